@@ -1,0 +1,47 @@
+"""The errors that misuse raises; expected outcomes are values with a status instead."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class SmsHandoverError(Exception):
+    """Root of every error this package raises on purpose; its text is one line for the user."""
+
+
+class ConfigurationError(SmsHandoverError, ValueError):
+    """A file, parameter or option holds a value that cannot be used."""
+
+
+class UnknownNameError(ConfigurationError):
+    """A name is not among the known ones; the message lists them and the nearest one."""
+
+    def __init__(self, kind: str, name: str, known: Iterable[str], where: str = "") -> None:
+        """Compose the message, e.g. ``unknown controller 'pdi': known are 'nmpc', 'pid'``."""
+        self.kind = kind
+        self.name = name
+        self.known = tuple(known)
+        nearest = get_close_matches(str(name), self.known, n=1)
+        hint = f" (did you mean {nearest[0]!r}?)" if nearest else ""
+        listed = ", ".join(repr(item) for item in self.known) or "none"
+        prefix = f"{where}: " if where else ""
+        super().__init__(f"{prefix}unknown {kind} {name!r}{hint}: known are {listed}")
+
+
+class RobotDescriptionError(ConfigurationError):
+    """The robot description is not a physical or not a consistent robot."""
+
+
+class ScheduleError(ConfigurationError):
+    """The task schedule cannot be carried out as written."""
+
+
+class UnstableLoopError(ConfigurationError):
+    """The sampled closed loop of gains and tick diverges at the start configuration."""
+
+
+class BagError(SmsHandoverError):
+    """A recording cannot be written, opened or trusted."""
+
+
+class GraphError(SmsHandoverError):
+    """The running graph broke its protocol: a node died, went silent or never appeared."""

@@ -1,0 +1,25 @@
+"""Frame names and the orders of components that the whole project keeps.
+
+Quaternions are stored x, y, z, w (as ROS messages and Pinocchio do). A twist is linear part
+first, then angular. ``a_in_b`` is the pose of frame ``a`` expressed in frame ``b``: it maps
+coordinates in ``a`` to coordinates in ``b``. ``docs/conventions.md`` gives the reasons.
+"""
+
+WORLD = "world"
+BASE = "base_link"
+DEPUTY = "deputy"
+
+
+def tool_frame(arm: str) -> str:
+    """Return the name of the tool frame of an arm, at the far end of its gripper."""
+    return f"{arm}_tool"
+
+
+def mount_frame(arm: str) -> str:
+    """Return the name of the frame on the spacecraft where an arm is bolted on."""
+    return f"{arm}_mount"
+
+
+def joint_name(arm: str, number: int) -> str:
+    """Return the name of joint ``number`` of an arm, counted from 1 at the mount."""
+    return f"{arm}_joint_{number}"

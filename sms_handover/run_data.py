@@ -1,0 +1,63 @@
+"""The record of one run as arrays, the same whether it came from a simulation or from a bag."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from sms_handover.types import GraspEvent, TaskPhase
+
+Array = npt.NDArray[np.float64]
+Stamps = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class RunData:
+    """One run: a row per tick (N of them), and a row per reference period (M of them).
+
+    Rows per tick: ``tick_ns`` (N,); joint arrays (N, n) in the order of ``joint_names``, where
+    ``joint_effort[k]`` acted over the tick that ended at ``tick_ns[k]`` and ``joint_command[k]``
+    answers the state of that stamp; ``base_pose`` (N, 7) position then quaternion x y z w of
+    ``base_link`` in ``world``; ``base_twist`` (N, 6) linear then angular in ``base_link`` axes.
+
+    Rows per reference period: ``reference_ns`` (M,); reference position and velocity (M, n);
+    per arm ``target_pose`` and ``tool_pose`` (M, 7) in ``world``; ``deputy_pose`` (M, 7);
+    momentum (M, 3) in ``world`` axes, the angular one about the centre of mass; ``kinetic_energy``
+    and ``work`` (M,) J; ``ik_status`` (M,) the number of the IkStatus message, -1 where none was asked.
+    """
+
+    joint_names: tuple[str, ...]
+    arms: tuple[str, ...]
+    tick_ns: Stamps
+    joint_position: Array
+    joint_velocity: Array
+    joint_effort: Array
+    joint_command: Array
+    base_pose: Array
+    base_twist: Array
+    reference_ns: Stamps
+    reference_position: Array
+    reference_velocity: Array
+    target_pose: Mapping[str, Array]
+    tool_pose: Mapping[str, Array]
+    deputy_pose: Array
+    linear_momentum: Array
+    angular_momentum: Array
+    kinetic_energy: Array
+    work: Array
+    ik_status: npt.NDArray[np.int64]
+    phases: tuple[TaskPhase, ...]
+    grasp_events: tuple[GraspEvent, ...]
+
+    def __post_init__(self) -> None:
+        """Make every array read-only and the mappings immutable."""
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+            elif isinstance(value, Mapping):
+                for array in value.values():
+                    array.setflags(write=False)
+                object.__setattr__(self, item.name, MappingProxyType(dict(value)))

@@ -1,0 +1,211 @@
+"""The values that cross the boundaries between core modules; every array in them is read-only.
+
+All are in SI units and radians. Joint arrays have one entry per joint, in the order of
+``RobotModel.joint_names``. Poses keep position and quaternion as they are in a message, so a
+value that went over DDS and one that did not are equal bit for bit.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+def read_only(values: npt.ArrayLike) -> Array:
+    """Return a float64 copy of ``values`` that cannot be written to."""
+    array = np.array(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """The pose ``a_in_b`` of one frame in another: position (3,) m and quaternion (4,) x y z w."""
+
+    position: Array
+    quaternion_xyzw: Array
+
+    def __post_init__(self) -> None:
+        """Copy the arrays and make them read-only."""
+        object.__setattr__(self, "position", read_only(self.position))
+        object.__setattr__(self, "quaternion_xyzw", read_only(self.quaternion_xyzw))
+
+
+@dataclass(frozen=True, eq=False)
+class Twist:
+    """Linear part (3,) m/s and angular part (3,) rad/s; the variable names the frames."""
+
+    linear: Array
+    angular: Array
+
+    def __post_init__(self) -> None:
+        """Copy the arrays and make them read-only."""
+        object.__setattr__(self, "linear", read_only(self.linear))
+        object.__setattr__(self, "angular", read_only(self.angular))
+
+
+@dataclass(frozen=True, eq=False)
+class RobotState:
+    """The whole state of the robot at one tick.
+
+    ``base_in_world`` is the pose of ``base_link``, ``twist_base_in_base`` its twist in its own
+    axes. ``joint_effort`` (n,) N m is what the plant applied over the tick that ended at ``stamp_ns``.
+    """
+
+    stamp_ns: int
+    base_in_world: Pose
+    twist_base_in_base: Twist
+    joint_position: Array
+    joint_velocity: Array
+    joint_effort: Array
+
+    def __post_init__(self) -> None:
+        """Copy the arrays and make them read-only."""
+        for name in ("joint_position", "joint_velocity", "joint_effort"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+@dataclass(frozen=True, eq=False)
+class JointReference:
+    """Desired joint position (n,) rad and velocity (n,) rad/s, valid from ``stamp_ns`` on."""
+
+    stamp_ns: int
+    position: Array
+    velocity: Array
+
+    def __post_init__(self) -> None:
+        """Copy the arrays and make them read-only."""
+        object.__setattr__(self, "position", read_only(self.position))
+        object.__setattr__(self, "velocity", read_only(self.velocity))
+
+
+@dataclass(frozen=True, eq=False)
+class JointCommand:
+    """Joint efforts (n,) N m that answer the state of the same stamp."""
+
+    stamp_ns: int
+    effort: Array
+
+    def __post_init__(self) -> None:
+        """Copy the array and make it read-only."""
+        object.__setattr__(self, "effort", read_only(self.effort))
+
+
+class IkStatus(Enum):
+    """How an inverse-kinematics solve ended; the value is what a user reads."""
+
+    CONVERGED = "converged"
+    STALLED = "stalled at the nearest pose found: the target is out of reach from this seed"
+    ITERATION_LIMIT = "stopped at the iteration limit"
+
+
+@dataclass(frozen=True, eq=False)
+class IkRequest:
+    """Targets of the tools in ``world``, per arm name, solved with the base locked where it is.
+
+    An arm without a target keeps the joints of the seed.
+    """
+
+    base_in_world: Pose
+    seed: Array
+    tool_in_world: Mapping[str, Pose]
+
+    def __post_init__(self) -> None:
+        """Copy seed and targets and make them read-only."""
+        object.__setattr__(self, "seed", read_only(self.seed))
+        object.__setattr__(self, "tool_in_world", MappingProxyType(dict(self.tool_in_world)))
+
+
+@dataclass(frozen=True, eq=False)
+class IkResult:
+    """The configuration found and how good it is, whatever the status.
+
+    ``position_error`` m and ``orientation_error`` rad are the largest over the arms asked for;
+    ``limit_margin`` rad is the smallest distance of any joint of the robot to its nearer limit;
+    ``manipulability`` has sqrt(det(J J^T)) per arm of the robot [Yoshikawa1985];
+    ``seed_distance`` rad is the largest joint step away from the seed.
+    """
+
+    joint_position: Array
+    status: IkStatus
+    iterations: int
+    position_error: float
+    orientation_error: float
+    limit_margin: float
+    manipulability: Array
+    seed_distance: float
+
+    def __post_init__(self) -> None:
+        """Copy the arrays and make them read-only."""
+        object.__setattr__(self, "joint_position", read_only(self.joint_position))
+        object.__setattr__(self, "manipulability", read_only(self.manipulability))
+
+
+class GraspAction(Enum):
+    """What a grasp command asks of the plant."""
+
+    GRASP = "grasp"
+    RELEASE = "release"
+    TRANSFER = "transfer"
+
+
+@dataclass(frozen=True)
+class GraspCommand:
+    """One act on the deputy: ``arm`` acts; a grasp names the deputy's grasp frame it closes on.
+
+    A transfer is a release by ``from_arm`` and a grasp by ``arm`` in the same instant, so no
+    closed kinematic chain forms; if the grasp misses, ``from_arm`` keeps its hold.
+    """
+
+    action: GraspAction
+    arm: str
+    grasp_frame: str = ""
+    from_arm: str = ""
+
+
+class GraspStatus(Enum):
+    """How the plant answered a grasp command."""
+
+    SUCCEEDED = "succeeded"
+    MISSED = "missed"
+    REJECTED = "rejected"
+
+
+@dataclass(frozen=True)
+class GraspEvent:
+    """What happened on a grasp command: errors of the tool against the grasp frame at that instant.
+
+    ``position_error`` m, ``angle_error`` rad, ``relative_speed`` m/s; NaN where they do not apply.
+    """
+
+    stamp_ns: int
+    command: GraspCommand
+    status: GraspStatus
+    position_error: float
+    angle_error: float
+    relative_speed: float
+    detail: str
+
+
+@dataclass(frozen=True)
+class TaskPhase:
+    """The phase of the schedule in force at ``stamp_ns`` and the grasp commands due at that instant."""
+
+    stamp_ns: int
+    index: int
+    name: str
+    commands: tuple[GraspCommand, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class DeputyState:
+    """Where the deputy is and who holds it: ``holder`` is an arm name, or '' while it floats."""
+
+    deputy_in_world: Pose
+    twist_deputy_in_world: Twist
+    holder: str
