@@ -1,0 +1,113 @@
+"""The topics of the graph as data: who publishes what, who needs it, and how often.
+
+The nodes make their endpoints from this table, wait on it until everything has matched, and the
+recorder checks its counts against it. Names are relative, so a namespace moves the whole graph;
+``/clock`` and ``/diagnostics`` are global by ROS convention.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
+
+PLANT = "plant"
+TRAJECTORY = "trajectory"
+IK = "ik"
+CONTROLLER = "controller"
+RECORDER = "recorder"
+LOOP_NODES = (PLANT, TRAJECTORY, IK, CONTROLLER)
+NODES = (*LOOP_NODES, RECORDER)
+
+CLOCK_PERIOD_NS = 10_000_000  # [ns] of simulation time between two /clock messages
+
+
+class Rate(Enum):
+    """When a topic gets a message."""
+
+    TICK = "every tick"
+    REFERENCE = "every reference period"
+    CLOCK = "every 10 ms of simulation time"
+    CHANGE = "on change, latched"
+    WALL = "every second of wall time"
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One topic: ROS name, type, the nodes that publish it and those (but the recorder) that need it."""
+
+    name: str
+    type: str
+    publishers: tuple[str, ...]
+    subscribers: tuple[str, ...]
+    rate: Rate
+
+    @property
+    def latched(self) -> bool:
+        """Tell whether a late subscriber still gets the last message."""
+        return self.rate is Rate.CHANGE
+
+
+def target_pose(arm: str) -> str:
+    """Return the name of the topic with an arm's target pose."""
+    return f"{arm}/target_pose"
+
+
+def tool_pose(arm: str) -> str:
+    """Return the name of the topic with an arm's tool pose."""
+    return f"{arm}/tool_pose"
+
+
+JOINT_STATES = "joint_states"
+BASE_ODOMETRY = "base_odometry"
+JOINT_COMMAND = "joint_command"
+JOINT_REFERENCE = "joint_reference"
+TASK_PHASE = "task/phase"
+GRASP_EVENT = "task/grasp_event"
+DEPUTY_POSE = "deputy/pose"
+LINEAR_MOMENTUM = "momentum/linear"
+ANGULAR_MOMENTUM = "momentum/angular"
+ENERGY = "energy"
+IK_STATUS = "ik/status"
+ROBOT_DESCRIPTION = "robot_description"
+RUN_STATE = "run/state"
+RUN_READY = "run/ready"
+RUN_PUBLISHED = "run/published"
+LOOP_TIMING = "loop_timing"
+CLOCK = "/clock"
+DIAGNOSTICS = "/diagnostics"
+TF = "/tf"  # written into the bag by the recorder; tf2_msgs cannot be imported everywhere
+
+SOLVE_IK = "solve_ik"  # service of the ik node
+
+_OURS = "sms_handover_interfaces/msg"
+
+
+def graph_topics(arms: Iterable[str]) -> tuple[Topic, ...]:
+    """Return every topic of the graph for a robot with these arms."""
+    state_readers = (TRAJECTORY, CONTROLLER)
+    everyone_else = (TRAJECTORY, IK, CONTROLLER)
+    pose, vector = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/Vector3Stamped"
+    joints, text = "sensor_msgs/msg/JointState", "std_msgs/msg/String"
+    table = [
+        Topic(JOINT_STATES, joints, (PLANT,), state_readers, Rate.TICK),
+        Topic(BASE_ODOMETRY, "nav_msgs/msg/Odometry", (PLANT,), state_readers, Rate.TICK),
+        Topic(JOINT_COMMAND, joints, (CONTROLLER,), (PLANT,), Rate.TICK),
+        Topic(JOINT_REFERENCE, joints, (TRAJECTORY,), (CONTROLLER,), Rate.REFERENCE),
+        Topic(TASK_PHASE, f"{_OURS}/TaskPhase", (TRAJECTORY,), (PLANT, CONTROLLER), Rate.REFERENCE),
+        Topic(DEPUTY_POSE, pose, (PLANT,), (TRAJECTORY,), Rate.REFERENCE),
+        Topic(GRASP_EVENT, f"{_OURS}/GraspEvent", (PLANT,), (), Rate.CHANGE),
+        Topic(LINEAR_MOMENTUM, vector, (PLANT,), (), Rate.REFERENCE),
+        Topic(ANGULAR_MOMENTUM, vector, (PLANT,), (), Rate.REFERENCE),
+        Topic(ENERGY, f"{_OURS}/EnergyStamped", (PLANT,), (), Rate.REFERENCE),
+        Topic(IK_STATUS, f"{_OURS}/IkStatus", (TRAJECTORY,), (), Rate.REFERENCE),
+        Topic(ROBOT_DESCRIPTION, text, (PLANT,), (), Rate.CHANGE),
+        Topic(RUN_STATE, f"{_OURS}/RunState", (PLANT,), everyone_else, Rate.CHANGE),
+        Topic(RUN_READY, text, everyone_else, (PLANT,), Rate.CHANGE),
+        Topic(RUN_PUBLISHED, f"{_OURS}/PublishedCounts", LOOP_NODES, (), Rate.CHANGE),
+        Topic(LOOP_TIMING, f"{_OURS}/LoopTiming", (PLANT,), (), Rate.WALL),
+        Topic(CLOCK, "rosgraph_msgs/msg/Clock", (PLANT,), (), Rate.CLOCK),
+        Topic(DIAGNOSTICS, "diagnostic_msgs/msg/DiagnosticArray", LOOP_NODES, (), Rate.WALL),
+    ]
+    for arm in arms:
+        table.append(Topic(target_pose(arm), pose, (TRAJECTORY,), (), Rate.REFERENCE))
+        table.append(Topic(tool_pose(arm), pose, (PLANT,), (), Rate.REFERENCE))
+    return tuple(table)
