@@ -1,0 +1,141 @@
+"""The robot description as URDF text, for Pinocchio and for every tool that draws a robot.
+
+Numbers keep full double precision. Rotor inertia has no place in URDF; it stays in the description.
+"""
+
+from collections.abc import Sequence
+from math import atan2, hypot
+from xml.etree import ElementTree as ET
+
+from sms_handover.frames import BASE, mount_frame, tool_frame
+from sms_handover.model.parts import (
+    ArmDescription,
+    Inertia,
+    JointDescription,
+    LinkDescription,
+    Origin,
+    RobotDescription,
+)
+
+_COLOURS = {  # [-] red, green, blue, opacity; appearance only
+    "body": (0.75, 0.68, 0.45, 1.0),
+    "panel": (0.10, 0.16, 0.42, 1.0),
+    "link": (0.80, 0.82, 0.85, 1.0),
+    "gripper": (0.25, 0.27, 0.30, 1.0),
+}
+_AT_ORIGIN = Origin((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def to_urdf(robot: RobotDescription) -> str:
+    """Return the robot as URDF with ``base_link`` as its root.
+
+    Per arm: link ``<arm>_mount`` fixed to the body, joints ``<arm>_joint_<i>`` moving links
+    ``<arm>_link_<i>``, then ``<arm>_gripper`` with its frame on the flange and ``<arm>_tool``, fixed.
+    Shapes are boxes and cylinders; the solar panels are visual only.
+    """
+    root = ET.Element("robot", name=robot.name)
+    for name, rgba in _COLOURS.items():
+        ET.SubElement(ET.SubElement(root, "material", name=name), "color", rgba=_numbers(rgba))
+    base = _link(root, BASE, robot.base.inertia)
+    _box(base, robot.base.size, _AT_ORIGIN, "body", solid=True)
+    for panel in robot.base.panels:
+        _box(base, panel.size, Origin(panel.xyz, (0.0, 0.0, 0.0)), "panel", solid=False)
+    for arm in robot.arms:
+        _arm(root, arm)
+    ET.indent(root)
+    return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _arm(root: ET.Element, arm: ArmDescription) -> None:
+    """Add the links and joints of one arm, from its mount to its tool frame."""
+    parent = mount_frame(arm.name)
+    pedestal = _link(root, parent)
+    _cylinder_to(pedestal, arm.joints[0].origin.xyz, arm.links[0].radius, "link")
+    _fixed(root, BASE, parent, arm.mount)
+    ends = [joint.origin.xyz for joint in arm.joints[1:]] + [arm.flange.xyz]
+    for joint, link, end in zip(arm.joints, arm.links, ends, strict=True):
+        _moving(root, parent, joint, link)
+        _cylinder_to(_link(root, link.name, link.inertia), end, link.radius, "link")
+        parent = link.name
+    gripper = arm.gripper
+    body = _link(root, gripper.name, gripper.inertia)
+    _cylinder_to(body, gripper.tool.xyz, gripper.radius, "gripper")
+    _fixed(root, parent, gripper.name, arm.flange)
+    _link(root, tool_frame(arm.name))
+    _fixed(root, gripper.name, tool_frame(arm.name), gripper.tool)
+
+
+def _link(root: ET.Element, name: str, inertia: Inertia | None = None) -> ET.Element:
+    """Add a link; without an inertia it is a massless frame."""
+    link = ET.SubElement(root, "link", name=name)
+    if inertia is not None:
+        element = ET.SubElement(link, "inertial")
+        _origin(element, Origin(inertia.com, (0.0, 0.0, 0.0)))
+        ET.SubElement(element, "mass", value=repr(inertia.mass))
+        keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+        moments = {key: repr(moment) for key, moment in zip(keys, inertia.moments, strict=True)}
+        ET.SubElement(element, "inertia", moments)
+    return link
+
+
+def _fixed(root: ET.Element, parent: str, child: str, origin: Origin) -> None:
+    _joint(root, f"{child}_fixed", "fixed", parent, child, origin)
+
+
+def _moving(root: ET.Element, parent: str, joint: JointDescription, link: LinkDescription) -> None:
+    element = _joint(root, joint.name, "revolute", parent, link.name, joint.origin)
+    ET.SubElement(element, "axis", xyz=_numbers(joint.axis))
+    limits = {
+        "lower": repr(joint.lower),
+        "upper": repr(joint.upper),
+        "velocity": repr(joint.velocity),
+        "effort": repr(joint.effort),
+    }
+    ET.SubElement(element, "limit", limits)
+
+
+def _joint(root: ET.Element, name: str, kind: str, parent: str, child: str, origin: Origin) -> ET.Element:
+    element = ET.SubElement(root, "joint", name=name, type=kind)
+    _origin(element, origin)
+    ET.SubElement(element, "parent", link=parent)
+    ET.SubElement(element, "child", link=child)
+    return element
+
+
+def _box(link: ET.Element, size: Sequence[float], origin: Origin, colour: str, *, solid: bool) -> None:
+    """Add a box to what is drawn and, if it is solid, to what collides."""
+    for element in _shapes(link, origin, colour, solid=solid):
+        ET.SubElement(element, "box", size=_numbers(size))
+
+
+def _cylinder_to(link: ET.Element, end: Sequence[float], radius: float, colour: str) -> None:
+    """Add a solid cylinder from the origin of a link's frame to ``end`` (3,) m, if they differ."""
+    x, y, z = end
+    across = hypot(x, y)
+    length = hypot(across, z)
+    if length == 0.0:
+        return
+    middle = Origin((x / 2.0, y / 2.0, z / 2.0), (0.0, atan2(across, z), atan2(y, x)))
+    for element in _shapes(link, middle, colour, solid=True):
+        ET.SubElement(element, "cylinder", radius=repr(radius), length=repr(length))
+
+
+def _shapes(link: ET.Element, origin: Origin, colour: str, *, solid: bool) -> list[ET.Element]:
+    """Add a visual and, if solid, a collision element; return the geometry elements to fill."""
+    geometries = []
+    for kind in ("visual", "collision") if solid else ("visual",):
+        element = ET.SubElement(link, kind)
+        _origin(element, origin)
+        geometries.append(ET.SubElement(element, "geometry"))
+        if kind == "visual":
+            ET.SubElement(element, "material", name=colour)
+    return geometries
+
+
+def _origin(parent: ET.Element, origin: Origin) -> None:
+    ET.SubElement(parent, "origin", xyz=_numbers(origin.xyz), rpy=_numbers(origin.rpy))
+
+
+def _numbers(values: Sequence[float]) -> str:
+    """Return the values with as many digits as it takes to read them back exactly."""
+    return " ".join(repr(float(value)) for value in values)
