@@ -1,0 +1,104 @@
+"""The loss ledger of a recording: per topic what was received, what is missing and how evenly it came."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+
+from sms_handover.errors import BagError
+from sms_handover.units import NS_PER_S
+
+_HEADING = ("topic", "received", "published", "missing", "twice", "late", "rate [Hz]", "largest gap [ms]")
+
+LEDGER_RECORD = "sms_handover.ledger"  # name of the metadata record in the bag
+
+
+@dataclass(frozen=True)
+class TopicLedger:
+    """The account of one topic; stamps are simulation time in nanoseconds.
+
+    ``missing`` counts the stamps between the first and the last that never came, ``duplicates``
+    those that came again, ``out_of_order`` those that came after a later one. Without a fixed
+    period (``period_ns`` 0) nothing can be missing and equal stamps are no duplicates. Stamps are
+    None where no message came or the type carries none; ``published`` is None where nobody
+    reported it.
+    """
+
+    name: str
+    period_ns: int
+    received: int
+    first_ns: int | None
+    last_ns: int | None
+    missing: int
+    duplicates: int
+    out_of_order: int
+    largest_gap_ns: int
+    published: int | None
+
+    @property
+    def lost(self) -> int | None:
+        """Return how many published messages were not received, None if that is unknown."""
+        return None if self.published is None else self.published - self.received
+
+    @property
+    def rate(self) -> float | None:
+        """Return the messages per second of simulation time, None for fewer than two stamps."""
+        if self.first_ns is None or self.last_ns is None or self.last_ns <= self.first_ns:
+            return None
+        return (self.received - 1) * NS_PER_S / (self.last_ns - self.first_ns)
+
+    @property
+    def complete(self) -> bool:
+        """Tell whether nothing is known to be missing."""
+        return self.missing == 0 and (self.lost is None or self.lost <= 0)
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """The accounts of all topics of a recording."""
+
+    topics: tuple[TopicLedger, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Tell whether no topic is known to miss anything."""
+        return all(topic.complete for topic in self.topics)
+
+    def to_record(self) -> dict[str, str]:
+        """Return the ledger as a metadata record: one JSON object per topic."""
+        return {topic.name: json.dumps(_without_name(topic)) for topic in self.topics}
+
+    @classmethod
+    def from_record(cls, record: Mapping[str, str]) -> "Ledger":
+        """Return the ledger in a metadata record; raises BagError if it is not one."""
+        try:
+            return cls(tuple(TopicLedger(name=name, **json.loads(text)) for name, text in record.items()))
+        except (TypeError, ValueError) as error:
+            raise BagError(f"the loss ledger of the bag is not readable: {error}") from error
+
+
+def ledger_table(ledger: Ledger) -> str:
+    """Return the ledger as text, one line per topic under a heading."""
+    rows = [_HEADING, *(_row(topic) for topic in ledger.topics)]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(_HEADING))]
+    return "\n".join(
+        "  ".join((name.ljust(widths[0]), *map(str.rjust, cells, widths[1:]))) for name, *cells in rows
+    )
+
+
+def _row(topic: TopicLedger) -> tuple[str, ...]:
+    """Return the cells of one topic."""
+    return (
+        topic.name,
+        str(topic.received),
+        "-" if topic.published is None else str(topic.published),
+        str(topic.missing) if topic.period_ns else "-",
+        str(topic.duplicates),
+        str(topic.out_of_order),
+        "-" if topic.rate is None else f"{topic.rate:.1f}",
+        "-" if topic.rate is None else f"{topic.largest_gap_ns / 1e6:.3f}",
+    )
+
+
+def _without_name(topic: TopicLedger) -> dict[str, object]:
+    """Return the fields of an account but its name."""
+    return {key: value for key, value in asdict(topic).items() if key != "name"}

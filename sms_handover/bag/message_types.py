@@ -1,0 +1,128 @@
+"""Message definitions by type name: schema text, type hash, and (de)serialisation without ROS.
+
+The standard types are those of Jazzy; every other type is read from its ``.msg`` file, so our own
+messages and those of a user's package are recorded alike.
+"""
+
+import os
+import sysconfig
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+
+from sms_handover.errors import BagError
+
+_SOURCE_PACKAGE = "sms_handover_interfaces"
+_TIME = "builtin_interfaces/msg/Time"
+_HEADER = "std_msgs/msg/Header"
+_ROS2_SYNTAX = 2
+
+
+@dataclass(frozen=True)
+class Schema:
+    """What a bag stores of a type: ``text`` as rosbag2 concatenates it, ``type_hash`` as RIHS01."""
+
+    type: str
+    text: str
+    type_hash: str
+
+
+class MessageTypes:
+    """The types known so far; more are found on demand in the source tree and the prefixes."""
+
+    def __init__(self, roots: Iterable[Path] | None = None) -> None:
+        """Look for ``<package>/msg/<Type>.msg`` under ``roots``, by default :func:`definition_roots`."""
+        self._roots = tuple(definition_roots() if roots is None else roots)
+        self._store = get_typestore(Stores.ROS2_JAZZY)
+
+    def schema(self, type_name: str) -> Schema:
+        """Return the schema of a type; raises BagError if it has no readable definition."""
+        self.require(type_name)
+        text, _ = self._store.generate_msgdef(type_name, ros_version=_ROS2_SYNTAX)
+        return Schema(type_name, text, self._store.hash_rihs01(type_name))
+
+    def stamped(self, type_name: str) -> bool:
+        """Tell whether a message of this type begins with a time: a Header or a Time comes first."""
+        self.require(type_name)
+        fields = self._store.fielddefs[type_name][1]
+        return bool(fields) and fields[0][1][1] in (_TIME, _HEADER)
+
+    def make(self, type_name: str, **values: Any) -> Any:
+        """Return a message object of a type with all its fields given."""
+        self.require(type_name)
+        return self._store.types[type_name](**values)
+
+    def serialize(self, message: Any) -> bytes:
+        """Return the CDR bytes of a message object, header included."""
+        return bytes(self._store.serialize_cdr(message, message.__msgtype__))
+
+    def deserialize(self, data: bytes | memoryview, type_name: str) -> Any:
+        """Return the message object in CDR bytes; raises BagError if they are not of this type."""
+        self.require(type_name)
+        try:
+            return self._store.deserialize_cdr(data, type_name)
+        except SerdeError as error:
+            raise BagError(f"a message does not decode as {type_name}: {error}") from error
+
+    def require(self, type_name: str) -> None:
+        """Make sure that a type and all it is made of are known, or raise BagError."""
+        pending, found = [type_name], {}
+        while pending:
+            name = pending.pop()
+            if name in self._store.fielddefs or name in found:
+                continue
+            definitions = self._parse(name)
+            found.update(definitions)
+            for _, fields in definitions.values():
+                pending.extend(nested for _, field in fields for nested in _nested_types(field))
+        if found:
+            try:
+                self._store.register(found)
+            except TypesysError as error:
+                raise BagError(f"the definition of {type_name} cannot be used: {error}") from error
+
+    def _parse(self, type_name: str) -> dict[str, Any]:
+        """Return the definitions in the ``.msg`` file of a type."""
+        package, _, short = type_name.partition("/msg/")
+        candidates = [root / package / "msg" / f"{short}.msg" for root in self._roots]
+        if package == _SOURCE_PACKAGE:
+            candidates.insert(0, _source_interfaces() / "msg" / f"{short}.msg")
+        path = next((path for path in candidates if short and path.is_file()), None)
+        if path is None:
+            raise BagError(
+                f"no definition of the message type {type_name!r}: looked for {short or type_name}.msg"
+                f" in {', '.join(str(root) for root in self._roots)}"
+            )
+        try:
+            return dict(get_types_from_msg(path.read_text(encoding="utf-8"), type_name))
+        except (OSError, UnicodeDecodeError, TypesysError) as error:
+            reason = " ".join(str(error).split())
+            raise BagError(f"the definition of {type_name} in {path} is not readable: {reason}") from error
+
+
+def definition_roots() -> tuple[Path, ...]:
+    """Return the ``share`` folders that hold message definitions, nearest first.
+
+    These are those of every ROS workspace (AMENT_PREFIX_PATH), then of the interpreter's environment.
+    """
+    prefixes = [prefix for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix]
+    prefixes.append(sysconfig.get_path("data"))
+    return tuple(Path(prefix) / "share" for prefix in prefixes)
+
+
+def _source_interfaces() -> Path:
+    """Return where our interface package is when this module runs from the source tree."""
+    return Path(__file__).resolve().parent.parent.parent / "interfaces"
+
+
+def _nested_types(field: Any) -> list[str]:
+    """Return the names of the message types that a parsed field is made of."""
+    _, content = field
+    if isinstance(content, str):
+        return [content]
+    first, _ = content
+    return _nested_types(first) if isinstance(first, tuple) else []

@@ -1,0 +1,76 @@
+"""The description of a bag that rosbag2 keeps in ``metadata.yaml`` and inside the file, version 9."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import yaml
+
+from sms_handover.bag.qos import Qos
+
+METADATA_FILE = "metadata.yaml"
+ROSBAG2_KEY = "rosbag2_bagfile_information"
+_VERSION = 9
+_ROS_DISTRO = "jazzy"
+
+
+@dataclass(frozen=True)
+class TopicCount:
+    """One topic of a bag and how many messages it holds."""
+
+    name: str
+    type: str
+    type_hash: str
+    qos: tuple[Qos, ...]
+    message_count: int
+
+
+def bag_information(
+    file_name: str, start_ns: int, end_ns: int, topics: Sequence[TopicCount]
+) -> dict[str, Any]:
+    """Return the body of the metadata for a bag of one MCAP file."""
+    return {
+        "version": _VERSION,
+        "storage_identifier": "mcap",
+        **_span(start_ns, end_ns, topics),
+        "topics_with_message_count": [_topic_information(topic) for topic in topics],
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": [file_name],
+        "files": [{"path": file_name, **_span(start_ns, end_ns, topics)}],
+        "custom_data": None,
+        "ros_distro": _ROS_DISTRO,
+    }
+
+
+def to_yaml(value: object) -> str:
+    """Return YAML text in block style, keys in the order given."""
+    return str(yaml.safe_dump(value, sort_keys=False, default_flow_style=False, allow_unicode=True))
+
+
+def qos_text(profiles: Sequence[Qos]) -> str:
+    """Return the YAML list that a channel carries as ``offered_qos_profiles``."""
+    return to_yaml([profile.to_rosbag2() for profile in profiles]).strip() if profiles else ""
+
+
+def _span(start_ns: int, end_ns: int, topics: Sequence[TopicCount]) -> dict[str, Any]:
+    """Return what both a bag and a file of it tell; a new object each time, so YAML needs no anchors."""
+    return {
+        "duration": {"nanoseconds": end_ns - start_ns},
+        "starting_time": {"nanoseconds_since_epoch": start_ns},
+        "message_count": sum(topic.message_count for topic in topics),
+    }
+
+
+def _topic_information(topic: TopicCount) -> dict[str, Any]:
+    """Return the entry of one topic."""
+    return {
+        "topic_metadata": {
+            "name": topic.name,
+            "type": topic.type,
+            "serialization_format": "cdr",
+            "offered_qos_profiles": [profile.to_rosbag2() for profile in topic.qos],
+            "type_description_hash": topic.type_hash,
+        },
+        "message_count": topic.message_count,
+    }

@@ -1,0 +1,54 @@
+"""Quality of service of a recorded topic, in the form that rosbag2 stores."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Reliability(Enum):
+    """Whether a lost sample is sent again."""
+
+    RELIABLE = "reliable"
+    BEST_EFFORT = "best_effort"
+
+
+class Durability(Enum):
+    """Whether a late subscriber still gets the last samples."""
+
+    VOLATILE = "volatile"
+    TRANSIENT_LOCAL = "transient_local"
+
+
+class History(Enum):
+    """How many samples a publisher keeps."""
+
+    KEEP_LAST = "keep_last"
+    KEEP_ALL = "keep_all"
+
+
+@dataclass(frozen=True)
+class Qos:
+    """What a publisher of a recorded topic offered; deadline, lifespan and lease are infinite."""
+
+    reliability: Reliability = Reliability.RELIABLE
+    durability: Durability = Durability.VOLATILE
+    history: History = History.KEEP_LAST
+    depth: int = 10
+
+    def to_rosbag2(self) -> dict[str, object]:
+        """Return the profile as version 9 of the rosbag2 metadata writes it."""
+        return {
+            "history": self.history.value,
+            "depth": self.depth,
+            "reliability": self.reliability.value,
+            "durability": self.durability.value,
+            "deadline": _infinite(),
+            "lifespan": _infinite(),
+            "liveliness": "automatic",
+            "liveliness_lease_duration": _infinite(),
+            "avoid_ros_namespace_conventions": False,
+        }
+
+
+def _infinite() -> dict[str, int]:
+    """Return the duration that ROS 2 reads as infinite."""
+    return {"sec": 9223372036, "nsec": 854775807}

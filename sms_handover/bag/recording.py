@@ -1,0 +1,103 @@
+"""Record the raw messages of a running graph: bag, loss ledger and clock in one object."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+
+from sms_handover.bag.counting import LedgerKeeper
+from sms_handover.bag.ledger import LEDGER_RECORD, Ledger
+from sms_handover.bag.message_types import MessageTypes
+from sms_handover.bag.qos import Qos
+from sms_handover.bag.stamp import stamp_ns
+from sms_handover.bag.writer import BagWriter
+
+PUBLISHED_COUNTS = "sms_handover_interfaces/msg/PublishedCounts"
+
+_LONGEST_RUN_NS = 10**17  # [ns] three years; a later stamp is the wall clock's
+
+
+class Recording:
+    """An open recording of a graph; close it, or use it as a context manager.
+
+    Whoever feeds it needs to know nothing of a message but its topic: the stamp is read from the
+    bytes and becomes the log time, the counts that nodes report at their end go to the ledger. A
+    message without a stamp, or with one of the wall clock, gets the newest simulation time.
+    """
+
+    def __init__(self, folder: Path, *, types: MessageTypes | None = None) -> None:
+        """Create the bag; raises BagError if ``folder`` exists or cannot be made."""
+        self.writer = BagWriter(folder, types=types)
+        self._types = self.writer.types
+        self._keeper = LedgerKeeper()
+        self._stamped: dict[str, bool] = {}
+        self._reports: set[str] = set()
+        self._now_ns = 0
+
+    def __enter__(self) -> "Recording":
+        """Return the recording."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close the recording, on an error in the block too."""
+        with self.writer:
+            self._record_ledger()
+
+    @property
+    def ledger(self) -> Ledger:
+        """Return the loss ledger as it stands."""
+        return self._keeper.ledger()
+
+    @property
+    def simulation_ns(self) -> int:
+        """Return the newest simulation time received."""
+        return self._now_ns
+
+    def add_topic(self, name: str, type_name: str, qos: Sequence[Qos] = (), period_ns: int = 0) -> None:
+        """Open a topic; ``period_ns`` is the fixed step of its stamps, 0 if it has none."""
+        self.writer.add_topic(name, type_name, qos)
+        self._keeper.add_topic(name, period_ns)
+        self._stamped[name] = self._types.stamped(type_name)
+        if type_name == PUBLISHED_COUNTS:
+            self._reports.add(name)
+
+    def receive(self, topic: str, data: bytes, wall_ns: int) -> None:
+        """Record the CDR bytes of one message that arrived at ``wall_ns``."""
+        if self._stamped.get(topic):
+            time_ns = stamp_ns(data)
+            if 0 <= time_ns < _LONGEST_RUN_NS:
+                if time_ns > self._now_ns:
+                    self._now_ns = time_ns
+                self.writer.write(topic, data, time_ns, wall_ns)
+                self._keeper.receive(topic, time_ns)
+                return
+        self.writer.write(topic, data, self._now_ns, wall_ns)
+        self._keeper.receive_unstamped(topic)
+        if topic in self._reports:
+            self._book_counts(data)
+
+    def receive_at(self, topic: str, data: bytes, time_ns: int, wall_ns: int) -> None:
+        """Record one message whose simulation time the caller knows, e.g. the transforms it made itself."""
+        self.writer.write(topic, data, time_ns, wall_ns)
+        self._keeper.receive(topic, time_ns)
+
+    def close(self) -> None:
+        """Write the ledger and complete the bag; a second call does nothing."""
+        if not self.writer.closed:
+            with self.writer:
+                self._record_ledger()
+
+    def _record_ledger(self) -> None:
+        """Write the ledger into the bag unless it is closed."""
+        if not self.writer.closed:
+            self.writer.record(LEDGER_RECORD, self.ledger.to_record())
+
+    def _book_counts(self, data: bytes) -> None:
+        """Book what a node says it has published."""
+        report = self._types.deserialize(data, PUBLISHED_COUNTS)
+        for topic, count in zip(report.topics, report.counts, strict=False):
+            self._keeper.report_published(report.node, topic, int(count))

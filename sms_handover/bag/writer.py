@@ -1,0 +1,236 @@
+"""Write a recording: one MCAP file and ``metadata.yaml`` in a new folder, as rosbag2 lays it out.
+
+``log_time`` of a message is simulation time, so readers and players see the run's own clock;
+``publish_time`` is wall time, so what happened to the messages on the way stays visible.
+"""
+
+import os
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from io import BufferedWriter
+from pathlib import Path
+from types import TracebackType
+
+from mcap.writer import CompressionType, Writer
+
+from sms_handover.bag.message_types import MessageTypes, Schema
+from sms_handover.bag.metadata import (
+    METADATA_FILE,
+    ROSBAG2_KEY,
+    TopicCount,
+    bag_information,
+    qos_text,
+    to_yaml,
+)
+from sms_handover.bag.qos import Qos
+from sms_handover.errors import BagError
+
+CHUNK_SIZE = 64 * 1024  # [byte] of uncompressed messages held back at most
+FLUSH_PERIOD_NS = 20_000_000  # [ns] of log time held back at most
+
+_PROFILE = "ros2"
+_LIBRARY = "sms_handover"
+_ROSBAG2_RECORD = "rosbag2"
+
+
+@dataclass
+class _Topic:
+    """An open channel; ``count`` grows with each message."""
+
+    schema: Schema
+    qos: tuple[Qos, ...]
+    channel: int
+    count: int = 0
+
+
+class BagWriter:
+    """An open recording; use it as a context manager, it leaves a complete bag even on an error."""
+
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        types: MessageTypes | None = None,
+        chunk_size: int = CHUNK_SIZE,
+        flush_period_ns: int = FLUSH_PERIOD_NS,
+    ) -> None:
+        """Create ``folder`` and ``<folder>/<name>_0.mcap``; raises BagError if it cannot."""
+        self.folder = Path(folder)
+        self.path = self.folder / f"{self.folder.name}_0.mcap"
+        self.types = MessageTypes() if types is None else types
+        self._flush_period_ns = flush_period_ns
+        self._flushed_ns = 0
+        self._start_ns: int | None = None
+        self._end_ns = 0
+        self._topics: dict[str, _Topic] = {}
+        self._schemas: dict[str, int] = {}
+        self._closed = False
+        self._stream = _create(self.folder, self.path)
+        self._mcap = Writer(self._stream, chunk_size=chunk_size, compression=CompressionType.ZSTD)
+        try:
+            self._mcap.start(profile=_PROFILE, library=_LIBRARY)
+            self._describe()  # a file that is never closed still tells how its QoS texts are to be read
+            self._stream.flush()
+        except OSError as error:
+            self._stream.close()
+            raise self._failure(error) from error
+
+    def __enter__(self) -> "BagWriter":
+        """Return the writer."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close the bag; on an error in the block too, and then that error is the one that counts."""
+        if error is None:
+            self.close()
+        else:
+            with suppress(BagError):
+                self.close()
+
+    @property
+    def closed(self) -> bool:
+        """Tell whether the bag has been closed."""
+        return self._closed
+
+    @property
+    def message_counts(self) -> dict[str, int]:
+        """Return the number of messages written so far, by topic."""
+        return {name: topic.count for name, topic in self._topics.items()}
+
+    def add_topic(self, name: str, type_name: str, qos: Sequence[Qos] = ()) -> None:
+        """Open a topic for writing; raises BagError on a second topic of that name or an unknown type."""
+        self._require_open()
+        if name in self._topics:
+            raise BagError(f"topic {name!r} is recorded into {self.folder} already")
+        schema = self.types.schema(type_name)
+        if type_name not in self._schemas:
+            self._schemas[type_name] = self._mcap.register_schema(type_name, "ros2msg", schema.text.encode())
+        channel = self._mcap.register_channel(
+            name,
+            "cdr",
+            self._schemas[type_name],
+            {"offered_qos_profiles": qos_text(qos), "topic_type_hash": schema.type_hash},
+        )
+        self._topics[name] = _Topic(schema, tuple(qos), channel)
+
+    def write(self, topic: str, data: bytes, log_time_ns: int, publish_time_ns: int) -> None:
+        """Append the CDR bytes of one message; the topic must have been added."""
+        try:
+            entry = self._topics[topic]
+            self._mcap.add_message(entry.channel, log_time_ns, data, publish_time_ns)
+        except KeyError:
+            raise BagError(f"topic {topic!r} was not added to the recording in {self.folder}") from None
+        except (OSError, ValueError) as error:
+            raise self._failure(error) from error
+        entry.count += 1
+        if self._start_ns is None or log_time_ns < self._start_ns:
+            self._start_ns = log_time_ns
+        if log_time_ns > self._end_ns:
+            self._end_ns = log_time_ns
+        if log_time_ns - self._flushed_ns >= self._flush_period_ns:
+            self.flush()
+
+    def flush(self) -> None:
+        """Hand everything written so far to the operating system; call it also when no messages come."""
+        self._flushed_ns = self._end_ns
+        try:
+            self._mcap.flush()  # type: ignore[no-untyped-call]
+        except (OSError, ValueError) as error:
+            raise self._failure(error) from error
+
+    def attach(self, name: str, media_type: str, content: bytes, wall_time_ns: int = 0) -> None:
+        """Store a whole file in the bag, e.g. ``robot.urdf``."""
+        self._require_open()
+        try:
+            self._mcap.add_attachment(wall_time_ns, wall_time_ns, name, media_type, content)
+        except OSError as error:
+            raise self._failure(error) from error
+
+    def record(self, name: str, values: Mapping[str, str]) -> None:
+        """Store a metadata record: a name with keys and texts."""
+        self._require_open()
+        try:
+            self._mcap.add_metadata(name, dict(values))
+        except OSError as error:
+            raise self._failure(error) from error
+
+    def close(self) -> None:
+        """Complete the bag and wait until it is on the disk; a second call does nothing."""
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            with self._stream as stream:
+                self._mcap.flush()  # type: ignore[no-untyped-call]
+                self._describe()
+                self._mcap.finish()  # type: ignore[no-untyped-call]
+                stream.flush()
+                os.fsync(stream.fileno())
+            _write_synced(self.folder / METADATA_FILE, to_yaml({ROSBAG2_KEY: self._information()}))
+            _sync_folder(self.folder)
+        except (OSError, ValueError) as error:
+            raise self._failure(error) from error
+
+    def _describe(self) -> None:
+        """Write the record from which rosbag2 reads the metadata if ``metadata.yaml`` is lost."""
+        self._mcap.add_metadata(_ROSBAG2_RECORD, {"serialized_metadata": to_yaml(self._information())})
+
+    def _information(self) -> dict[str, object]:
+        """Return the metadata of what has been written so far."""
+        topics = [
+            TopicCount(name, topic.schema.type, topic.schema.type_hash, topic.qos, topic.count)
+            for name, topic in self._topics.items()
+        ]
+        start_ns = 0 if self._start_ns is None else self._start_ns
+        return bag_information(self.path.name, start_ns, max(start_ns, self._end_ns), topics)
+
+    def _require_open(self) -> None:
+        """Raise BagError if the bag has been closed."""
+        if self._closed:
+            raise BagError(f"the recording in {self.folder} is closed")
+
+    def _failure(self, error: Exception) -> BagError:
+        """Return the error for the user after the file system refused something."""
+        if self._closed and not isinstance(error, OSError):
+            return BagError(f"the recording in {self.folder} is closed")
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        return BagError(f"cannot write the recording {self.path}: {reason}")
+
+
+def _create(folder: Path, path: Path) -> BufferedWriter:
+    """Create the folder, which must not exist, and open the file in it."""
+    try:
+        folder.mkdir()
+        return path.open("xb")
+    except FileExistsError:
+        raise BagError(
+            f"{folder} exists already: a recording never overwrites, choose another output folder"
+        ) from None
+    except FileNotFoundError:
+        raise BagError(f"cannot create {folder}: its parent folder does not exist") from None
+    except OSError as error:
+        raise BagError(f"cannot create the recording {folder}: {error.strerror}") from error
+
+
+def _write_synced(path: Path, text: str) -> None:
+    """Write a text file and wait until it is on the disk."""
+    with path.open("x", encoding="utf-8") as stream:
+        stream.write(text)
+        stream.flush()
+        os.fsync(stream.fileno())
+
+
+def _sync_folder(folder: Path) -> None:
+    """Wait until the names in a folder are on the disk, where the system can do that."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
