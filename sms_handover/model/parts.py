@@ -1,13 +1,11 @@
-"""The parts of a robot as plain values; every part that exists has been checked.
+"""The parts of an arm as plain values; every part that exists has been checked.
 
 Numbers are in SI units and radians; tuples keep the parts comparable and immutable.
 """
 
-from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
-from re import fullmatch
 
-from sms_handover.errors import RobotDescriptionError, UnknownNameError
 from sms_handover.model.validation import (
     check_moments,
     check_position_limits,
@@ -20,6 +18,19 @@ from sms_handover.model.validation import (
 from sms_handover.types import Array, read_only
 
 Floats = tuple[float, ...]
+
+
+def box_moments(mass: float, size: Sequence[float]) -> Floats:
+    """Return ixx ixy ixz iyy iyz izz of a uniform box, kg m^2: m (b^2 + c^2) / 12 on the diagonal."""
+    x2, y2, z2 = (edge**2 for edge in size)
+    share = mass / 12.0
+    return (share * (y2 + z2), 0.0, 0.0, share * (x2 + z2), 0.0, share * (x2 + y2))
+
+
+def cylinder_moments(mass: float, radius: float, length: float) -> Floats:
+    """Return the six moments of a uniform cylinder along z: m (3 r^2 + l^2) / 12 across, m r^2 / 2 along."""
+    across = mass * (3.0 * radius**2 + length**2) / 12.0
+    return (across, 0.0, 0.0, across, 0.0, mass * radius**2 / 2.0)
 
 
 @dataclass(frozen=True)
@@ -121,107 +132,11 @@ class Gripper:
 
     @property
     def inertia(self) -> Inertia:
-        """Inertia in the frame of the flange: m (3 r^2 + l^2) / 12 across and m r^2 / 2 along z."""
-        across = self.mass * (3.0 * self.radius**2 + self.length**2) / 12.0
-        along = self.mass * self.radius**2 / 2.0
+        """Inertia in the frame of the flange."""
         com = (0.0, 0.0, self.length / 2.0)
-        return Inertia(self.name, self.mass, com, (across, 0.0, 0.0, across, 0.0, along))
+        return Inertia(self.name, self.mass, com, cylinder_moments(self.mass, self.radius, self.length))
 
     @property
     def tool(self) -> Origin:
         """Where the tool frame lies in the frame of the flange."""
         return Origin((0.0, 0.0, self.length), (0.0, 0.0, 0.0))
-
-
-@dataclass(frozen=True)
-class ArmDescription:
-    """A serial arm: ``links[i]`` is moved by ``joints[i]``, counted from the mount outwards.
-
-    ``mount`` is the arm's root frame in ``base_link``, ``flange`` lies in the last link.
-    """
-
-    name: str
-    mount: Origin
-    joints: tuple[JointDescription, ...]
-    links: tuple[LinkDescription, ...]
-    flange: Origin
-    gripper: Gripper
-
-    def __post_init__(self) -> None:
-        """Check that the name can be part of a topic and that joints and links pair up."""
-        if not fullmatch(r"[a-z][a-z0-9_]*", self.name):
-            raise RobotDescriptionError(
-                f"arm name is {self.name!r}, allowed are lower-case letters, digits and _, a letter first"
-            )
-        if not self.joints:
-            raise RobotDescriptionError(f"{self.name}: has 0 joints, allowed is at least 1")
-        if len(self.joints) != len(self.links):
-            counts = f"{len(self.joints)} joints and {len(self.links)} links"
-            raise RobotDescriptionError(f"{self.name}: has {counts}, allowed are equal numbers")
-
-    @property
-    def mass(self) -> float:
-        """Mass in kg of links and gripper."""
-        return sum(link.inertia.mass for link in self.links) + self.gripper.mass
-
-    @property
-    def rotor_inertia(self) -> Floats:
-        """Reflected rotor inertia of every joint, kg m^2."""
-        return tuple(joint.rotor_inertia for joint in self.joints)
-
-
-@dataclass(frozen=True)
-class Panel:
-    """A box that is drawn on the spacecraft and has no mass: centre (3,) m in ``base_link``, edges (3,) m."""
-
-    xyz: Floats
-    size: Floats
-
-    def __post_init__(self) -> None:
-        """Check position and size."""
-        vector(self.xyz, 3, "panel xyz", "m")
-        for edge in vector(self.size, 3, "panel size", "m"):
-            positive(edge, "panel size", "m")
-
-
-@dataclass(frozen=True)
-class Base:
-    """The spacecraft body: its inertia in ``base_link``, edges (3,) m of the box drawn for it, its panels."""
-
-    inertia: Inertia
-    size: Floats
-    panels: tuple[Panel, ...] = ()
-
-    def __post_init__(self) -> None:
-        """Check the size."""
-        for edge in vector(self.size, 3, f"{self.inertia.body}: size", "m"):
-            positive(edge, f"{self.inertia.body}: size", "m")
-
-
-@dataclass(frozen=True)
-class RobotDescription:
-    """A free-floating spacecraft with one or more arms, in the order of the file."""
-
-    name: str
-    base: Base
-    arms: tuple[ArmDescription, ...]
-
-    def __post_init__(self) -> None:
-        """Check that there is an arm and that arm names differ."""
-        if not self.arms:
-            raise RobotDescriptionError("the robot has 0 arms, allowed is at least 1")
-        name, count = Counter(arm.name for arm in self.arms).most_common(1)[0]
-        if count > 1:
-            raise RobotDescriptionError(f"arm name {name!r} is given {count} times, allowed is once")
-
-    @property
-    def mass(self) -> float:
-        """Total mass in kg."""
-        return self.base.inertia.mass + sum(arm.mass for arm in self.arms)
-
-    def arm(self, name: str) -> ArmDescription:
-        """Return the arm of a name; raises UnknownNameError."""
-        for arm in self.arms:
-            if arm.name == name:
-                return arm
-        raise UnknownNameError("arm", name, [arm.name for arm in self.arms])

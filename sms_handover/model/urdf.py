@@ -8,14 +8,8 @@ from math import atan2, hypot
 from xml.etree import ElementTree as ET
 
 from sms_handover.frames import BASE, mount_frame, tool_frame
-from sms_handover.model.parts import (
-    ArmDescription,
-    Inertia,
-    JointDescription,
-    LinkDescription,
-    Origin,
-    RobotDescription,
-)
+from sms_handover.model.assembly import ArmDescription, RobotDescription
+from sms_handover.model.parts import Inertia, JointDescription, LinkDescription, Origin
 
 _COLOURS = {  # [-] red, green, blue, opacity; appearance only
     "body": (0.75, 0.68, 0.45, 1.0),
@@ -79,10 +73,12 @@ def _link(root: ET.Element, name: str, inertia: Inertia | None = None) -> ET.Ele
 
 
 def _fixed(root: ET.Element, parent: str, child: str, origin: Origin) -> None:
+    """Fix one link to another."""
     _joint(root, f"{child}_fixed", "fixed", parent, child, origin)
 
 
 def _moving(root: ET.Element, parent: str, joint: JointDescription, link: LinkDescription) -> None:
+    """Add the joint that moves a link."""
     element = _joint(root, joint.name, "revolute", parent, link.name, joint.origin)
     ET.SubElement(element, "axis", xyz=_numbers(joint.axis))
     limits = {
@@ -95,6 +91,7 @@ def _moving(root: ET.Element, parent: str, joint: JointDescription, link: LinkDe
 
 
 def _joint(root: ET.Element, name: str, kind: str, parent: str, child: str, origin: Origin) -> ET.Element:
+    """Add a joint with what every kind of joint has."""
     element = ET.SubElement(root, "joint", name=name, type=kind)
     _origin(element, origin)
     ET.SubElement(element, "parent", link=parent)
@@ -133,6 +130,7 @@ def _shapes(link: ET.Element, origin: Origin, colour: str, *, solid: bool) -> li
 
 
 def _origin(parent: ET.Element, origin: Origin) -> None:
+    """Place an element in the frame of its link."""
     ET.SubElement(parent, "origin", xyz=_numbers(origin.xyz), rpy=_numbers(origin.rpy))
 
 

@@ -1,4 +1,4 @@
-"""Checks on single values of a robot description; each error is one line with value, unit and what is allowed."""
+"""Checks on single values of a robot description; an error names the value, its unit and what is allowed."""
 
 from collections.abc import Sequence
 from math import isfinite, sqrt
@@ -47,6 +47,12 @@ def vector(values: object, length: int, what: str, unit: str = "") -> tuple[floa
     return tuple(number(item, f"{what}[{index}]", unit) for index, item in enumerate(values))
 
 
+def positive_vector(values: object, length: int, what: str, unit: str) -> tuple[float, ...]:
+    """Return ``values`` as ``length`` floats above zero; raises RobotDescriptionError."""
+    checked = vector(values, length, what, unit)
+    return tuple(positive(item, f"{what}[{index}]", unit) for index, item in enumerate(checked))
+
+
 def check_unit_axis(axis: Sequence[float], what: str) -> None:
     """Raise RobotDescriptionError unless ``axis`` (3,) has length 1."""
     length = sqrt(sum(component**2 for component in axis))
@@ -65,8 +71,9 @@ def check_position_limits(lower: float, upper: float, what: str) -> None:
 def check_moments(moments: Sequence[float], what: str) -> None:
     """Raise RobotDescriptionError unless ``moments`` (kg m^2) are those of a real body.
 
-    ``moments`` are ixx ixy ixz iyy iyz izz about the centre of mass. The principal moments must be
-    positive and none may exceed the sum of the other two, as their integrals over mass demand.
+    ``moments`` are the entries ixx ixy ixz iyy iyz izz of the inertia matrix about the centre of
+    mass. The principal moments must be positive and none may exceed the sum of the other two, as
+    their integrals over mass demand.
     """
     smallest, middle, largest = (float(value) for value in np.linalg.eigvalsh(moment_matrix(moments)))
     principal = f"principal moments {smallest:.6g}, {middle:.6g}, {largest:.6g} kg m^2"

@@ -1,0 +1,122 @@
+"""How parts make an arm, and arms and a spacecraft make the robot; all of it checked when it is made."""
+
+from collections import Counter
+from dataclasses import dataclass
+from re import fullmatch
+
+from sms_handover.errors import RobotDescriptionError, UnknownNameError
+from sms_handover.frames import joint_name
+from sms_handover.model.parts import Floats, Gripper, Inertia, JointDescription, LinkDescription, Origin
+from sms_handover.model.validation import positive_vector, vector
+
+
+def link_name(arm: str, number: int) -> str:
+    """Return the name of the link that joint ``number`` of an arm moves."""
+    return f"{arm}_link_{number}"
+
+
+def gripper_name(arm: str) -> str:
+    """Return the name of an arm's gripper link, whose frame is the arm's flange."""
+    return f"{arm}_gripper"
+
+
+@dataclass(frozen=True)
+class ArmDescription:
+    """A serial arm: ``links[i]`` is moved by ``joints[i]``, counted from the mount outwards.
+
+    ``mount`` is the arm's root frame in ``base_link``, ``flange`` lies in the last link.
+    """
+
+    name: str
+    mount: Origin
+    joints: tuple[JointDescription, ...]
+    links: tuple[LinkDescription, ...]
+    flange: Origin
+    gripper: Gripper
+
+    def __post_init__(self) -> None:
+        """Check that the name can be part of a topic and that the parts pair up and carry it."""
+        if not fullmatch(r"[a-z][a-z0-9_]*", self.name):
+            raise RobotDescriptionError(
+                f"arm name is {self.name!r}, allowed are lower-case letters, digits and _, a letter first"
+            )
+        if not self.joints:
+            raise RobotDescriptionError(f"{self.name}: has 0 joints, allowed is at least 1")
+        if len(self.joints) != len(self.links):
+            counts = f"{len(self.joints)} joints and {len(self.links)} links"
+            raise RobotDescriptionError(f"{self.name}: has {counts}, allowed are equal numbers")
+        parts = [*self.joints, *self.links, self.gripper]
+        numbers = range(1, len(self.joints) + 1)
+        expected = [joint_name(self.name, number) for number in numbers]
+        expected += [link_name(self.name, number) for number in numbers]
+        expected.append(gripper_name(self.name))
+        for part, name in zip(parts, expected, strict=True):
+            if part.name != name:
+                raise RobotDescriptionError(
+                    f"{self.name}: a part is named {part.name!r}, allowed is {name!r}"
+                )
+
+    @property
+    def mass(self) -> float:
+        """Mass in kg of links and gripper."""
+        return sum(link.inertia.mass for link in self.links) + self.gripper.mass
+
+    @property
+    def rotor_inertia(self) -> Floats:
+        """Reflected rotor inertia of every joint, kg m^2."""
+        return tuple(joint.rotor_inertia for joint in self.joints)
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A box that is drawn on the spacecraft and has no mass: centre (3,) m in ``base_link``, edges (3,) m."""
+
+    xyz: Floats
+    size: Floats
+
+    def __post_init__(self) -> None:
+        """Check position and size."""
+        vector(self.xyz, 3, "panel xyz", "m")
+        positive_vector(self.size, 3, "panel size", "m")
+
+
+@dataclass(frozen=True)
+class Base:
+    """The spacecraft body: its inertia in ``base_link``, edges (3,) m of the box drawn for it, its panels."""
+
+    inertia: Inertia
+    size: Floats
+    panels: tuple[Panel, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check the size."""
+        positive_vector(self.size, 3, f"{self.inertia.body}: size", "m")
+
+
+@dataclass(frozen=True)
+class RobotDescription:
+    """A free-floating spacecraft with one or more arms, in the order of the file."""
+
+    name: str
+    base: Base
+    arms: tuple[ArmDescription, ...]
+
+    def __post_init__(self) -> None:
+        """Check that there is an arm and that arm names differ."""
+        if not self.arms:
+            raise RobotDescriptionError("the robot has 0 arms, allowed is at least 1")
+        name, count = Counter(arm.name for arm in self.arms).most_common(1)[0]
+        if count > 1:
+            raise RobotDescriptionError(f"arm name {name!r} is given {count} times, allowed is once")
+
+    @property
+    def mass(self) -> float:
+        """Total mass in kg."""
+        return self.base.inertia.mass + sum(arm.mass for arm in self.arms)
+
+    def arm(self, name: str) -> ArmDescription:
+        """Return the arm of a name; raises UnknownNameError."""
+        for arm in self.arms:
+            if arm.name == name:
+                return arm
+        raise UnknownNameError("arm", name, [arm.name for arm in self.arms])
