@@ -45,16 +45,15 @@ class ArmDescription:
         if len(self.joints) != len(self.links):
             counts = f"{len(self.joints)} joints and {len(self.links)} links"
             raise RobotDescriptionError(f"{self.name}: has {counts}, allowed are equal numbers")
-        parts = [*self.joints, *self.links, self.gripper]
+        names = [joint.name for joint in self.joints] + [link.name for link in self.links]
+        names.append(self.gripper.name)
         numbers = range(1, len(self.joints) + 1)
-        expected = [joint_name(self.name, number) for number in numbers]
-        expected += [link_name(self.name, number) for number in numbers]
-        expected.append(gripper_name(self.name))
-        for part, name in zip(parts, expected, strict=True):
-            if part.name != name:
-                raise RobotDescriptionError(
-                    f"{self.name}: a part is named {part.name!r}, allowed is {name!r}"
-                )
+        allowed = [joint_name(self.name, number) for number in numbers]
+        allowed += [link_name(self.name, number) for number in numbers]
+        allowed.append(gripper_name(self.name))
+        for name, expected in zip(names, allowed, strict=True):
+            if name != expected:
+                raise RobotDescriptionError(f"{self.name}: a part is named {name!r}, allowed is {expected!r}")
 
     @property
     def mass(self) -> float:

@@ -12,7 +12,7 @@ Section = Mapping[str, object]
 
 
 def read_section(value: object, where: str, required: Sequence[str], optional: Sequence[str] = ()) -> Section:
-    """Return ``value`` as a mapping with every required key and no unknown one; raises RobotDescriptionError."""
+    """Return ``value`` as a mapping with all required and no unknown keys; raises RobotDescriptionError."""
     if not isinstance(value, dict):
         raise RobotDescriptionError(f"{where} is {value!r}, expected a mapping")
     known = (*required, *optional)

@@ -3,7 +3,7 @@
 Numbers keep full double precision. Rotor inertia has no place in URDF; it stays in the description.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import atan2, hypot
 from xml.etree import ElementTree as ET
 
@@ -65,38 +65,37 @@ def _link(root: ET.Element, name: str, inertia: Inertia | None = None) -> ET.Ele
     if inertia is not None:
         element = ET.SubElement(link, "inertial")
         _origin(element, Origin(inertia.com, (0.0, 0.0, 0.0)))
-        ET.SubElement(element, "mass", value=repr(inertia.mass))
+        ET.SubElement(element, "mass", value=_numbers([inertia.mass]))
         keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-        moments = {key: repr(moment) for key, moment in zip(keys, inertia.moments, strict=True)}
+        moments = {key: _numbers([moment]) for key, moment in zip(keys, inertia.moments, strict=True)}
         ET.SubElement(element, "inertia", moments)
     return link
 
 
 def _fixed(root: ET.Element, parent: str, child: str, origin: Origin) -> None:
     """Fix one link to another."""
-    _joint(root, f"{child}_fixed", "fixed", parent, child, origin)
+    _connect(ET.SubElement(root, "joint", name=f"{child}_fixed", type="fixed"), parent, child, origin)
 
 
 def _moving(root: ET.Element, parent: str, joint: JointDescription, link: LinkDescription) -> None:
     """Add the joint that moves a link."""
-    element = _joint(root, joint.name, "revolute", parent, link.name, joint.origin)
+    element = ET.SubElement(root, "joint", name=joint.name, type="revolute")
+    _connect(element, parent, link.name, joint.origin)
     ET.SubElement(element, "axis", xyz=_numbers(joint.axis))
     limits = {
-        "lower": repr(joint.lower),
-        "upper": repr(joint.upper),
-        "velocity": repr(joint.velocity),
-        "effort": repr(joint.effort),
+        "lower": _numbers([joint.lower]),
+        "upper": _numbers([joint.upper]),
+        "velocity": _numbers([joint.velocity]),
+        "effort": _numbers([joint.effort]),
     }
     ET.SubElement(element, "limit", limits)
 
 
-def _joint(root: ET.Element, name: str, kind: str, parent: str, child: str, origin: Origin) -> ET.Element:
-    """Add a joint with what every kind of joint has."""
-    element = ET.SubElement(root, "joint", name=name, type=kind)
-    _origin(element, origin)
-    ET.SubElement(element, "parent", link=parent)
-    ET.SubElement(element, "child", link=child)
-    return element
+def _connect(joint: ET.Element, parent: str, child: str, origin: Origin) -> None:
+    """Say which links a joint connects, and where its frame lies in the parent."""
+    _origin(joint, origin)
+    ET.SubElement(joint, "parent", link=parent)
+    ET.SubElement(joint, "child", link=child)
 
 
 def _box(link: ET.Element, size: Sequence[float], origin: Origin, colour: str, *, solid: bool) -> None:
@@ -114,7 +113,7 @@ def _cylinder_to(link: ET.Element, end: Sequence[float], radius: float, colour: 
         return
     middle = Origin((x / 2.0, y / 2.0, z / 2.0), (0.0, atan2(across, z), atan2(y, x)))
     for element in _shapes(link, middle, colour, solid=True):
-        ET.SubElement(element, "cylinder", radius=repr(radius), length=repr(length))
+        ET.SubElement(element, "cylinder", radius=_numbers([radius]), length=_numbers([length]))
 
 
 def _shapes(link: ET.Element, origin: Origin, colour: str, *, solid: bool) -> list[ET.Element]:
@@ -134,6 +133,6 @@ def _origin(parent: ET.Element, origin: Origin) -> None:
     ET.SubElement(parent, "origin", xyz=_numbers(origin.xyz), rpy=_numbers(origin.rpy))
 
 
-def _numbers(values: Sequence[float]) -> str:
+def _numbers(values: Iterable[float]) -> str:
     """Return the values with as many digits as it takes to read them back exactly."""
     return " ".join(repr(float(value)) for value in values)
