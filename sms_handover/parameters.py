@@ -18,7 +18,7 @@ from sms_handover.errors import ConfigurationError, UnknownNameError
 T = TypeVar("T")
 
 _SPEC = "sms_handover.spec"
-_WILDCARD = "/**"  # ROS parameter files: this key holds for every node
+EVERY_NODE = "/**"  # section of ROS parameter files that holds for every node
 
 
 @dataclass(frozen=True)
@@ -73,21 +73,19 @@ def build(cls: type[T], values: Mapping[str, object], where: str) -> T:
     return cls(**checked)
 
 
-def read_parameter_files(paths: Sequence[Path], node: str) -> dict[str, object]:
-    """Return the parameters of ``node`` from files in ROS 2 form; later files win.
+def read_parameter_files(paths: Sequence[Path], section: str) -> dict[str, object]:
+    """Return the parameters in one section of files in ROS 2 form; later files win.
 
-    Within a file the wildcard section ``/**`` comes first, then the node's own section.
+    A section is the name of a node, or :data:`EVERY_NODE` for parameters that all nodes share.
     """
     merged: dict[str, object] = {}
     for path in paths:
-        document = read_yaml(path)
-        for section in (_WILDCARD, node):
-            content = document.get(section)
-            if content is None:
-                continue
-            if not isinstance(content, dict) or not isinstance(content.get("ros__parameters"), dict):
-                raise ConfigurationError(f"{path}: section {section!r} needs a mapping 'ros__parameters'")
-            merged.update(content["ros__parameters"])
+        content = read_yaml(path).get(section)
+        if content is None:
+            continue
+        if not isinstance(content, dict) or not isinstance(content.get("ros__parameters"), dict):
+            raise ConfigurationError(f"{path}: section {section!r} needs a mapping 'ros__parameters'")
+        merged.update(content["ros__parameters"])
     return merged
 
 

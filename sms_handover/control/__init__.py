@@ -1,0 +1,1 @@
+"""Joint controllers: the laws behind one interface, gains per phase, and the sampled-loop check."""

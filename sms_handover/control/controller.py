@@ -1,0 +1,87 @@
+"""The controller: one law, its gains phase by phase, and the reference it tracks."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from sms_handover.control.base import ControlLaw
+from sms_handover.control.nmpc import NmpcGains, NmpcLaw
+from sms_handover.control.pid import PidGains, PidLaw
+from sms_handover.control.reference_track import ReferenceTrack
+from sms_handover.control.stability import LoopStability, loop_stability
+from sms_handover.errors import UnstableLoopError
+from sms_handover.model.reduced import reduced_dynamics
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.types import Array, JointCommand, JointReference, RobotState, TaskPhase
+from sms_handover.units import ns_to_seconds
+
+Gains = NmpcGains | PidGains
+
+
+class JointController:
+    """Tracks joint references with a law whose gains change with the phase of the task."""
+
+    def __init__(
+        self, robot: RobotModel, gains_by_phase: Sequence[Gains], tick_ns: int, base_configuration: Array
+    ) -> None:
+        """Set up the law of the gains' kind, and check every gain set at the start configuration.
+
+        ``gains_by_phase`` has one entry per phase of the schedule, all of one kind;
+        ``base_configuration`` is q (7 + n,) at the start. Raises UnstableLoopError.
+        """
+        self._robot = robot
+        self._gains_by_phase = tuple(gains_by_phase)
+        self._dt = ns_to_seconds(tick_ns)
+        self._law = make_law(robot, self._gains_by_phase[0])
+        self._track = ReferenceTrack()
+        self._phase = 0
+        check_stability(robot, self._gains_by_phase, self._dt, base_configuration)
+
+    def reset(self) -> None:
+        """Go back to the start of the run."""
+        self._law = make_law(self._robot, self._gains_by_phase[0])
+        self._track.reset()
+        self._phase = 0
+
+    def enter(self, phase: TaskPhase) -> None:
+        """Take over the gains of a phase, if it is a new one."""
+        if phase.index != self._phase:
+            self._phase = phase.index
+            self._law.use(self._gains_by_phase[phase.index])
+            self._track.restart()
+
+    def track(self, reference: JointReference) -> None:
+        """Take the next joint reference."""
+        self._track.update(reference)
+
+    def step(self, state: RobotState) -> JointCommand:
+        """Return the command that answers a state; zero efforts until a first reference has come."""
+        if not self._track.ready:
+            return JointCommand(state.stamp_ns, [0.0] * self._robot.n_joints)
+        effort = self._law.step(state, self._track.at(state.stamp_ns), self._dt)
+        return JointCommand(state.stamp_ns, effort)
+
+
+def make_law(robot: RobotModel, gains: Gains) -> ControlLaw[Any]:
+    """Return the law that these gains belong to."""
+    return NmpcLaw(robot, gains) if isinstance(gains, NmpcGains) else PidLaw(robot, gains)
+
+
+def check_stability(
+    robot: RobotModel, gains_by_phase: Sequence[Gains], dt: float, q: Array
+) -> tuple[LoopStability, ...]:
+    """Return the stability of the sampled loop of each gain set at rest in q (7 + n,); raises UnstableLoopError."""
+    inertia = reduced_dynamics(robot, q, np.zeros(robot.pin.nv)).inertia
+    found = []
+    for gains in gains_by_phase:
+        feedback = make_law(robot, gains).linearised(inertia)
+        stability = loop_stability(inertia, feedback, dt, robot.joint_names)
+        if not stability.stable:
+            raise UnstableLoopError(
+                f"the loop of {gains} at a tick of {dt:g} s is unstable at the start configuration: "
+                f"spectral radius {stability.spectral_radius:.6f}, allowed is below 1, "
+                f"first at {stability.joint}; use a shorter tick or smaller gains"
+            )
+        found.append(stability)
+    return tuple(found)

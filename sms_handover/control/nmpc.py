@@ -1,0 +1,74 @@
+"""Closed-form nonlinear model predictive control of the reduced dynamics."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sms_handover.control.base import ControlLaw, DesiredMotion, LinearFeedback
+from sms_handover.model.reduced import reduced_dynamics
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.parameters import parameter
+from sms_handover.types import Array, RobotState
+
+MAX_CONTROL_ORDER = 3
+
+
+@dataclass(frozen=True)
+class NmpcGains:
+    """What shapes the law: how far it looks ahead and how many derivatives of the input it plans."""
+
+    rolling_period: float = parameter("prediction horizon T_r", unit="s", minimum=1e-3)
+    control_order: int = parameter(
+        "order r of the Taylor expansion of the input", minimum=0, maximum=MAX_CONTROL_ORDER
+    )
+
+    @property
+    def position_gain(self) -> float:
+        """A_1 = (r+1)(r+2)(r+4)(r+5) / (12 T_r^2) in 1/s^2; 10/(3 T_r^2) for r = 0."""
+        r = self.control_order
+        return (r + 1) * (r + 2) * (r + 4) * (r + 5) / (12.0 * self.rolling_period**2)
+
+    @property
+    def velocity_gain(self) -> float:
+        """A_2 = (r+1)(r+5) / (2 T_r) in 1/s; 5/(2 T_r) for r = 0."""
+        r = self.control_order
+        return (r + 1) * (r + 5) / (2.0 * self.rolling_period)
+
+
+class NmpcLaw(ControlLaw[NmpcGains]):
+    """u = H*(q_d'' - A_1 e - A_2 e') + c*, the minimiser of (1/2) int_0^T_r e(t+s)^T e(t+s) ds [Chen2003].
+
+    H* and c* are those of the arms on the free base, so e'' + A_2 e' + A_1 e = 0 holds exactly for
+    a perfect model and unlimited efforts.
+    """
+
+    def __init__(self, robot: RobotModel, gains: NmpcGains) -> None:
+        """Set up the law for a robot."""
+        self._robot = robot
+        self._gains = gains
+
+    def reset(self) -> None:
+        """Do nothing: the law has no memory."""
+
+    def use(self, gains: NmpcGains) -> None:
+        """Go on with other gains."""
+        self._gains = gains
+
+    def step(self, state: RobotState, desired: DesiredMotion, dt: float) -> Array:
+        """Return the joint efforts (n,) N m, limited to what the joints can give; ``dt`` plays no part."""
+        robot, gains = self._robot, self._gains
+        dynamics = reduced_dynamics(robot, robot.q_of(state), robot.v_of(state))
+        error = state.joint_position - desired.position
+        error_rate = state.joint_velocity - desired.velocity
+        acceleration = (
+            desired.acceleration - gains.position_gain * error - gains.velocity_gain * error_rate
+        )
+        effort = dynamics.inertia @ acceleration + dynamics.bias
+        return np.clip(effort, -robot.effort_limit, robot.effort_limit)
+
+    def linearised(self, inertia: Array) -> LinearFeedback:
+        """Return K_e = A_1 H*, K_v = A_2 H*, K_z = 0."""
+        gains = self._gains
+        return LinearFeedback(
+            gains.position_gain * inertia, gains.velocity_gain * inertia, np.zeros_like(inertia)
+        )

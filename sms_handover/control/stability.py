@@ -1,0 +1,56 @@
+"""Whether gains and tick can be stable together, computed before anything moves."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sms_handover.control.base import LinearFeedback
+from sms_handover.types import Array
+
+ROUNDING = 1e-9  # [-] eigenvalues of the sampled loop are not known better than this
+
+
+@dataclass(frozen=True)
+class LoopStability:
+    """Spectral radius of the sampled closed loop and the joint that moves most in its fastest-growing mode."""
+
+    spectral_radius: float
+    joint: str
+
+    @property
+    def stable(self) -> bool:
+        """Tell whether every mode decays."""
+        return self.spectral_radius < 1.0 - ROUNDING
+
+
+def sampled_loop(inertia: Array, feedback: LinearFeedback, dt: float) -> Array:
+    """Return the transition matrix of (e, e', z) over one tick with the efforts held constant.
+
+    The arms are linearised at rest, e'' = H*^-1 u, which a zero-order hold samples exactly:
+    e+ = e + e' dt + H*^-1 u dt^2/2, e'+ = e' + H*^-1 u dt, z+ = z + e dt. Without integral action
+    z is left out, because it would only add eigenvalues of one.
+    """
+    n = inertia.shape[0]
+    has_integral = bool(np.any(feedback.integral))
+    gains = [feedback.position, feedback.velocity] + ([feedback.integral] if has_integral else [])
+    pull = np.linalg.solve(inertia, np.hstack(gains))
+    size = pull.shape[1]
+    transition = np.eye(size)
+    transition[:n, n : 2 * n] = dt * np.eye(n)
+    transition[:n] -= 0.5 * dt * dt * pull
+    transition[n : 2 * n] -= dt * pull
+    if has_integral:
+        transition[2 * n :, :n] = dt * np.eye(n)
+    return transition
+
+
+def loop_stability(
+    inertia: Array, feedback: LinearFeedback, dt: float, joint_names: Sequence[str]
+) -> LoopStability:
+    """Return the stability of the sampled loop for the reduced inertia H* (n, n) and a tick of ``dt`` s."""
+    values, vectors = np.linalg.eig(sampled_loop(inertia, feedback, dt))
+    worst = int(np.argmax(np.abs(values)))
+    n = inertia.shape[0]
+    share = np.abs(vectors[: 2 * n, worst]).reshape(2, n).max(axis=0)
+    return LoopStability(float(np.abs(values[worst])), joint_names[int(np.argmax(share))])

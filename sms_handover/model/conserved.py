@@ -1,0 +1,35 @@
+"""What a free-floating robot conserves, and the energy it exchanges with its motors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.types import Array, read_only
+
+
+@dataclass(frozen=True, eq=False)
+class PhysicsReceipt:
+    """Momenta, kinetic energy and centre of mass of the whole robot at one instant.
+
+    ``linear_momentum`` (3,) kg m/s and ``angular_momentum`` (3,) kg m^2/s about the centre of mass
+    are in ``world`` axes, ``centre_of_mass`` (3,) m in ``world``, ``kinetic_energy`` in J.
+    """
+
+    linear_momentum: Array
+    angular_momentum: Array
+    centre_of_mass: Array
+    kinetic_energy: float
+
+
+def physics_receipt(robot: RobotModel, q: Array, v: Array) -> PhysicsReceipt:
+    """Return the conserved quantities by the centroidal momentum A_G(q) v [Orin2013].
+
+    Kinetic energy is v^T H v / 2. Shapes: ``q`` (7 + n,), ``v`` (6 + n,).
+    """
+    momentum = pin.computeCentroidalMomentum(robot.pin, robot.data, q, v)
+    linear, angular = np.array(momentum.linear), np.array(momentum.angular)
+    centre = np.array(pin.centerOfMass(robot.pin, robot.data, q))
+    energy = float(pin.computeKineticEnergy(robot.pin, robot.data, q, v))
+    return PhysicsReceipt(read_only(linear), read_only(angular), read_only(centre), energy)

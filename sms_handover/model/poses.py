@@ -1,0 +1,44 @@
+"""Conversions between :class:`Pose` values, Pinocchio's SE3 and roll-pitch-yaw."""
+
+import numpy as np
+import pinocchio as pin
+
+from sms_handover.types import Array, Pose, Twist
+
+
+def se3_of(pose: Pose) -> pin.SE3:
+    """Return the homogeneous transformation of a pose."""
+    return pin.SE3(pin.Quaternion(pose.quaternion_xyzw), pose.position)
+
+
+def pose_of(transformation: pin.SE3) -> Pose:
+    """Return position and quaternion (x y z w) of a homogeneous transformation."""
+    return Pose(transformation.translation, pin.Quaternion(transformation.rotation).coeffs())
+
+
+def pose_from_xyz_rpy(xyz: Array, rpy: Array) -> Pose:
+    """Return a pose from a position in m and fixed-axis roll, pitch, yaw in rad (as in URDF)."""
+    rotation = pin.rpy.rpyToMatrix(np.asarray(rpy, dtype=np.float64))
+    return pose_of(pin.SE3(rotation, np.asarray(xyz, dtype=np.float64)))
+
+
+def pose_row(pose: Pose) -> Array:
+    """Return a pose as one row (7,): position, then quaternion x y z w."""
+    return np.concatenate([pose.position, pose.quaternion_xyzw])
+
+
+def twist_of(motion: pin.Motion) -> Twist:
+    """Return the linear and angular parts of a spatial velocity."""
+    return Twist(motion.linear, motion.angular)
+
+
+def pose_distance(a: Pose, b: Pose) -> tuple[float, float]:
+    """Return the distance in m between two origins and the angle in rad between two orientations.
+
+    The angle is taken from the vector part too, so it keeps its precision near zero:
+    2 atan2(|v|, |w|) of the relative quaternion.
+    """
+    relative = pin.Quaternion(a.quaternion_xyzw).conjugate() * pin.Quaternion(b.quaternion_xyzw)
+    x, y, z, w = relative.coeffs()
+    angle = 2.0 * np.arctan2(np.sqrt(x * x + y * y + z * z), abs(w))
+    return float(np.linalg.norm(a.position - b.position)), float(angle)

@@ -1,0 +1,63 @@
+"""Dynamics and kinematics of the arms with the reaction of the unactuated base eliminated."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from sms_handover.model.robot_model import BASE_NV, RobotModel
+from sms_handover.types import Array
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedDynamics:
+    """H* (n, n) kg m^2 and c* (n,) N m of H* q_m'' + c* = u."""
+
+    inertia: Array
+    bias: Array
+
+
+def reduced_dynamics(robot: RobotModel, q: Array, v: Array) -> ReducedDynamics:
+    """Return the joint-space dynamics of the arms on a free base.
+
+    With the equations of motion split in base (b) and arms (m) rows, no wrench on the base and no
+    gravity, the base acceleration is -H_b^-1 (H_bm q_m'' + c_b), hence [Papadopoulos2021]
+
+        H* = H_m - H_bm^T H_b^-1 H_bm,    c* = c_m - H_bm^T H_b^-1 c_b.
+    """
+    inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.WORLD)
+    bias = pin.nonLinearEffects(robot.pin, robot.data, q, v)
+    coupling = inertia[:BASE_NV, BASE_NV:]
+    right = np.column_stack([coupling, bias[:BASE_NV]])
+    solved = np.linalg.solve(inertia[:BASE_NV, :BASE_NV], right)
+    reaction = coupling.T @ solved
+    return ReducedDynamics(
+        inertia=inertia[BASE_NV:, BASE_NV:] - reaction[:, :-1],
+        bias=bias[BASE_NV:] - reaction[:, -1],
+    )
+
+
+def base_twist_per_joint_rate(robot: RobotModel, q: Array) -> Array:
+    """Return -H_b^-1 H_bm (6, n): the base twist in ``base_link`` axes per joint rate at zero momentum."""
+    inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.WORLD)
+    reaction: Array = -np.linalg.solve(inertia[:BASE_NV, :BASE_NV], inertia[:BASE_NV, BASE_NV:])
+    return reaction
+
+
+def tool_jacobian(robot: RobotModel, q: Array, arm: str) -> Array:
+    """Return the Jacobian (6, 6 + n) of a tool: twist of its origin in ``world`` axes per v."""
+    jacobian: Array = pin.computeFrameJacobian(
+        robot.pin, robot.data, q, robot.tool_frame_id[arm], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    )
+    return jacobian
+
+
+def generalized_jacobian(robot: RobotModel, q: Array, arm: str) -> Array:
+    """Return the generalised Jacobian (6, n) of a tool [Umetani1989].
+
+    It maps joint rates to the tool's twist in ``world`` axes with the base's reaction included,
+    for zero momentum: J* = J_m - J_b H_b^-1 H_bm.
+    """
+    jacobian = tool_jacobian(robot, q, arm)
+    return jacobian[:, BASE_NV:] + jacobian[:, :BASE_NV] @ base_twist_per_joint_rate(robot, q)
+

@@ -1,0 +1,136 @@
+"""The Pinocchio model of the free-floating robot, with maps from names to indices."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import pinocchio as pin
+
+from sms_handover.errors import RobotDescriptionError, UnknownNameError
+from sms_handover.frames import tool_frame
+from sms_handover.model.description import RobotDescription, load_robot
+from sms_handover.model.poses import pose_of, se3_of
+from sms_handover.model.urdf import to_urdf
+from sms_handover.types import Array, Pose, RobotState, Twist, read_only
+
+BASE_NQ = 7  # position and quaternion of the free-flyer joint
+BASE_NV = 6  # its twist, linear then angular, in base_link axes
+
+
+class RobotModel:
+    """A spacecraft with arms: kinematics and dynamics of its nv = 6 + n degrees of freedom.
+
+    The configuration is q = (base position, base quaternion x y z w, n joint angles), the
+    velocity v = (base twist in ``base_link`` axes, n joint rates). There is no gravity. An instance
+    owns Pinocchio's work space, so it is not to be shared between threads.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        """Build the model; raises RobotDescriptionError where the description is inconsistent."""
+        self.description = description
+        self.urdf = to_urdf(description)
+        self.pin = pin.buildModelFromXML(self.urdf, pin.JointModelFreeFlyer())
+        self.pin.gravity.setZero()
+        self.data = self.pin.createData()
+        self.joint_names: tuple[str, ...] = tuple(self.pin.names[2:])
+        self.n_joints = len(self.joint_names)
+        if self.pin.nv != BASE_NV + self.n_joints or self.pin.nq != BASE_NQ + self.n_joints:
+            raise RobotDescriptionError("every joint of an arm must be revolute with limits (nq = 7 + n)")
+        self.lower = read_only(self.pin.lowerPositionLimit[BASE_NQ:])
+        self.upper = read_only(self.pin.upperPositionLimit[BASE_NQ:])
+        self.effort_limit = read_only(self.pin.effortLimit[BASE_NV:])
+        self.arms = tuple(arm.name for arm in description.arms)
+        self.arm_joints: Mapping[str, slice] = MappingProxyType(self._arm_slices())
+        self.tool_frame_id: Mapping[str, int] = MappingProxyType(
+            {arm: self.pin.getFrameId(tool_frame(arm)) for arm in self.arms}
+        )
+        self._apply_rotor_inertia()
+
+    @classmethod
+    def load(cls, path: Path | None = None) -> "RobotModel":
+        """Return the model of a robot description file, by default the shipped one."""
+        return cls(load_robot(path))
+
+    @property
+    def mass(self) -> float:
+        """Total mass in kg."""
+        return float(pin.computeTotalMass(self.pin))
+
+    def joint_index(self, name: str) -> int:
+        """Return the position of a joint in every joint array; raises UnknownNameError."""
+        try:
+            return self.joint_names.index(name)
+        except ValueError:
+            raise UnknownNameError("joint", name, self.joint_names) from None
+
+    def require_arm(self, name: str, where: str = "") -> None:
+        """Raise UnknownNameError unless the robot has an arm of this name."""
+        if name not in self.arms:
+            raise UnknownNameError("arm", name, self.arms, where)
+
+    def configuration(self, base_in_world: Pose, joint_position: Array) -> Array:
+        """Return q (7 + n,) from the pose of the base and the joint angles."""
+        return np.concatenate([base_in_world.position, base_in_world.quaternion_xyzw, joint_position])
+
+    def velocity(self, twist_base_in_base: Twist, joint_velocity: Array) -> Array:
+        """Return v (6 + n,) from the twist of the base in its own axes and the joint rates."""
+        return np.concatenate([twist_base_in_base.linear, twist_base_in_base.angular, joint_velocity])
+
+    def q_of(self, state: RobotState) -> Array:
+        """Return the configuration (7 + n,) of a state."""
+        return self.configuration(state.base_in_world, state.joint_position)
+
+    def v_of(self, state: RobotState) -> Array:
+        """Return the velocity (6 + n,) of a state."""
+        return self.velocity(state.twist_base_in_base, state.joint_velocity)
+
+    def tools_in_world(self, base_in_world: Pose, joint_position: Array) -> dict[str, Pose]:
+        """Return the pose of every tool frame in ``world``, by forward kinematics."""
+        pin.forwardKinematics(self.pin, self.data, self.configuration(base_in_world, joint_position))
+        return {
+            arm: pose_of(pin.updateFramePlacement(self.pin, self.data, frame_id))
+            for arm, frame_id in self.tool_frame_id.items()
+        }
+
+    def links_in_world(self, base_in_world: Pose, joint_position: Array) -> dict[str, Pose]:
+        """Return the pose in ``world`` of every link of the description, for a transform tree."""
+        pin.forwardKinematics(self.pin, self.data, self.configuration(base_in_world, joint_position))
+        pin.updateFramePlacements(self.pin, self.data)
+        return {
+            frame.name: pose_of(self.data.oMf[index])
+            for index, frame in enumerate(self.pin.frames)
+            if frame.type == pin.FrameType.BODY
+        }
+
+    def tool_twist_in_world(self, q: Array, v: Array, arm: str) -> Twist:
+        """Return the twist of a tool: of its origin, in the axes of ``world``."""
+        pin.forwardKinematics(self.pin, self.data, q, v)
+        motion = pin.getFrameVelocity(
+            self.pin, self.data, self.tool_frame_id[arm], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        )
+        return Twist(motion.linear, motion.angular)
+
+    def integrate_base(self, base_in_world: Pose, twist_base_in_base: Array, duration: float) -> Pose:
+        """Return the base pose after a constant body twist (6,) over ``duration`` s."""
+        return pose_of(se3_of(base_in_world) * pin.exp6(pin.Motion(twist_base_in_base * duration)))
+
+    def _arm_slices(self) -> dict[str, slice]:
+        """Return where each arm's joints lie in the joint arrays; they are contiguous in a tree."""
+        slices = {}
+        for arm in self.description.arms:
+            indices = [self.joint_index(joint.name) for joint in arm.joints]
+            first, count = min(indices), len(indices)
+            if indices != list(range(first, first + count)):
+                raise RobotDescriptionError(f"the joints of arm {arm.name!r} are not one serial chain")
+            slices[arm.name] = slice(first, first + count)
+        return slices
+
+    def _apply_rotor_inertia(self) -> None:
+        """Add each joint's reflected rotor inertia to the diagonal of the mass matrix."""
+        armature = np.zeros(self.pin.nv)
+        for arm in self.description.arms:
+            part = self.arm_joints[arm.name]
+            reflected = [joint.rotor_inertia for joint in arm.joints]
+            armature[BASE_NV + part.start : BASE_NV + part.stop] = reflected
+        self.pin.armature = armature

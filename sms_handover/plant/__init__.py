@@ -1,0 +1,1 @@
+"""The simulated spacecraft: forward dynamics, integrators, and the deputy with its attachment."""

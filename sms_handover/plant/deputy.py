@@ -1,0 +1,94 @@
+"""The deputy: a CubeSat that floats or is held by one arm, and the rule by which a grasp holds."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from sms_handover.model.poses import pose_distance, pose_of, se3_of
+from sms_handover.types import DeputyState, Pose, Twist
+
+
+@dataclass(frozen=True)
+class GraspTolerance:
+    """How far a tool may be from a grasp frame when it closes: m, rad, m/s."""
+
+    position: float
+    angle: float
+    speed: float
+
+
+@dataclass(frozen=True)
+class GraspErrors:
+    """How far the tool was from the grasp frame: m, rad, m/s."""
+
+    position: float
+    angle: float
+    speed: float
+
+    def within(self, tolerance: GraspTolerance) -> bool:
+        """Tell whether every error is inside its tolerance."""
+        return (
+            self.position <= tolerance.position
+            and self.angle <= tolerance.angle
+            and self.speed <= tolerance.speed
+        )
+
+
+class MasslessDeputy:
+    """A rigid deputy whose mass is neglected: held, it moves with the tool; free, it drifts.
+
+    Free motion keeps the twist it had when let go: constant velocity of its origin and constant
+    angular velocity. A grasp keeps the relative pose of tool and deputy of that instant, so a
+    position error of the grasp is carried on and nothing jumps.
+    """
+
+    def __init__(self, deputy_in_world: Pose, grasp_frames: Mapping[str, Pose]) -> None:
+        """Start at rest at a pose, with the grasp frames as poses in the deputy."""
+        self._grasp_frames = {name: se3_of(pose) for name, pose in grasp_frames.items()}
+        self._pose = se3_of(deputy_in_world)
+        self._twist = Twist(np.zeros(3), np.zeros(3))
+        self._holder = ""
+        self._deputy_in_tool = pin.SE3.Identity()
+
+    @property
+    def state(self) -> DeputyState:
+        """Return pose and twist in ``world`` axes, and who holds it."""
+        return DeputyState(pose_of(self._pose), self._twist, self._holder)
+
+    @property
+    def holder(self) -> str:
+        """Return the name of the arm that holds the deputy, '' while it floats."""
+        return self._holder
+
+    def errors_of(self, grasp_frame: str, tool_in_world: Pose, tool_twist_in_world: Twist) -> GraspErrors:
+        """Return how far a tool is from a grasp frame; the speed is that of the two origins."""
+        frame = self._pose * self._grasp_frames[grasp_frame]
+        position, angle = pose_distance(pose_of(frame), tool_in_world)
+        lever = frame.translation - self._pose.translation
+        frame_velocity = self._twist.linear + np.cross(self._twist.angular, lever)
+        speed = float(np.linalg.norm(tool_twist_in_world.linear - frame_velocity))
+        return GraspErrors(position, angle, speed)
+
+    def attach(self, arm: str, tool_in_world: Pose) -> None:
+        """Fix the deputy to a tool at their present relative pose."""
+        self._holder = arm
+        self._deputy_in_tool = se3_of(tool_in_world).actInv(self._pose)
+
+    def detach(self) -> None:
+        """Let the deputy float with the twist it has."""
+        self._holder = ""
+
+    def follow(self, tool_in_world: Pose, tool_twist_in_world: Twist) -> None:
+        """Move with the tool that holds it."""
+        tool = se3_of(tool_in_world)
+        self._pose = tool * self._deputy_in_tool
+        lever = self._pose.translation - tool.translation
+        linear = tool_twist_in_world.linear + np.cross(tool_twist_in_world.angular, lever)
+        self._twist = Twist(linear, tool_twist_in_world.angular)
+
+    def drift(self, duration: float) -> None:
+        """Move freely over ``duration`` s."""
+        rotation = pin.exp3(self._twist.angular * duration) @ self._pose.rotation
+        self._pose = pin.SE3(rotation, self._pose.translation + self._twist.linear * duration)

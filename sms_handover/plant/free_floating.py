@@ -1,0 +1,170 @@
+"""The plant: the free-floating robot and the deputy, advanced tick by tick under joint efforts."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from sms_handover.errors import ConfigurationError
+from sms_handover.model.conserved import PhysicsReceipt, physics_receipt
+from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
+from sms_handover.plant.deputy import GraspTolerance, MasslessDeputy
+from sms_handover.plant.grasping import answer
+from sms_handover.plant.integrators import TABLEAUS, rkmk_step
+from sms_handover.plant.parameters import PlantParameters
+from sms_handover.types import (
+    Array,
+    DeputyState,
+    GraspCommand,
+    GraspEvent,
+    JointCommand,
+    Pose,
+    RobotState,
+    Twist,
+)
+from sms_handover.units import ns_to_seconds
+
+
+@dataclass(frozen=True, eq=False)
+class InitialState:
+    """Where a run starts, at rest: base pose in ``world``, joint angles (n,) rad, the deputy."""
+
+    base_in_world: Pose
+    joint_position: Array
+    deputy_in_world: Pose
+    deputy_grasp_frames: "dict[str, Pose]"
+
+
+class FreeFloatingPlant:
+    """H(q) v' + c(q, v) = (0, u): a base without actuators that carries arms, and no gravity.
+
+    The efforts of a tick are held constant over it. Time is counted in whole ticks, so stamps are exact.
+    """
+
+    def __init__(
+        self, robot: RobotModel, parameters: PlantParameters, initial: InitialState, tick_ns: int
+    ) -> None:
+        """Place robot and deputy at rest; raises ConfigurationError where a joint starts outside its limits."""
+        self._robot = robot
+        self._tableau = TABLEAUS[parameters.integrator]
+        self._tolerance = GraspTolerance(
+            parameters.grasp_position_tolerance,
+            parameters.grasp_angle_tolerance,
+            parameters.grasp_speed_tolerance,
+        )
+        self._initial = initial
+        self._tick_ns = tick_ns
+        self._tick_s = ns_to_seconds(tick_ns)
+        self._check_start()
+        self.reset()
+
+    def reset(self) -> None:
+        """Go back to the initial state at time zero."""
+        self._tick = 0
+        self._q = self._robot.configuration(self._initial.base_in_world, self._initial.joint_position)
+        self._v = np.zeros(self._robot.pin.nv)
+        self._effort = np.zeros(self._robot.n_joints)
+        self._work = 0.0
+        self._saturated_ticks = np.zeros(self._robot.n_joints, dtype=np.int64)
+        self._deputy = MasslessDeputy(self._initial.deputy_in_world, self._initial.deputy_grasp_frames)
+
+    @property
+    def tick(self) -> int:
+        """Number of ticks integrated since the start."""
+        return self._tick
+
+    @property
+    def stamp_ns(self) -> int:
+        """Simulation time in ns."""
+        return self._tick * self._tick_ns
+
+    @property
+    def state(self) -> RobotState:
+        """Return the state at this tick."""
+        q, v = self._q, self._v
+        return RobotState(
+            stamp_ns=self.stamp_ns,
+            base_in_world=Pose(q[:3], q[3:BASE_NQ]),
+            twist_base_in_base=Twist(v[:3], v[3:BASE_NV]),
+            joint_position=q[BASE_NQ:],
+            joint_velocity=v[BASE_NV:],
+            joint_effort=self._effort,
+        )
+
+    @property
+    def deputy(self) -> DeputyState:
+        """Return where the deputy is and who holds it."""
+        self._deputy_follow()
+        return self._deputy.state
+
+    @property
+    def work(self) -> float:
+        """Work in J that the joint efforts have done since the start."""
+        return self._work
+
+    @property
+    def saturated_ticks(self) -> dict[str, int]:
+        """Return for each joint in how many ticks its command exceeded the effort limit."""
+        return dict(zip(self._robot.joint_names, self._saturated_ticks.tolist(), strict=True))
+
+    @property
+    def tools_in_world(self) -> dict[str, Pose]:
+        """Return the pose of every tool."""
+        state = self.state
+        return self._robot.tools_in_world(state.base_in_world, state.joint_position)
+
+    @property
+    def receipt(self) -> PhysicsReceipt:
+        """Return momenta, energy and centre of mass of the robot."""
+        return physics_receipt(self._robot, self._q, self._v)
+
+    def execute(self, commands: tuple[GraspCommand, ...]) -> tuple[GraspEvent, ...]:
+        """Carry out grasp commands at this instant, in order, and return what came of each."""
+        if not commands:
+            return ()
+        self._deputy_follow()
+        tools = self.tools_in_world
+        twists = {arm: self._robot.tool_twist_in_world(self._q, self._v, arm) for arm in tools}
+        return tuple(
+            answer(command, self._deputy, tools, twists, self._tolerance, self.stamp_ns)
+            for command in commands
+        )
+
+    def step(self, command: JointCommand) -> None:
+        """Integrate one tick under the command's efforts, each limited to what the joint can give.
+
+        The work is u . (q_m(t + h) - q_m(t)), exact because u is constant over the tick.
+        """
+        limit = self._robot.effort_limit
+        effort = np.clip(command.effort, -limit, limit)
+        self._saturated_ticks += effort != command.effort
+        generalized = np.concatenate([np.zeros(BASE_NV), effort])
+        model, data = self._robot.pin, self._robot.data
+
+        def acceleration(q: Array, v: Array) -> Array:
+            result: Array = pin.aba(model, data, q, v, generalized)
+            return result.copy()
+
+        before = self._q
+        self._q, self._v = rkmk_step(model, self._tableau, acceleration, before, self._v, self._tick_s)
+        self._work += float(effort @ (self._q[BASE_NQ:] - before[BASE_NQ:]))
+        self._effort = effort
+        self._tick += 1
+        if not self._deputy.holder:
+            self._deputy.drift(self._tick_s)
+
+    def _deputy_follow(self) -> None:
+        """Bring a held deputy to where its tool is now."""
+        holder = self._deputy.holder
+        if holder:
+            twist = self._robot.tool_twist_in_world(self._q, self._v, holder)
+            self._deputy.follow(self.tools_in_world[holder], twist)
+
+    def _check_start(self) -> None:
+        """Raise ConfigurationError where a joint starts outside its limits."""
+        robot, start = self._robot, np.asarray(self._initial.joint_position)
+        for name, value, low, high in zip(robot.joint_names, start, robot.lower, robot.upper, strict=True):
+            if not low <= value <= high:
+                raise ConfigurationError(
+                    f"initial position of {name} is {value} rad, allowed is {low} to {high} rad"
+                )

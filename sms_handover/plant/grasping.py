@@ -1,0 +1,68 @@
+"""The plant's answer to a grasp command: who holds the deputy afterwards, and why."""
+
+from collections.abc import Mapping
+from math import nan
+
+from sms_handover.plant.deputy import GraspErrors, GraspTolerance, MasslessDeputy
+from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, Pose, Twist
+from sms_handover.units import DEG_PER_RAD, MM_PER_M
+
+
+def answer(
+    command: GraspCommand,
+    deputy: MasslessDeputy,
+    tools_in_world: Mapping[str, Pose],
+    tool_twists_in_world: Mapping[str, Twist],
+    tolerance: GraspTolerance,
+    stamp_ns: int,
+) -> GraspEvent:
+    """Carry out one grasp command on the deputy and return the event.
+
+    A grasp holds only if position, angle and relative speed are within tolerance; otherwise it is
+    missed and the deputy stays with whom it was. A command that contradicts who holds the deputy is rejected.
+    """
+    refusal = _refusal(command, deputy.holder)
+    if refusal:
+        return _event(stamp_ns, command, GraspStatus.REJECTED, None, refusal)
+    if command.action is GraspAction.RELEASE:
+        deputy.detach()
+        return _event(stamp_ns, command, GraspStatus.SUCCEEDED, None, f"{command.arm} let go")
+    tool = tools_in_world[command.arm]
+    errors = deputy.errors_of(command.grasp_frame, tool, tool_twists_in_world[command.arm])
+    if not errors.within(tolerance):
+        return _event(stamp_ns, command, GraspStatus.MISSED, errors, _miss(errors, tolerance))
+    deputy.attach(command.arm, tool)
+    return _event(stamp_ns, command, GraspStatus.SUCCEEDED, errors, f"{command.arm} holds the deputy")
+
+
+def _refusal(command: GraspCommand, holder: str) -> str:
+    """Return why a command makes no sense while ``holder`` holds the deputy, or ''."""
+    if command.action is GraspAction.RELEASE and holder != command.arm:
+        return f"{command.arm} does not hold the deputy"
+    if command.action is GraspAction.GRASP and holder:
+        return f"{holder} holds the deputy already"
+    if command.action is GraspAction.TRANSFER and holder != command.from_arm:
+        return f"{command.from_arm} does not hold the deputy"
+    return ""
+
+
+def _miss(errors: GraspErrors, tolerance: GraspTolerance) -> str:
+    """Return which errors were outside their tolerance, with units."""
+    table = (
+        ("distance", errors.position, tolerance.position, MM_PER_M, "mm"),
+        ("angle", errors.angle, tolerance.angle, DEG_PER_RAD, "deg"),
+        ("speed", errors.speed, tolerance.speed, MM_PER_M, "mm/s"),
+    )
+    return "; ".join(
+        f"{name} {value * scale:.3g} {unit}, allowed {limit * scale:.3g} {unit}"
+        for name, value, limit, scale, unit in table
+        if not value <= limit
+    )
+
+
+def _event(
+    stamp_ns: int, command: GraspCommand, status: GraspStatus, errors: GraspErrors | None, detail: str
+) -> GraspEvent:
+    """Return the event of a command; without errors their fields are NaN."""
+    position, angle, speed = (errors.position, errors.angle, errors.speed) if errors else (nan, nan, nan)
+    return GraspEvent(stamp_ns, command, status, position, angle, speed, detail)

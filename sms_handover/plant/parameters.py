@@ -1,0 +1,24 @@
+"""Parameters of the plant."""
+
+from dataclasses import dataclass
+
+from sms_handover.parameters import parameter
+from sms_handover.plant.integrators import TABLEAUS
+
+
+@dataclass(frozen=True)
+class PlantParameters:
+    """How the plant integrates and when a grasp holds; the numbers are in ``config/plant.yaml``."""
+
+    integrator: str = parameter("Runge-Kutta-Munthe-Kaas scheme between ticks", choices=tuple(TABLEAUS))
+    grasp_position_tolerance: float = parameter(
+        "largest distance of the tool to the grasp frame at which a grasp holds", unit="m", minimum=0.0
+    )
+    grasp_angle_tolerance: float = parameter(
+        "largest angle between tool and grasp frame at which a grasp holds", unit="rad", minimum=0.0
+    )
+    grasp_speed_tolerance: float = parameter(
+        "largest speed of the tool relative to the grasp frame at which a grasp holds",
+        unit="m/s",
+        minimum=0.0,
+    )

@@ -1,0 +1,125 @@
+"""Collects the rows of a run while it happens and gives them back as arrays."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from sms_handover.model.conserved import PhysicsReceipt
+from sms_handover.model.poses import pose_row
+from sms_handover.run_data import RunData
+from sms_handover.types import (
+    Array,
+    GraspEvent,
+    IkResult,
+    IkStatus,
+    JointCommand,
+    JointReference,
+    Pose,
+    RobotState,
+    TaskPhase,
+)
+
+IK_STATUS_NUMBER: Mapping[IkStatus, int] = {status: number for number, status in enumerate(IkStatus)}
+
+
+class RunRecorder:
+    """Preallocated arrays for a run of known length, filled row by row."""
+
+    def __init__(self, joint_names: tuple[str, ...], arms: tuple[str, ...], ticks: int, periods: int) -> None:
+        """Make room for ``ticks`` states and ``periods`` references."""
+        n = len(joint_names)
+        self._joint_names, self._arms = joint_names, arms
+        self._tick_ns = np.zeros(ticks, dtype=np.int64)
+        self._joints = np.full((4, ticks, n), np.nan)  # position, velocity, effort, command
+        self._base = np.full((ticks, 13), np.nan)  # position, quaternion, twist
+        self._reference_ns = np.zeros(periods, dtype=np.int64)
+        self._reference = np.full((2, periods, n), np.nan)  # position, velocity
+        self._poses = np.full((2, len(arms), periods, 7), np.nan)  # target, tool
+        self._deputy = np.full((periods, 7), np.nan)
+        self._receipts = np.full((periods, 8), np.nan)  # momenta, kinetic energy, work
+        self._ik_status = np.full(periods, -1, dtype=np.int64)
+        self._phases: list[TaskPhase] = []
+        self._events: list[GraspEvent] = []
+        self._tick = 0
+        self._period = 0
+
+    def tick(self, state: RobotState, command: JointCommand) -> None:
+        """Add the row of one tick."""
+        k = self._tick
+        self._tick_ns[k] = state.stamp_ns
+        self._joints[0, k] = state.joint_position
+        self._joints[1, k] = state.joint_velocity
+        self._joints[2, k] = state.joint_effort
+        self._joints[3, k] = command.effort
+        self._base[k, :3] = state.base_in_world.position
+        self._base[k, 3:7] = state.base_in_world.quaternion_xyzw
+        self._base[k, 7:10] = state.twist_base_in_base.linear
+        self._base[k, 10:] = state.twist_base_in_base.angular
+        self._tick += 1
+
+    def reference(
+        self,
+        phase: TaskPhase,
+        reference: JointReference,
+        targets_in_world: Mapping[str, Pose],
+        ik: IkResult | None,
+    ) -> None:
+        """Add what the trajectory gave in one reference period; :meth:`plant` completes the row."""
+        row = self._period
+        self._reference_ns[row] = reference.stamp_ns
+        self._reference[0, row] = reference.position
+        self._reference[1, row] = reference.velocity
+        for index, arm in enumerate(self._arms):
+            self._poses[0, index, row] = pose_row(targets_in_world[arm])
+        if ik is not None:
+            self._ik_status[row] = IK_STATUS_NUMBER[ik.status]
+        self._phases.append(phase)
+        self._period += 1
+
+    def plant(
+        self, tools_in_world: Mapping[str, Pose], deputy_in_world: Pose, receipt: PhysicsReceipt, work: float
+    ) -> None:
+        """Add what the plant gave in one reference period, before :meth:`reference`."""
+        row = self._period
+        for index, arm in enumerate(self._arms):
+            self._poses[1, index, row] = pose_row(tools_in_world[arm])
+        self._deputy[row] = pose_row(deputy_in_world)
+        self._receipts[row, :3] = receipt.linear_momentum
+        self._receipts[row, 3:6] = receipt.angular_momentum
+        self._receipts[row, 6:] = receipt.kinetic_energy, work
+
+    def events(self, events: tuple[GraspEvent, ...]) -> None:
+        """Add grasp events."""
+        self._events.extend(events)
+
+    def data(self) -> RunData:
+        """Return what has been collected so far."""
+        ticks, periods = slice(self._tick), slice(self._period)
+
+        def per_arm(kind: int) -> dict[str, Array]:
+            return {arm: self._poses[kind, i, periods].copy() for i, arm in enumerate(self._arms)}
+
+        return RunData(
+            joint_names=self._joint_names,
+            arms=self._arms,
+            tick_ns=self._tick_ns[ticks].copy(),
+            joint_position=self._joints[0, ticks].copy(),
+            joint_velocity=self._joints[1, ticks].copy(),
+            joint_effort=self._joints[2, ticks].copy(),
+            joint_command=self._joints[3, ticks].copy(),
+            base_pose=self._base[ticks, :7].copy(),
+            base_twist=self._base[ticks, 7:].copy(),
+            reference_ns=self._reference_ns[periods].copy(),
+            reference_position=self._reference[0, periods].copy(),
+            reference_velocity=self._reference[1, periods].copy(),
+            target_pose=per_arm(0),
+            tool_pose=per_arm(1),
+            deputy_pose=self._deputy[periods].copy(),
+            linear_momentum=self._receipts[periods, :3].copy(),
+            angular_momentum=self._receipts[periods, 3:6].copy(),
+            kinetic_energy=self._receipts[periods, 6].copy(),
+            work=self._receipts[periods, 7].copy(),
+            ik_status=self._ik_status[periods].copy(),
+            phases=tuple(self._phases),
+            grasp_events=tuple(self._events),
+        )

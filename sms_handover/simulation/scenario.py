@@ -1,0 +1,89 @@
+"""A scenario: everything a run is made of, read from files and checked before anything moves."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar
+
+from sms_handover.control.parameters import ControllerParameters
+from sms_handover.errors import UnknownNameError
+from sms_handover.ik.parameters import IkParameters
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.parameters import EVERY_NODE, build, read_parameter_files
+from sms_handover.plant.parameters import PlantParameters
+from sms_handover.share import config_file
+from sms_handover.simulation.parameters import CommonParameters
+from sms_handover.topics import CONTROLLER, IK, PLANT, TRAJECTORY
+from sms_handover.trajectory.load import load_schedule
+from sms_handover.trajectory.parameters import TrajectoryParameters
+from sms_handover.trajectory.schedule import Schedule
+
+T = TypeVar("T")
+
+COMMON = "common"  # prefix of an override that holds for every node
+
+Overrides = Mapping[str, Mapping[str, object]]
+
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """The parameters of every node that takes part in the loop."""
+
+    common: CommonParameters
+    plant: PlantParameters
+    trajectory: TrajectoryParameters
+    ik: IkParameters
+    controller: ControllerParameters
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """Parameters, robot and schedule of one run."""
+
+    parameters: ParameterSet
+    robot: RobotModel
+    schedule: Schedule
+    overrides: Overrides = field(default_factory=dict)
+
+
+def load_parameters(overrides: Overrides | None = None, files: Sequence[Path] = ()) -> ParameterSet:
+    """Return the shipped parameters with those of ``files`` and then ``overrides`` on top.
+
+    ``overrides`` maps a node name, or ``common``, to parameters. Raises ConfigurationError.
+    """
+    overrides = overrides or {}
+    known = (COMMON, PLANT, TRAJECTORY, IK, CONTROLLER)
+    for node in overrides:
+        if node not in known:
+            raise UnknownNameError("node", node, known, "parameter overrides")
+
+    def group(cls: type[T], node: str, section: str) -> T:
+        paths = [config_file(f"{node}.yaml"), *files]
+        return build(cls, {**read_parameter_files(paths, section), **overrides.get(node, {})}, node)
+
+    return ParameterSet(
+        common=group(CommonParameters, COMMON, EVERY_NODE),
+        plant=group(PlantParameters, PLANT, PLANT),
+        trajectory=group(TrajectoryParameters, TRAJECTORY, TRAJECTORY),
+        ik=group(IkParameters, IK, IK),
+        controller=group(ControllerParameters, CONTROLLER, CONTROLLER),
+    )
+
+
+def load_scenario(overrides: Overrides | None = None, files: Sequence[Path] = ()) -> Scenario:
+    """Return the scenario that parameters, robot description and schedule make, all checked."""
+    parameters = load_parameters(overrides, files)
+    robot = load_robot_model(parameters.common)
+    schedule = load_task(parameters.common, robot)
+    return Scenario(parameters, robot, schedule, overrides or {})
+
+
+def load_robot_model(common: CommonParameters) -> RobotModel:
+    """Return the model of the robot that the parameters name."""
+    return RobotModel.load(Path(common.robot) if common.robot else None)
+
+
+def load_task(common: CommonParameters, robot: RobotModel) -> Schedule:
+    """Return the schedule that the parameters name, checked against the robot."""
+    path = Path(common.schedule) if common.schedule else config_file("handover.yaml")
+    return load_schedule(path, robot, common.reference_ns)

@@ -1,0 +1,55 @@
+"""Making the parts of the loop from a scenario; the nodes and the in-process loop share this."""
+
+import numpy as np
+
+from sms_handover.control.controller import Gains, JointController
+from sms_handover.control.parameters import ControllerParameters, gains_of
+from sms_handover.errors import UnknownNameError
+from sms_handover.control.parameters import LAWS
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
+from sms_handover.plant.parameters import PlantParameters
+from sms_handover.simulation.parameters import CommonParameters
+from sms_handover.trajectory.schedule import Schedule
+from sms_handover.types import Array
+
+
+def initial_joints(robot: RobotModel, schedule: Schedule) -> Array:
+    """Return the initial joint angles (n,) in the order of the robot's joints."""
+    joints = np.zeros(robot.n_joints)
+    for arm, values in schedule.initial_joints.items():
+        joints[robot.arm_joints[arm]] = values
+    return joints
+
+
+def make_plant(
+    robot: RobotModel, schedule: Schedule, common: CommonParameters, parameters: PlantParameters
+) -> FreeFloatingPlant:
+    """Return the plant at the start of the schedule."""
+    initial = InitialState(
+        schedule.base_in_world,
+        initial_joints(robot, schedule),
+        schedule.deputy.deputy_in_world,
+        dict(schedule.deputy.grasp_frames),
+    )
+    return FreeFloatingPlant(robot, parameters, initial, common.tick_ns)
+
+
+def gains_by_phase(schedule: Schedule, parameters: ControllerParameters) -> tuple[Gains, ...]:
+    """Return the gains of the chosen law for every phase; a phase changes only what it names."""
+    found = []
+    for phase in schedule.phases:
+        where = f"gains of phase {phase.name!r}"
+        for law in phase.gains:
+            if law not in LAWS:
+                raise UnknownNameError("control law", law, LAWS, where)
+        found.append(gains_of(parameters, phase.gains.get(parameters.law, {}), where))
+    return tuple(found)
+
+
+def make_controller(
+    robot: RobotModel, schedule: Schedule, common: CommonParameters, parameters: ControllerParameters
+) -> JointController:
+    """Return the controller, its gains checked for stability at the start of the schedule."""
+    start = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
+    return JointController(robot, gains_by_phase(schedule, parameters), common.tick_ns, start)

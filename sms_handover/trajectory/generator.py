@@ -1,0 +1,153 @@
+"""The trajectory generator: from the schedule and the present state to targets and joint reference."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from sms_handover.model.poses import pose_of, se3_of
+from sms_handover.model.reduced import generalized_jacobian
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.trajectory.parameters import TrajectoryParameters
+from sms_handover.trajectory.pose_path import PosePath
+from sms_handover.trajectory.schedule import GraspFrameTarget, JointTarget, Phase, Schedule, ToolTarget
+from sms_handover.trajectory.time_law import TIME_LAWS, Progress
+from sms_handover.types import (
+    Array,
+    IkRequest,
+    JointReference,
+    Pose,
+    RobotState,
+    TaskPhase,
+    Twist,
+    read_only,
+)
+from sms_handover.units import ns_to_seconds
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """What the arms shall do at one instant.
+
+    Arms led by their tool have pose and twist in ``world``; ``joint_position`` and ``joint_velocity``
+    (n,) hold the desired joints of the others, and the present ones for arms led by their tool.
+    """
+
+    stamp_ns: int
+    tool_in_world: Mapping[str, Pose]
+    tool_twist_in_world: Mapping[str, Twist]
+    joint_position: Array
+    joint_velocity: Array
+
+    def __post_init__(self) -> None:
+        """Make arrays and mappings immutable."""
+        object.__setattr__(self, "tool_in_world", MappingProxyType(dict(self.tool_in_world)))
+        object.__setattr__(self, "tool_twist_in_world", MappingProxyType(dict(self.tool_twist_in_world)))
+        object.__setattr__(self, "joint_position", read_only(self.joint_position))
+        object.__setattr__(self, "joint_velocity", read_only(self.joint_velocity))
+
+
+class TrajectoryGenerator:
+    """Walks through a schedule; each reference period it gives targets, an IK request and a reference.
+
+    Inverse kinematics is not solved here but asked for, because it is a service of its own.
+    """
+
+    def __init__(self, robot: RobotModel, schedule: Schedule, parameters: TrajectoryParameters) -> None:
+        """Set up at the start of the schedule."""
+        self._robot = robot
+        self._schedule = schedule
+        self._time_law = TIME_LAWS[parameters.time_law]
+        self._damping = parameters.jacobian_damping
+        self.reset()
+
+    def reset(self) -> None:
+        """Go back to the start of the schedule."""
+        self._index = -1
+        self._joints_at_start: Array = np.zeros(self._robot.n_joints)
+        self._tools_at_start: Mapping[str, Pose] = {}
+
+    def targets(self, state: RobotState, deputy_in_world: Pose) -> tuple[TaskPhase, Targets]:
+        """Return the phase in force and the targets of the arms; enters a new phase when it is due."""
+        index = self._schedule.phase_index(state.stamp_ns)
+        phase = self._schedule.phases[index]
+        entered = index != self._index
+        if entered:
+            self._index = index
+            self._joints_at_start = state.joint_position
+            self._tools_at_start = self._robot.tools_in_world(state.base_in_world, state.joint_position)
+        task = TaskPhase(state.stamp_ns, index, phase.name, phase.commands if entered else ())
+        return task, self._targets_of(phase, state, deputy_in_world)
+
+    def ik_request(self, state: RobotState, targets: Targets) -> IkRequest:
+        """Return what to ask of inverse kinematics: the base locked where it is, the present joints as seed.
+
+        Arms that are led by their joints take part with their desired joints.
+        """
+        return IkRequest(state.base_in_world, targets.joint_position, targets.tool_in_world)
+
+    def reference(
+        self, state: RobotState, targets: Targets, joint_position: Array
+    ) -> tuple[JointReference, Mapping[str, Pose]]:
+        """Return the joint reference for the joint angles that inverse kinematics found.
+
+        Also returns the target pose of every tool, for arms led by their joints the one that these
+        joints give. The joint rates bring about the desired tool twists with the reaction of
+        the base accounted for: the damped inverse of the generalised Jacobian [Umetani1989].
+        """
+        poses = self._robot.tools_in_world(state.base_in_world, joint_position)
+        poses.update(targets.tool_in_world)
+        velocity = np.array(targets.joint_velocity)
+        if any(np.any(t.linear) or np.any(t.angular) for t in targets.tool_twist_in_world.values()):
+            velocity = self._resolve_rates(state, targets, velocity)
+        return JointReference(state.stamp_ns, joint_position, velocity), poses
+
+    def _targets_of(self, phase: Phase, state: RobotState, deputy_in_world: Pose) -> Targets:
+        """Return the targets of every arm at the time of a state."""
+        progress = self._time_law(
+            ns_to_seconds(state.stamp_ns - phase.start_ns), ns_to_seconds(phase.motion_ns)
+        )
+        poses: dict[str, Pose] = {}
+        twists: dict[str, Twist] = {}
+        position = np.array(state.joint_position)
+        velocity = np.zeros(self._robot.n_joints)
+        for arm, target in phase.targets.items():
+            joints = self._robot.arm_joints[arm]
+            start = self._joints_at_start[joints]
+            if isinstance(target, ToolTarget | GraspFrameTarget):
+                goal = self._goal(target, deputy_in_world)
+                poses[arm], twists[arm] = PosePath(self._tools_at_start[arm], goal).at(progress)
+            elif isinstance(target, JointTarget):
+                position[joints], velocity[joints] = _joint_motion(start, target.position, progress)
+            else:
+                position[joints] = start
+        return Targets(state.stamp_ns, poses, twists, position, velocity)
+
+    def _goal(self, target: ToolTarget | GraspFrameTarget, deputy_in_world: Pose) -> Pose:
+        """Return the pose in ``world`` that a tool shall reach."""
+        if isinstance(target, ToolTarget):
+            return target.tool_in_world
+        frame = self._schedule.deputy.grasp_frames[target.grasp_frame]
+        return pose_of(se3_of(deputy_in_world) * se3_of(frame) * se3_of(target.tool_in_grasp_frame))
+
+    def _resolve_rates(self, state: RobotState, targets: Targets, velocity: Array) -> Array:
+        """Return the joint rates with those of tool-led arms solved for from the desired twists."""
+        robot = self._robot
+        q = robot.q_of(state)
+        led = [arm for arm in robot.arms if arm in targets.tool_twist_in_world]
+        jacobian = np.vstack([generalized_jacobian(robot, q, arm) for arm in led])
+        twists = [targets.tool_twist_in_world[arm] for arm in led]
+        wanted = np.concatenate([part for t in twists for part in (t.linear, t.angular)])
+        columns = np.concatenate([np.arange(robot.n_joints)[robot.arm_joints[arm]] for arm in led])
+        free = jacobian[:, columns]
+        rest = wanted - jacobian @ velocity  # the other arms move the tool through the base
+        damped = free @ free.T + self._damping**2 * np.eye(rest.size)
+        result = np.array(velocity)
+        result[columns] = free.T @ np.linalg.solve(damped, rest)
+        return result
+
+
+def _joint_motion(start: Array, end: Array, progress: Progress) -> tuple[Array, Array]:
+    """Return joint position and velocity on the straight way between two joint configurations."""
+    return start + progress.fraction * (end - start), progress.rate * (end - start)

@@ -1,0 +1,29 @@
+"""A path from one pose to another: a straight line for the origin, the shortest turn for the axes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from sms_handover.model.poses import pose_of, se3_of
+from sms_handover.trajectory.time_law import Progress
+from sms_handover.types import Pose, Twist
+
+
+@dataclass(frozen=True, eq=False)
+class PosePath:
+    """The geodesic of R^3 x SO(3): p = p0 + s (p1 - p0), R = R0 exp(s log(R0^T R1))."""
+
+    start: Pose
+    end: Pose
+
+    def at(self, progress: Progress) -> tuple[Pose, Twist]:
+        """Return pose and twist (of the origin, in ``world`` axes) at a point of the time law."""
+        if progress.fraction == 1.0 and progress.rate == 0.0:
+            return self.end, Twist(np.zeros(3), np.zeros(3))
+        start, end = se3_of(self.start), se3_of(self.end)
+        turn = pin.log3(start.rotation.T @ end.rotation)
+        rotation = start.rotation @ pin.exp3(progress.fraction * turn)
+        way = end.translation - start.translation
+        pose = pose_of(pin.SE3(rotation, start.translation + progress.fraction * way))
+        return pose, Twist(progress.rate * way, start.rotation @ (progress.rate * turn))

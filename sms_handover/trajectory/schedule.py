@@ -1,0 +1,109 @@
+"""The task schedule as values: who goes where, when, and who holds the deputy."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from sms_handover.types import Array, GraspCommand, Pose, read_only
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Keep the joint angles the arm has when the phase begins."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointTarget:
+    """Go to joint angles (joints of the arm,) rad."""
+
+    position: Array
+
+    def __post_init__(self) -> None:
+        """Copy the array and make it read-only."""
+        object.__setattr__(self, "position", read_only(self.position))
+
+
+@dataclass(frozen=True, eq=False)
+class ToolTarget:
+    """Bring the tool to a pose in ``world``."""
+
+    tool_in_world: Pose
+
+
+@dataclass(frozen=True, eq=False)
+class GraspFrameTarget:
+    """Bring the tool to a pose relative to a grasp frame of the deputy, wherever the deputy is."""
+
+    grasp_frame: str
+    tool_in_grasp_frame: Pose
+
+
+ArmTarget = Hold | JointTarget | ToolTarget | GraspFrameTarget
+
+
+@dataclass(frozen=True, eq=False)
+class Phase:
+    """One phase: its time span, the target of every arm, and what happens at its first instant.
+
+    ``motion_ns`` is how long a smooth time law takes to reach the targets; ``gains`` has, per
+    control law, the gains that differ from the controller's own while the phase lasts.
+    """
+
+    name: str
+    start_ns: int
+    end_ns: int
+    motion_ns: int
+    targets: Mapping[str, ArmTarget]
+    commands: tuple[GraspCommand, ...] = ()
+    gains: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Make the mappings immutable."""
+        object.__setattr__(self, "targets", MappingProxyType(dict(self.targets)))
+        object.__setattr__(self, "gains", MappingProxyType(dict(self.gains)))
+
+
+@dataclass(frozen=True, eq=False)
+class DeputyDescription:
+    """The deputy: mass kg, edges (3,) m, where it starts, and its grasp frames as poses in it.
+
+    A tool that holds the deputy perfectly coincides with a grasp frame.
+    """
+
+    mass: float
+    size: Array
+    deputy_in_world: Pose
+    grasp_frames: Mapping[str, Pose]
+
+    def __post_init__(self) -> None:
+        """Copy the arrays and make them read-only."""
+        object.__setattr__(self, "size", read_only(self.size))
+        object.__setattr__(self, "grasp_frames", MappingProxyType(dict(self.grasp_frames)))
+
+
+@dataclass(frozen=True, eq=False)
+class Schedule:
+    """A whole task: where everything starts and the phases in the order of time.
+
+    ``initial_joints`` has the joint angles per arm. ``text`` is the file as read, for the record.
+    """
+
+    initial_joints: Mapping[str, Array]
+    base_in_world: Pose
+    deputy: DeputyDescription
+    phases: tuple[Phase, ...]
+    text: str
+
+    def __post_init__(self) -> None:
+        """Make the mapping immutable."""
+        object.__setattr__(self, "initial_joints", MappingProxyType(dict(self.initial_joints)))
+
+    @property
+    def end_ns(self) -> int:
+        """When the last phase ends, in ns of simulation time."""
+        return self.phases[-1].end_ns
+
+    def phase_index(self, stamp_ns: int) -> int:
+        """Return the index of the phase in force at a time; after the end it is the last one."""
+        started = [index for index, phase in enumerate(self.phases) if phase.start_ns <= stamp_ns]
+        return started[-1]

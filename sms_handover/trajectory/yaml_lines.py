@@ -1,0 +1,124 @@
+"""YAML mappings and lists that remember the line they start at, for errors that point at it."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from sms_handover.errors import ScheduleError, UnknownNameError
+
+
+class Section:
+    """A mapping of a YAML file: typed access to its keys, with the line in every error."""
+
+    def __init__(self, path: Path, node: yaml.MappingNode) -> None:
+        """Index the keys; raises ScheduleError on a key given twice."""
+        self._path = path
+        self.line = node.start_mark.line + 1
+        self._nodes: dict[str, yaml.Node] = {}
+        for key_node, value_node in node.value:
+            key = str(key_node.value)
+            if key in self._nodes:
+                raise self.error(f"key {key!r} is given twice", key_node.start_mark.line + 1)
+            self._nodes[key] = value_node
+
+    def error(self, text: str, line: int | None = None) -> ScheduleError:
+        """Return an error that names the file and a line, by default that of this section."""
+        return ScheduleError(f"{self._path}:{line or self.line}: {text}")
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Return the keys in the order of the file."""
+        return tuple(self._nodes)
+
+    def line_of(self, key: str) -> int:
+        """Return the line of a key's value."""
+        return self._nodes[key].start_mark.line + 1
+
+    def refuse_unknown(self, known: Sequence[str]) -> None:
+        """Raise ScheduleError on a key that is not among the known ones."""
+        for key in self._nodes:
+            if key not in known:
+                raise ScheduleError(
+                    str(UnknownNameError("key", key, known, f"{self._path}:{self.line_of(key)}"))
+                )
+
+    def has(self, key: str) -> bool:
+        """Tell whether a key is given."""
+        return key in self._nodes
+
+    def section(self, key: str) -> "Section":
+        """Return the mapping under a key."""
+        node = self._get(key)
+        if not isinstance(node, yaml.MappingNode):
+            raise self.error(f"{key!r} must be a mapping", self.line_of(key))
+        return Section(self._path, node)
+
+    def sections(self, key: str) -> list["Section"]:
+        """Return the mappings in the list under a key."""
+        node = self._get(key)
+        if not isinstance(node, yaml.SequenceNode):
+            raise self.error(f"{key!r} must be a list", self.line_of(key))
+        for item in node.value:
+            if not isinstance(item, yaml.MappingNode):
+                raise self.error(f"every item of {key!r} must be a mapping", item.start_mark.line + 1)
+        return [Section(self._path, item) for item in node.value]
+
+    def is_text(self, key: str) -> bool:
+        """Tell whether the value of a key is a single word or number."""
+        return isinstance(self._get(key), yaml.ScalarNode)
+
+    def value(self, key: str) -> Any:
+        """Return the plain value under a key."""
+        loader = yaml.SafeLoader("")
+        try:
+            return loader.construct_object(self._get(key), deep=True)  # type: ignore[no-untyped-call]
+        except yaml.YAMLError as error:
+            raise self.error(f"{key!r}: {error}", self.line_of(key)) from error
+
+    def text(self, key: str) -> str:
+        """Return the text under a key."""
+        value = self.value(key)
+        if not isinstance(value, str) or not value:
+            raise self.error(f"{key!r} is {value!r}, expected text", self.line_of(key))
+        return value
+
+    def number(self, key: str, unit: str, minimum: float = float("-inf")) -> float:
+        """Return the finite number under a key."""
+        return self._number(self.value(key), key, unit, minimum)
+
+    def vector(self, key: str, size: int, unit: str) -> list[float]:
+        """Return the list of ``size`` finite numbers under a key."""
+        values = self.value(key)
+        if not isinstance(values, list) or len(values) != size:
+            raise self.error(f"{key!r} is {values!r}, expected {size} numbers in {unit}", self.line_of(key))
+        return [self._number(value, key, unit, float("-inf")) for value in values]
+
+    def _number(self, value: object, key: str, unit: str, minimum: float) -> float:
+        """Return ``value`` as a float if it is a finite number not below ``minimum``."""
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not minimum <= float(value) < float("inf"):  # type: ignore[arg-type]
+            allowed = f"a number of at least {minimum:g}" if minimum > float("-inf") else "a finite number"
+            raise self.error(f"{key!r} is {value!r}, expected {allowed} in {unit}", self.line_of(key))
+        return float(value)  # type: ignore[arg-type]
+
+    def _get(self, key: str) -> yaml.Node:
+        """Return the node under a key, which must be given."""
+        if key not in self._nodes:
+            raise self.error(f"key {key!r} is missing")
+        return self._nodes[key]
+
+
+def read_section(path: Path) -> tuple[Section, str]:
+    """Return the top-level mapping of a YAML file and the file's text; raises ScheduleError."""
+    try:
+        text = path.read_text(encoding="utf-8")
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+    except OSError as error:
+        raise ScheduleError(f"cannot read the schedule {path}: {error.strerror}") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ScheduleError(f"{path} is not valid YAML: {' '.join(str(error).split())}") from error
+    if not isinstance(node, yaml.MappingNode):
+        raise ScheduleError(f"{path}: expected a mapping at the top level")
+    return Section(path, node), text
