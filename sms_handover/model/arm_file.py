@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+from sms_handover.errors import RobotDescriptionError
 from sms_handover.frames import joint_name
 from sms_handover.model.assembly import link_name
 from sms_handover.model.parts import Inertia, JointDescription, LinkDescription, Origin
@@ -16,8 +17,11 @@ def read_arm_file(file: Path, arm: str) -> tuple[list[JointDescription], list[Li
     document = read_yaml(file)
     with naming(file):
         root = read_section(document, "arm description", ("joints", "flange"))
+        entries = read_list(root["joints"], "joints")
+        if not entries:
+            raise RobotDescriptionError("joints has 0 entries, allowed is at least 1")
         joints, links = [], []
-        for number_from_1, item in enumerate(read_list(root["joints"], "joints"), start=1):
+        for number_from_1, item in enumerate(entries, start=1):
             where = joint_name(arm, number_from_1)
             section = read_section(item, where, ("origin", "axis", "limits", "link"))
             joints.append(_joint(section, where))
