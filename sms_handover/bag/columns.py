@@ -37,7 +37,7 @@ class _Group:
     fixed: list[tuple[int, int, bytes]]
     size: int
     rows: list[int] = field(default_factory=list)
-    bytes_of_block: list[bytearray] = field(default_factory=list)
+    wanted: list[tuple[int, int, bytearray]] = field(default_factory=list)
 
     def fits(self, data: bytes) -> bool:
         """Tell whether a message has this layout for sure."""
@@ -47,9 +47,10 @@ class _Group:
 class BlockCollector:
     """The float64 blocks of the messages of one topic, with their stamps."""
 
-    def __init__(self, parse: Callable[[bytes], Layout]) -> None:
-        """Use ``parse`` for messages of a form not seen before."""
+    def __init__(self, parse: Callable[[bytes], Layout], wanted: Sequence[int]) -> None:
+        """Use ``parse`` for messages of a form not seen before; keep the ``wanted`` blocks of a layout."""
         self._parse = parse
+        self._wanted = tuple(wanted)
         self._stamps: list[int] = []
         self._groups: dict[Layout, _Group] = {}
         self._last: _Group | None = None
@@ -61,32 +62,28 @@ class BlockCollector:
             group = self._last = self._group(data)
         group.rows.append(len(self._stamps))
         self._stamps.append(stamp_ns(data))
-        for (begin, end), block in zip(group.layout.blocks, group.bytes_of_block, strict=True):
-            block += data[begin:end]
+        for begin, end, numbers in group.wanted:
+            numbers.extend(data[begin:end])
 
     def first_texts(self) -> tuple[str, ...]:
         """Return the texts of the first message, () if there is none."""
         return next(iter(self._groups)).texts if self._groups else ()
 
     def series(self, block: int, columns: Sequence[str] | int) -> Series:
-        """Return one block as a series.
+        """Return one of the wanted blocks, counted from 0, as a series.
 
         ``columns`` is the width of the block, or the names of its columns: then they are looked
         up among the texts of each message, and a name that is not there gives NaN.
         """
-        width = columns if isinstance(columns, int) else len(columns)
-        values: Array = np.full((len(self._stamps), width), np.nan)
+        names = tuple(map(str, range(columns))) if isinstance(columns, int) else tuple(columns)
+        values: Array = np.full((len(self._stamps), len(names)), np.nan)
         for group in self._groups.values():
-            numbers = np.frombuffer(
-                group.bytes_of_block[block], dtype="<f8" if group.layout.little_endian else ">f8"
-            ).reshape(len(group.rows), -1)
-            if numbers.shape[1] == 0:
-                continue
-            names = range(width) if isinstance(columns, int) else columns
-            texts = range(width) if isinstance(columns, int) else group.layout.texts
-            pairs = [(new, texts.index(name)) for new, name in enumerate(names) if name in texts]
-            new, old = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
-            values[np.ix_(group.rows, new)] = numbers[:, old]
+            order = "<f8" if group.layout.little_endian else ">f8"
+            numbers = np.frombuffer(group.wanted[block][2], dtype=order).reshape(len(group.rows), -1)
+            if numbers.shape[1]:
+                there = names if isinstance(columns, int) else group.layout.texts
+                new = [place for place, name in enumerate(names) if name in there]
+                values[np.ix_(group.rows, new)] = numbers[:, [there.index(names[place]) for place in new]]
         return Series(np.array(self._stamps, dtype=np.int64), values)
 
     def _group(self, data: bytes) -> _Group:
@@ -95,11 +92,13 @@ class BlockCollector:
         ends = [_STAMP_END, *(end for _, end in layout.blocks)]
         begins = [*(begin for begin, _ in layout.blocks), len(data)]
         fixed = [(0, _ORIGIN, data[:_ORIGIN])]
-        fixed += [(end, begin, data[end:begin]) for end, begin in zip(ends, begins, strict=True) if end < begin]
+        fixed += [
+            (end, begin, data[end:begin]) for end, begin in zip(ends, begins, strict=True) if end < begin
+        ]
         group = self._groups.setdefault(layout, _Group(layout, fixed, len(data)))
         group.fixed, group.size = fixed, len(data)
-        if not group.bytes_of_block:
-            group.bytes_of_block = [bytearray() for _ in layout.blocks]
+        if not group.wanted:
+            group.wanted = [(*layout.blocks[index], bytearray()) for index in self._wanted]
         return group
 
 

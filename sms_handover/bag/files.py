@@ -35,7 +35,9 @@ def bag_files(path: Path) -> tuple[Path, ...]:
     files = (path,) if path.is_file() else tuple(sorted(path.glob("*.mcap")))
     if not files:
         other = next((file.name for file in sorted(path.iterdir()) if file.suffix in {".db3", ".zstd"}), None)
-        reason = f"it holds {other}, only uncompressed .mcap files are read" if other else "no .mcap file in it"
+        reason = (
+            f"it holds {other}, only uncompressed .mcap files are read" if other else "no .mcap file in it"
+        )
         raise BagError(f"{path} is not a bag: {reason}")
     for file in files:
         _check_ends(file)

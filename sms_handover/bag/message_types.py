@@ -39,6 +39,15 @@ class MessageTypes:
         self._roots = tuple(definition_roots() if roots is None else roots)
         self._store = get_typestore(Stores.ROS2_JAZZY)
 
+    def learn(self, type_name: str, text: str) -> None:
+        """Take the definition of a type, and of those it is made of, from the schema text of a bag."""
+        try:
+            definitions = get_types_from_msg(text, type_name)
+            known = self._store.fielddefs
+            self._register({name: value for name, value in definitions.items() if name not in known})
+        except TypesysError as error:
+            raise BagError(f"the schema of {type_name} is not readable: {_one_line(error)}") from error
+
     def schema(self, type_name: str) -> Schema:
         """Return the schema of a type; raises BagError if it has no readable definition."""
         self.require(type_name)
@@ -79,11 +88,12 @@ class MessageTypes:
             found.update(definitions)
             for _, fields in definitions.values():
                 pending.extend(nested for _, field in fields for nested in _nested_types(field))
-        if found:
-            try:
-                self._store.register(found)
-            except TypesysError as error:
-                raise BagError(f"the definition of {type_name} cannot be used: {error}") from error
+        self._register(found)
+
+    def _register(self, definitions: dict[str, Any]) -> None:
+        """Add definitions, if there are any, to the known ones."""
+        if definitions:
+            self._store.register(definitions)
 
     def _parse(self, type_name: str) -> dict[str, Any]:
         """Return the definitions in the ``.msg`` file of a type."""
@@ -100,8 +110,9 @@ class MessageTypes:
         try:
             return dict(get_types_from_msg(path.read_text(encoding="utf-8"), type_name))
         except (OSError, UnicodeDecodeError, TypesysError) as error:
-            reason = " ".join(str(error).split())
-            raise BagError(f"the definition of {type_name} in {path} is not readable: {reason}") from error
+            raise BagError(
+                f"the definition of {type_name} in {path} is not readable: {_one_line(error)}"
+            ) from error
 
 
 def definition_roots() -> tuple[Path, ...]:
@@ -117,6 +128,11 @@ def definition_roots() -> tuple[Path, ...]:
 def _source_interfaces() -> Path:
     """Return where our interface package is when this module runs from the source tree."""
     return Path(__file__).resolve().parent.parent.parent / "interfaces"
+
+
+def _one_line(error: Exception) -> str:
+    """Return the text of an error without line breaks, cut to a readable length."""
+    return " ".join(str(error).split())[:200]
 
 
 def _nested_types(field: Any) -> list[str]:

@@ -1,9 +1,12 @@
 """Values with stamps, and how they are brought onto a common time axis."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from sms_handover.bag.decode import header_ns
 from sms_handover.run_data import Array, Stamps
 
 
@@ -34,3 +37,24 @@ class Series:
             there = self.stamp_ns[place] == stamp_ns
             rows[there] = self.values[place[there]]
         return rows
+
+
+class RowCollector:
+    """Rows of numbers taken from decoded messages, with their stamps."""
+
+    def __init__(self, width: int, values: Callable[[Any], tuple[float, ...]]) -> None:
+        """Take ``width`` numbers by ``values`` from each message."""
+        self._width = width
+        self._values = values
+        self._stamps: list[int] = []
+        self._rows: list[tuple[float, ...]] = []
+
+    def add(self, message: Any) -> None:
+        """Take one decoded message with a header."""
+        self._rows.append(self._values(message))
+        self._stamps.append(header_ns(message))
+
+    def series(self) -> Series:
+        """Return the rows taken so far."""
+        rows = np.array(self._rows, dtype=np.float64).reshape(-1, self._width)
+        return Series(np.array(self._stamps, dtype=np.int64), rows)
