@@ -474,6 +474,22 @@ def test_parts_made_in_code_are_checked_too(robot: RobotDescription) -> None:
         replace(arm, name="arm_c")
     with pytest.raises(RobotDescriptionError, match=r"origin xyz has 2 numbers, expected 3 in m"):
         replace(arm.mount, xyz=(0.0, 0.0))
+    with pytest.raises(RobotDescriptionError, match=r"origin rpy\[2\] is nan rad"):
+        replace(arm.mount, rpy=(0.0, 0.0, nan))
+    with pytest.raises(RobotDescriptionError, match=r"arm_a_link_1: com has 2 numbers, expected 3 in m"):
+        replace(arm.links[0].inertia, com=(0.0, 0.0))
+    with pytest.raises(RobotDescriptionError, match=r"arm_a_link_1: inertia has 3 numbers, expected 6"):
+        replace(arm.links[0].inertia, moments=(1.0, 1.0, 1.0))
+    with pytest.raises(RobotDescriptionError, match=r"arm_a_joint_1: axis has 1 numbers, expected 3"):
+        replace(arm.joints[0], axis=(1.0,))
+    with pytest.raises(RobotDescriptionError, match=r"panel xyz\[0\] is inf m"):
+        replace(robot.base.panels[0], xyz=(inf, 0.0, 0.0))
+    with pytest.raises(RobotDescriptionError, match=r"panel size\[0\] is 0.0 m, allowed is more than 0"):
+        replace(robot.base.panels[0], size=(0.0, 1.0, 1.0))
+    with pytest.raises(
+        RobotDescriptionError, match=r"base_link: size\[2\] is -1.0 m, allowed is more than 0"
+    ):
+        replace(robot.base, size=(1.0, 1.0, -1.0))
     with pytest.raises(RobotDescriptionError, match=r"position limit upper is inf rad"):
         replace(arm.joints[0], upper=inf)
 
