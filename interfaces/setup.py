@@ -11,10 +11,10 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from importlib.metadata import distribution
 from pathlib import Path
+from xml.etree import ElementTree
 
 from setuptools import Distribution, setup
 from setuptools.command.build_py import build_py
@@ -97,7 +97,7 @@ class BuildInterfaces(build_py):
         missing = missing_tool()
         if missing:
             raise SystemExit(f"{PACKAGE}: {missing}, then run the same command again")
-        stage = Path(self.get_finalized_command("build").build_temp).resolve() / "stage"
+        stage = Path(self.build_lib).resolve().with_name("stage")
         modules = Path(self.build_lib) / PACKAGE
         for left_over in (stage, modules):
             shutil.rmtree(left_over, ignore_errors=True)

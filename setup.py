@@ -1,0 +1,87 @@
+"""Install sms_handover as a ROS package (colcon) or as a wheel (pip)."""
+
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+from setuptools import find_packages, setup
+
+PACKAGE = "sms_handover"
+ROOT = Path(__file__).resolve().parent
+
+USER_COMMANDS = ["sms-handover = sms_handover.cli.main:main"]
+ROS_EXECUTABLES = [
+    "handover = sms_handover.cli.main:run_main",
+    "plant = sms_handover.nodes.plant:main",
+    "trajectory = sms_handover.nodes.trajectory:main",
+    "ik = sms_handover.nodes.ik:main",
+    "controller = sms_handover.nodes.controller:main",
+    "recorder = sms_handover.nodes.recorder:main",
+]
+
+
+def package_version() -> str:
+    """Return the version that package.xml declares."""
+    version = ElementTree.parse(ROOT / "package.xml").findtext("version")
+    if version is None:
+        raise SystemExit(f"{PACKAGE}: package.xml has no <version>")
+    return version
+
+
+def shared_files(*folders: str) -> list[tuple[str, list[str]]]:
+    """Pair each shipped file with the folder below ``share/`` that mirrors where it lies here."""
+    found = [path for folder in folders for path in sorted((ROOT / folder).rglob("*"))]
+    files = [path.relative_to(ROOT) for path in found if path.is_file() and "__pycache__" not in path.parts]
+    return [(f"share/{PACKAGE}/{path.parent}", [str(path)]) for path in files]
+
+
+def console_scripts() -> list[str]:
+    """Return the executables to install.
+
+    In a ROS workspace, where setup.py itself installs, setup.cfg sends them to lib/sms_handover and
+    ``ros2 run`` finds them there. A wheel would put ``plant`` and ``ik`` on everybody's PATH; it
+    carries the user's command only, and the nodes run as ``python -m sms_handover.nodes.plant``.
+    """
+    installed_by_ros = {"install", "develop"} & set(sys.argv)
+    return USER_COMMANDS + (ROS_EXECUTABLES if installed_by_ros else [])
+
+
+setup(
+    name=PACKAGE,
+    version=package_version(),
+    description="Free-floating dual-arm handover: a ROS 2 graph and the numerical core it runs on",
+    maintainer="sms_handover maintainers",
+    maintainer_email="maintainers@sms-handover.example",
+    license="BSD-3-Clause",
+    packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
+    package_data={PACKAGE: ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
+        (f"share/{PACKAGE}", ["package.xml"]),
+        *shared_files("config", "launch"),
+    ],
+    python_requires=">=3.10,<3.14",
+    install_requires=[
+        "ros-jazzy-rclpy>=7.1.6,<7.2",
+        "ros-jazzy-common-interfaces>=5.3.6,<5.4",
+        "ros-jazzy-rmw-fastrtps-cpp>=8.4.3,<8.5",
+        "sms_handover_interfaces",
+        "mcap>=1.3,<2",
+        "numpy>=2.0,<3",
+        "pin>=4.0,<5",
+        "pyyaml>=6,<7",
+        "rosbags>=0.11,<0.12",
+    ],
+    extras_require={
+        "test": [
+            "mcap-ros2-support>=0.5,<1",
+            "mypy>=1.15",
+            "pytest>=8",
+            "ruff>=0.6",
+            "types-PyYAML",
+            "types-setuptools",
+        ],
+    },
+    zip_safe=False,
+    entry_points={"console_scripts": console_scripts()},
+)
