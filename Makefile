@@ -1,0 +1,66 @@
+# Everything runs in one environment, $(VENV), that these targets make; nothing else on the machine changes.
+PYTHON ?= $(shell python3.11 -c 'import sys; print(sys.executable)' 2>/dev/null || echo python3)
+VENV ?= .venv
+RUNS ?= runs
+
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint .ci/constraints.txt
+TYPED := setup.py interfaces/setup.py sms_handover test $(wildcard benchmarks/*.py)
+
+# The environment stands alone: what a sourced ROS workspace or another environment exports must not leak in.
+unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
+
+.DEFAULT_GOAL := help
+.PHONY: help handover simulate test lint install colcon clean
+
+help:  ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+
+handover: install  ## hand the deputy over under NMPC, then PID, over DDS in lock step; record both; compare
+	rm -rf $(RUNS)/nmpc $(RUNS)/pid
+	$(BIN)/sms-handover run --controller nmpc --output $(RUNS)/nmpc
+	$(BIN)/sms-handover run --controller pid --output $(RUNS)/pid
+	$(BIN)/sms-handover compare $(RUNS)/nmpc $(RUNS)/pid
+
+simulate: install  ## the same handover in one process, without DDS or a recording
+	$(BIN)/sms-handover simulate
+
+test: lint  ## check style and types, then run every test
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/.test  ## check style and types
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy $(TYPED)
+
+install: $(VENV)/.package  ## make the environment and install the package into it
+
+colcon:  ## build the package as a ROS workspace does, with colcon, and list its executables
+	PYTHON="$(PYTHON)" .ci/colcon
+
+clean:  ## remove the environment and everything built; recordings stay
+	rm -rf $(VENV) build dist *.egg-info interfaces/build interfaces/*.egg-info .mypy_cache .pytest_cache .ruff_cache
+
+# Stamps: each holds until a file it depends on changes.
+INTERFACES := $(wildcard interfaces/*.txt interfaces/*.xml interfaces/*.py interfaces/*.toml) \
+              $(wildcard interfaces/msg/*.msg interfaces/srv/*.srv)
+METADATA := setup.py setup.cfg pyproject.toml package.xml
+
+$(VENV)/.environment:
+	@command -v c++ >/dev/null || command -v g++ >/dev/null || command -v clang++ >/dev/null || \
+	  { echo "sms_handover: no C++ compiler found: install one (Debian, Ubuntu: apt install g++), then run make again"; exit 1; } >&2
+	$(PYTHON) -m venv $(VENV)
+	@touch $@
+
+$(VENV)/.interfaces: $(VENV)/.environment $(INTERFACES) .ci/constraints.txt
+	@echo "Building the interface package and installing the ROS wheels (about a minute)"
+	$(PIP) ./interfaces
+	@touch $@
+
+$(VENV)/.package: $(VENV)/.interfaces $(METADATA)
+	$(PIP) --editable .
+	@touch $@
+
+$(VENV)/.test: $(VENV)/.package
+	$(PIP) --editable '.[test]'
+	@touch $@
