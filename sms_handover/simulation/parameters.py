@@ -2,9 +2,13 @@
 
 from dataclasses import dataclass
 
-from sms_handover.errors import ConfigurationError
+from sms_handover.errors import ConfigurationError, UnknownNameError
 from sms_handover.parameters import parameter
+from sms_handover.topics import NODES
 from sms_handover.units import seconds_to_ns
+
+LOCKSTEP, REALTIME = "lockstep", "realtime"
+MODES = (LOCKSTEP, REALTIME)
 
 
 @dataclass(frozen=True)
@@ -15,16 +19,25 @@ class CommonParameters:
     reference_period: float = parameter(
         "simulated time between two joint references", unit="s", minimum=1e-6, maximum=10.0
     )
+    duration: float = parameter("simulated time of the run; 0: to the end of the schedule", unit="s", minimum=0.0)
     robot: str = parameter("path of the robot description; empty: the package's robot.yaml")
     schedule: str = parameter("path of the task schedule; empty: the package's handover.yaml")
 
+    mode: str = parameter(
+        "lockstep: every tick waits for its command; realtime: paced by the wall clock", choices=MODES
+    )
+    peers: tuple[str, ...] = parameter("nodes of the graph; the run starts when all have matched")
+
     def __post_init__(self) -> None:
-        """Refuse a reference period that is no whole number of ticks."""
+        """Refuse a reference period that is no whole number of ticks, and peers that do not exist."""
         if self.reference_ns % self.tick_ns:
             raise ConfigurationError(
                 f"reference_period is {self.reference_period:g} s, allowed is a multiple of the tick "
                 f"of {self.tick:g} s"
             )
+        for name in self.peers:
+            if name not in NODES:
+                raise UnknownNameError("node", name, NODES, "parameter 'peers'")
 
     @property
     def tick_ns(self) -> int:
@@ -35,3 +48,13 @@ class CommonParameters:
     def reference_ns(self) -> int:
         """The reference period in ns."""
         return seconds_to_ns(self.reference_period)
+
+    def last_tick(self, schedule_end_ns: int) -> int:
+        """Return the number of ticks that the run integrates."""
+        end_ns = seconds_to_ns(self.duration) if self.duration > 0.0 else schedule_end_ns
+        return end_ns // self.tick_ns
+
+    @property
+    def ticks_per_reference(self) -> int:
+        """The number of ticks in a reference period."""
+        return self.reference_ns // self.tick_ns

@@ -9,20 +9,17 @@ from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.wiring import make_controller, make_plant
 from sms_handover.trajectory.generator import TrajectoryGenerator
 from sms_handover.types import TaskPhase
-from sms_handover.units import seconds_to_ns
 
 Progress = Callable[[int, TaskPhase], None]
 
 
-def simulate(
-    scenario: Scenario | None = None, *, duration: float | None = None, progress: Progress | None = None
-) -> RunData:
+def simulate(scenario: Scenario | None = None, *, progress: Progress | None = None) -> RunData:
     """Return the run of a scenario, by default the shipped one over its whole schedule.
 
     Per tick: the plant gives its state; each reference period the trajectory generator gives phase,
     targets and, through inverse kinematics, the joint reference; the controller answers; the plant
     carries out grasp commands and integrates. The last state is answered too, but not integrated.
-    ``duration`` in s ends the run early; ``progress`` is called with time in ns and phase each reference period.
+    ``progress`` is called with the time in ns and the phase each reference period.
     """
     scenario = scenario or load_scenario()
     parameters, robot, schedule = scenario.parameters, scenario.robot, scenario.schedule
@@ -30,15 +27,12 @@ def simulate(
     plant = make_plant(robot, schedule, common, parameters.plant)
     controller = make_controller(robot, schedule, common, parameters.controller)
     generator = TrajectoryGenerator(robot, schedule, parameters.trajectory)
-    end_ns = schedule.end_ns if duration is None else seconds_to_ns(duration)
-    last_tick = end_ns // common.tick_ns
-    ticks_per_reference = common.reference_ns // common.tick_ns
-    recorder = RunRecorder(
-        robot.joint_names, robot.arms, last_tick + 1, last_tick // ticks_per_reference + 1
-    )
+    last_tick = common.last_tick(schedule.end_ns)
+    periods = last_tick // common.ticks_per_reference + 1
+    recorder = RunRecorder(robot.joint_names, robot.arms, last_tick + 1, periods)
     for tick in range(last_tick + 1):
         state = plant.state
-        if tick % ticks_per_reference == 0:
+        if tick % common.ticks_per_reference == 0:
             deputy = plant.deputy
             recorder.plant(plant.tools_in_world, deputy.deputy_in_world, plant.receipt, plant.work)
             phase, targets = generator.targets(state, deputy.deputy_in_world)

@@ -1,0 +1,1 @@
+"""What joins the core to ROS 2: messages, endpoints, parameters, stamps and spinning."""

@@ -1,0 +1,196 @@
+"""Messages and the values of the core, one pair of functions each; every number keeps its bits."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Point, PoseStamped, Quaternion, Vector3, Vector3Stamped
+from geometry_msgs.msg import Pose as PoseMessage
+from sensor_msgs.msg import JointState
+from sms_handover_interfaces.msg import (
+    EnergyStamped,
+    IkStatus as IkStatusMessage,
+)
+from sms_handover_interfaces.msg import GraspCommand as GraspCommandMessage
+from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
+from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
+from std_msgs.msg import Header
+
+from sms_handover.errors import GraphError
+from sms_handover.frames import WORLD
+from sms_handover.types import (
+    Array,
+    GraspAction,
+    GraspCommand,
+    GraspEvent,
+    GraspStatus,
+    IkResult,
+    IkStatus,
+    Pose,
+    TaskPhase,
+)
+from sms_handover.units import NS_PER_S
+
+_ACTIONS = {
+    GraspAction.GRASP: GraspCommandMessage.GRASP,
+    GraspAction.RELEASE: GraspCommandMessage.RELEASE,
+    GraspAction.TRANSFER: GraspCommandMessage.TRANSFER,
+}
+_ACTION_OF = {number: action for action, number in _ACTIONS.items()}
+_GRASP_STATUS = {
+    GraspStatus.SUCCEEDED: GraspEventMessage.SUCCEEDED,
+    GraspStatus.MISSED: GraspEventMessage.MISSED,
+    GraspStatus.REJECTED: GraspEventMessage.REJECTED,
+}
+_GRASP_STATUS_OF = {number: status for status, number in _GRASP_STATUS.items()}
+_IK_STATUS = {
+    IkStatus.CONVERGED: IkStatusMessage.CONVERGED,
+    IkStatus.STALLED: IkStatusMessage.STALLED,
+    IkStatus.ITERATION_LIMIT: IkStatusMessage.ITERATION_LIMIT,
+}
+_IK_STATUS_OF = {number: status for status, number in _IK_STATUS.items()}
+
+
+def time_message(stamp_ns: int) -> Time:
+    """Return a time message from integer nanoseconds."""
+    return Time(sec=stamp_ns // NS_PER_S, nanosec=stamp_ns % NS_PER_S)
+
+
+def stamp_ns_of(message: Time) -> int:
+    """Return integer nanoseconds from a time message."""
+    return int(message.sec) * NS_PER_S + int(message.nanosec)
+
+
+def header(stamp_ns: int, frame: str = WORLD) -> Header:
+    """Return a header with a stamp and a frame."""
+    return Header(stamp=time_message(stamp_ns), frame_id=frame)
+
+
+def pose_message(pose: Pose) -> PoseMessage:
+    """Return a pose as a message."""
+    x, y, z = pose.position.tolist()
+    qx, qy, qz, qw = pose.quaternion_xyzw.tolist()
+    return PoseMessage(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
+
+
+def pose_of_message(message: PoseMessage) -> Pose:
+    """Return the pose in a message."""
+    p, o = message.position, message.orientation
+    return Pose([p.x, p.y, p.z], [o.x, o.y, o.z, o.w])
+
+
+def pose_stamped(pose: Pose, stamp_ns: int) -> PoseStamped:
+    """Return a pose in ``world`` with its stamp."""
+    return PoseStamped(header=header(stamp_ns), pose=pose_message(pose))
+
+
+def vector_stamped(vector: Array, stamp_ns: int) -> Vector3Stamped:
+    """Return a vector in the axes of ``world`` with its stamp."""
+    x, y, z = vector.tolist()
+    return Vector3Stamped(header=header(stamp_ns), vector=Vector3(x=x, y=y, z=z))
+
+
+def energy_message(kinetic: float, work: float, stamp_ns: int) -> EnergyStamped:
+    """Return the energy account of the plant."""
+    return EnergyStamped(header=header(stamp_ns), kinetic=kinetic, work=work)
+
+
+def joint_positions_message(names: Sequence[str], position: Array, stamp_ns: int) -> JointState:
+    """Return joint angles as a message."""
+    return JointState(header=header(stamp_ns, ""), name=list(names), position=position.tolist())
+
+
+def joints_in_order(names: Sequence[str], message_names: Sequence[str], values: Sequence[float]) -> Array:
+    """Return the values of a joint message in the order of ``names``; raises GraphError if one is missing."""
+    if len(message_names) != len(values):
+        raise GraphError(f"a joint message has {len(message_names)} names and {len(values)} values")
+    by_name: Mapping[str, float] = dict(zip(message_names, values, strict=True))
+    missing = [name for name in names if name not in by_name]
+    if missing:
+        raise GraphError(f"a joint message lacks {missing[0]!r}")
+    return np.array([by_name[name] for name in names])
+
+
+def phase_message(phase: TaskPhase) -> TaskPhaseMessage:
+    """Return a phase and its commands as a message."""
+    return TaskPhaseMessage(
+        header=header(phase.stamp_ns),
+        index=phase.index,
+        name=phase.name,
+        commands=[_command_message(command) for command in phase.commands],
+    )
+
+
+def phase_of_message(message: TaskPhaseMessage) -> TaskPhase:
+    """Return the phase in a message."""
+    commands = tuple(_command_of(command) for command in message.commands)
+    return TaskPhase(stamp_ns_of(message.header.stamp), int(message.index), message.name, commands)
+
+
+def event_message(event: GraspEvent) -> GraspEventMessage:
+    """Return a grasp event as a message."""
+    return GraspEventMessage(
+        header=header(event.stamp_ns),
+        command=_command_message(event.command),
+        status=_GRASP_STATUS[event.status],
+        position_error=event.position_error,
+        angle_error=event.angle_error,
+        relative_speed=event.relative_speed,
+        detail=event.detail,
+    )
+
+
+def event_of_message(message: GraspEventMessage) -> GraspEvent:
+    """Return the grasp event in a message."""
+    return GraspEvent(
+        stamp_ns_of(message.header.stamp),
+        _command_of(message.command),
+        _GRASP_STATUS_OF[message.status],
+        message.position_error,
+        message.angle_error,
+        message.relative_speed,
+        message.detail,
+    )
+
+
+def ik_status_message(result: IkResult, stamp_ns: int) -> IkStatusMessage:
+    """Return how a solve ended as a message."""
+    return IkStatusMessage(
+        header=header(stamp_ns),
+        status=_IK_STATUS[result.status],
+        iterations=result.iterations,
+        position_error=result.position_error,
+        orientation_error=result.orientation_error,
+        limit_margin=result.limit_margin,
+        manipulability=result.manipulability.tolist(),
+        seed_distance=result.seed_distance,
+    )
+
+
+def ik_result_of(joint_position: Array, message: IkStatusMessage) -> IkResult:
+    """Return an IK result from its joints and the status message."""
+    return IkResult(
+        joint_position=joint_position,
+        status=_IK_STATUS_OF[message.status],
+        iterations=int(message.iterations),
+        position_error=message.position_error,
+        orientation_error=message.orientation_error,
+        limit_margin=message.limit_margin,
+        manipulability=message.manipulability,
+        seed_distance=message.seed_distance,
+    )
+
+
+def _command_message(command: GraspCommand) -> GraspCommandMessage:
+    """Return a grasp command as a message."""
+    return GraspCommandMessage(
+        action=_ACTIONS[command.action],
+        arm=command.arm,
+        grasp_frame=command.grasp_frame,
+        from_arm=command.from_arm,
+    )
+
+
+def _command_of(message: GraspCommandMessage) -> GraspCommand:
+    """Return the grasp command in a message."""
+    return GraspCommand(_ACTION_OF[message.action], message.arm, message.grasp_frame, message.from_arm)

@@ -1,0 +1,15 @@
+"""Message classes by the name of their type."""
+
+from importlib import import_module
+from typing import Any
+
+from sms_handover.errors import GraphError
+
+
+def message_class(type_name: str) -> Any:
+    """Return the class of a type such as ``sensor_msgs/msg/JointState``; raises GraphError if not installed."""
+    package, kind, name = type_name.split("/")
+    try:
+        return getattr(import_module(f"{package}.{kind}"), name)
+    except (ImportError, AttributeError) as error:
+        raise GraphError(f"message type {type_name} is not installed: {error}") from error

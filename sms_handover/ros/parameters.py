@@ -1,0 +1,85 @@
+"""Declares a dataclass of parameters on a node and reads it back."""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, TypeVar, get_type_hints
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.node import Node
+
+from sms_handover.errors import UnknownNameError
+from sms_handover.parameters import ParameterSpec, build, read_parameter_files, spec_of
+from sms_handover.share import config_file
+
+T = TypeVar("T")
+
+_LARGEST = 1.7976931348623157e308  # [-] stands for "no upper bound" in a range message
+_LARGEST_INT = 2**63 - 1  # [-]
+_ROS_OWN = ("use_sim_time", "start_type_description_service")
+
+
+def declare(node: Node, cls: type[T], file: str, section: str) -> T:
+    """Declare the fields of ``cls`` as read-only parameters of ``node`` and return them checked.
+
+    The defaults are those of a section of a file in the package's ``config/``; what was given on
+    the command line comes on top. Raises ConfigurationError.
+    """
+    defaults = read_parameter_files([config_file(file)], section)
+    hints = get_type_hints(cls)
+    values = {}
+    for item in fields(cls):  # type: ignore[arg-type]
+        descriptor = _descriptor(spec_of(item), hints[item.name])
+        if node.has_parameter(item.name):
+            node.set_descriptor(item.name, descriptor)
+        else:
+            node.declare_parameter(item.name, defaults.get(item.name), descriptor)
+        values[item.name] = node.get_parameter(item.name).value
+    return build(cls, values, node.get_name())
+
+
+def refuse_unknown(node: Node, *groups: type[object]) -> None:
+    """Raise UnknownNameError if the node was given a parameter that none of its groups has."""
+    known = [item.name for cls in groups for item in fields(cls)]  # type: ignore[arg-type]
+    for name in node.get_parameters_by_prefix(""):
+        if name not in known and not name.startswith((*_ROS_OWN, "qos_overrides.")):
+            raise UnknownNameError("parameter", name, known, node.get_name())
+
+
+def as_arguments(values: Mapping[str, object]) -> list[str]:
+    """Return command-line arguments that set parameters of a node: ``-p name:=value``."""
+    return [part for name, value in values.items() for part in ("-p", f"{name}:={_yaml(value)}")]
+
+
+def _yaml(value: object) -> str:
+    """Return a value as YAML that reads back as the same type."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_yaml(item) for item in value) + "]"
+    if isinstance(value, str | Path):
+        return "'" + str(value).replace("'", "''") + "'"
+    if isinstance(value, float):
+        text = repr(value)
+        return text if "." in text or "e" not in text else text.replace("e", ".0e")
+    return repr(value)
+
+
+def _descriptor(spec: ParameterSpec, hint: Any) -> ParameterDescriptor:
+    """Return what ``ros2 param describe`` shows of a parameter."""
+    unit = f" [{spec.unit}]" if spec.unit else ""
+    descriptor = ParameterDescriptor(
+        description=spec.description + unit,
+        additional_constraints=" | ".join(spec.choices),
+        read_only=True,
+        dynamic_typing=True,
+    )
+    if spec.minimum is not None or spec.maximum is not None:
+        low = -_LARGEST if spec.minimum is None else spec.minimum
+        high = _LARGEST if spec.maximum is None else spec.maximum
+        if hint is float:
+            descriptor.floating_point_range = [FloatingPointRange(from_value=float(low), to_value=float(high))]
+        if hint is int:
+            top = _LARGEST_INT if spec.maximum is None else int(high)
+            descriptor.integer_range = [IntegerRange(from_value=int(low), to_value=top)]
+    return descriptor
