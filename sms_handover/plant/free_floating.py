@@ -8,7 +8,7 @@ import pinocchio as pin
 from sms_handover.errors import ConfigurationError
 from sms_handover.model.conserved import PhysicsReceipt, physics_receipt
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
-from sms_handover.plant.deputy import GraspTolerance, MasslessDeputy
+from sms_handover.plant.deputy import MasslessDeputy
 from sms_handover.plant.grasping import answer
 from sms_handover.plant.integrators import TABLEAUS, rkmk_step
 from sms_handover.plant.parameters import PlantParameters
@@ -47,11 +47,7 @@ class FreeFloatingPlant:
         """Place robot and deputy at rest; raises ConfigurationError where a joint starts outside its limits."""
         self._robot = robot
         self._tableau = TABLEAUS[parameters.integrator]
-        self._tolerance = GraspTolerance(
-            parameters.grasp_position_tolerance,
-            parameters.grasp_angle_tolerance,
-            parameters.grasp_speed_tolerance,
-        )
+        self._tolerance = parameters.grasp_tolerance
         self._initial = initial
         self._tick_ns = tick_ns
         self._tick_s = ns_to_seconds(tick_ns)

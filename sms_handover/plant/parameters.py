@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from sms_handover.parameters import parameter
+from sms_handover.plant.deputy import GraspTolerance
 from sms_handover.plant.integrators import TABLEAUS
 
 
@@ -22,3 +23,10 @@ class PlantParameters:
         unit="m/s",
         minimum=0.0,
     )
+
+    @property
+    def grasp_tolerance(self) -> GraspTolerance:
+        """The three tolerances of a grasp."""
+        return GraspTolerance(
+            self.grasp_position_tolerance, self.grasp_angle_tolerance, self.grasp_speed_tolerance
+        )

@@ -11,7 +11,14 @@ from sms_handover.model.reduced import generalized_jacobian
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.pose_path import PosePath
-from sms_handover.trajectory.schedule import GraspFrameTarget, JointTarget, Phase, Schedule, ToolTarget
+from sms_handover.trajectory.schedule import (
+    DeputyDescription,
+    GraspFrameTarget,
+    JointTarget,
+    Phase,
+    Schedule,
+    ToolTarget,
+)
 from sms_handover.trajectory.time_law import TIME_LAWS, Progress
 from sms_handover.types import (
     Array,
@@ -116,20 +123,13 @@ class TrajectoryGenerator:
             joints = self._robot.arm_joints[arm]
             start = self._joints_at_start[joints]
             if isinstance(target, ToolTarget | GraspFrameTarget):
-                goal = self._goal(target, deputy_in_world)
+                goal = goal_in_world(target, self._schedule.deputy, deputy_in_world)
                 poses[arm], twists[arm] = PosePath(self._tools_at_start[arm], goal).at(progress)
             elif isinstance(target, JointTarget):
                 position[joints], velocity[joints] = _joint_motion(start, target.position, progress)
             else:
                 position[joints] = start
         return Targets(state.stamp_ns, poses, twists, position, velocity)
-
-    def _goal(self, target: ToolTarget | GraspFrameTarget, deputy_in_world: Pose) -> Pose:
-        """Return the pose in ``world`` that a tool shall reach."""
-        if isinstance(target, ToolTarget):
-            return target.tool_in_world
-        frame = self._schedule.deputy.grasp_frames[target.grasp_frame]
-        return pose_of(se3_of(deputy_in_world) * se3_of(frame) * se3_of(target.tool_in_grasp_frame))
 
     def _resolve_rates(self, state: RobotState, targets: Targets, velocity: Array) -> Array:
         """Return the joint rates with those of tool-led arms solved for from the desired twists."""
@@ -146,6 +146,16 @@ class TrajectoryGenerator:
         result = np.array(velocity)
         result[columns] = free.T @ np.linalg.solve(damped, rest)
         return result
+
+
+def goal_in_world(
+    target: ToolTarget | GraspFrameTarget, deputy: DeputyDescription, deputy_in_world: Pose
+) -> Pose:
+    """Return the pose in ``world`` that a tool shall reach, with the deputy where it is."""
+    if isinstance(target, ToolTarget):
+        return target.tool_in_world
+    frame = deputy.grasp_frames[target.grasp_frame]
+    return pose_of(se3_of(deputy_in_world) * se3_of(frame) * se3_of(target.tool_in_grasp_frame))
 
 
 def _joint_motion(start: Array, end: Array, progress: Progress) -> tuple[Array, Array]:

@@ -1,0 +1,204 @@
+"""Whether a schedule can be carried out, worked out before anything moves."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from sms_handover.errors import ScheduleError
+from sms_handover.ik.levenberg_marquardt import solve_ik
+from sms_handover.model.poses import pose_distance
+from sms_handover.model.reduced import base_twist_per_joint_rate
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.plant.deputy import MasslessDeputy
+from sms_handover.plant.grasping import answer
+from sms_handover.simulation.scenario import Scenario
+from sms_handover.simulation.wiring import initial_joints
+from sms_handover.trajectory.generator import goal_in_world
+from sms_handover.trajectory.schedule import GraspFrameTarget, JointTarget, Phase, ToolTarget
+from sms_handover.types import Array, GraspStatus, IkRequest, Pose, Twist, read_only
+from sms_handover.units import DEG_PER_RAD, MM_PER_M
+
+_PATH_STEPS = 64  # [-] midpoint steps along a joint path; their error is far below a grasp tolerance
+_MAX_SETTLE = 40  # [-] each round shrinks the error by about the arms' share of the mass
+_SETTLED = 1e-9  # [m, rad] change of the base pose in a round
+_RESTARTS = 10  # [-] random configurations tried where the present one does not lead to the target
+_SEED = 20250101  # [-] so that a schedule always gets the same verdict
+_AT_REST = Twist(np.zeros(3), np.zeros(3))
+
+
+@dataclass(frozen=True, eq=False)
+class PhasePrediction:
+    """Where a phase will end: joint angles (n,) rad, base pose, and how far the base has turned.
+
+    ``base_rotation_angle`` in rad is counted from the start of the run. ``restarts`` is how many random
+    configurations were tried before one led to the targets; a run has only the first try, so anything
+    but 0 means that it may come to rest elsewhere.
+    """
+
+    phase: str
+    joint_position: Array
+    base_in_world: Pose
+    base_rotation_angle: float
+    restarts: int
+
+    def __post_init__(self) -> None:
+        """Copy the array and make it read-only."""
+        object.__setattr__(self, "joint_position", read_only(self.joint_position))
+
+
+@dataclass(frozen=True, eq=False)
+class _Rest:
+    """The robot at rest: base pose, joint angles (n,), and the error energy of tools with a target."""
+
+    base_in_world: Pose
+    joint_position: Array
+    targets: Mapping[str, Pose]
+    missed: Mapping[str, tuple[float, float]]  # per arm out of tolerance: m, rad
+
+    @property
+    def energy(self) -> float:
+        """Squared errors of all arms that miss their target, metres and radians weighted alike."""
+        return sum(position**2 + angle**2 for position, angle in self.missed.values())
+
+
+def check_feasibility(scenario: Scenario) -> tuple[PhasePrediction, ...]:
+    """Return where each phase will end; raises ScheduleError where a target or a grasp is out of reach.
+
+    Assumes that a phase ends at rest, at its targets, on a straight path in joint space, at zero
+    momentum: the base's displacement then follows from the joint path alone, whatever its timing.
+    A grasp is checked at the tool pose that the phase before ends at. Poses on the way to a target
+    are not checked.
+    """
+    return _Walk(scenario).predictions()
+
+
+def base_after(robot: RobotModel, base_in_world: Pose, start: Array, end: Array) -> Pose:
+    """Return the base pose after a straight joint path from ``start`` to ``end`` (n,) at zero momentum.
+
+    Midpoint rule on SE(3); the twist per joint rate depends on the joints only, not on the base pose.
+    """
+    stride = (end - start) / _PATH_STEPS
+    pose = base_in_world
+    for index in range(_PATH_STEPS):
+        q = robot.configuration(base_in_world, start + (index + 0.5) * stride)
+        pose = robot.integrate_base(pose, base_twist_per_joint_rate(robot, q) @ stride, 1.0)
+    return pose
+
+
+class _Walk:
+    """A walk through the phases from rest to rest."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Begin at the start of the schedule."""
+        self._robot, self._schedule = scenario.robot, scenario.schedule
+        self._ik = scenario.parameters.ik
+        self._tolerance = scenario.parameters.plant.grasp_tolerance
+        deputy = self._schedule.deputy
+        self._deputy = MasslessDeputy(deputy.deputy_in_world, deputy.grasp_frames)
+        self._base = self._schedule.base_in_world
+        self._joints = initial_joints(self._robot, self._schedule)
+
+    def predictions(self) -> tuple[PhasePrediction, ...]:
+        """Return the prediction of every phase."""
+        found = []
+        for phase in self._schedule.phases:
+            self._grasp(phase)
+            rest, restarts = self._reach(phase)
+            self._base, self._joints = rest.base_in_world, rest.joint_position
+            turned = pose_distance(self._schedule.base_in_world, self._base)[1]
+            found.append(PhasePrediction(phase.name, self._joints, self._base, turned, restarts))
+        return tuple(found)
+
+    def _grasp(self, phase: Phase) -> None:
+        """Carry out the grasp commands of a phase; raises ScheduleError where one would not succeed."""
+        tools = self._carry_deputy(self._base, self._joints)
+        at_rest = dict.fromkeys(tools, _AT_REST)
+        for command in phase.commands:
+            event = answer(command, self._deputy, tools, at_rest, self._tolerance, phase.start_ns)
+            if event.status is GraspStatus.MISSED:
+                raise ScheduleError(
+                    f"phase {phase.name!r}: {command.arm} would miss grasp frame {command.grasp_frame!r}: "
+                    f"{event.detail}"
+                )
+            if event.status is GraspStatus.REJECTED:
+                raise ScheduleError(f"phase {phase.name!r}: {event.detail}")
+
+    def _reach(self, phase: Phase) -> tuple[_Rest, int]:
+        """Return where a phase ends and after how many restarts; raises ScheduleError where it cannot."""
+        random = np.random.default_rng(_SEED)
+        robot = self._robot
+        best = self._settle(phase, self._base, self._joints)
+        restarts = 0
+        while best.missed and restarts < _RESTARTS:
+            restarts += 1
+            seed = np.array(best.joint_position)
+            for arm in best.missed:
+                part = robot.arm_joints[arm]
+                low, high = np.maximum(robot.lower[part], -np.pi), np.minimum(robot.upper[part], np.pi)
+                seed[part] = random.uniform(low, high)
+            trial = self._solve(best.base_in_world, seed, best.targets)
+            if trial.energy < best.energy:
+                settled = self._settle(phase, trial.base_in_world, trial.joint_position)
+                best = min(best, settled, key=lambda rest: rest.energy)
+        for arm, (position, angle) in best.missed.items():
+            x, y, z = best.targets[arm].position
+            raise ScheduleError(
+                f"phase {phase.name!r}: the target of {arm} at ({x:.3f}, {y:.3f}, {z:.3f}) m is out of "
+                f"reach: the nearest pose found is {position * MM_PER_M:.3g} mm and "
+                f"{angle * DEG_PER_RAD:.3g} deg away"
+            )
+        return best, restarts
+
+    def _settle(self, phase: Phase, base_in_world: Pose, seed: Array) -> _Rest:
+        """Return the rest at which joints and base agree, by fixed-point iteration from a seed.
+
+        The joints decide how far the base is pushed, and the base pose which joints reach the targets.
+        """
+        base = base_in_world
+        joints = self._lead_by_joints(phase, seed)
+        for _ in range(_MAX_SETTLE):
+            rest = self._solve(base, joints, self._targets(phase, base, joints))
+            joints = rest.joint_position
+            settled = base_after(self._robot, self._base, self._joints, joints)
+            if max(pose_distance(base, settled)) <= _SETTLED:
+                break
+            base = settled
+        return rest
+
+    def _solve(self, base_in_world: Pose, seed: Array, targets: Mapping[str, Pose]) -> _Rest:
+        """Return the rest with the joints that inverse kinematics finds, and which arms miss."""
+        result = solve_ik(self._robot, IkRequest(base_in_world, seed, targets), self._ik)
+        tools = self._robot.tools_in_world(base_in_world, result.joint_position)
+        errors = {arm: pose_distance(tools[arm], target) for arm, target in targets.items()}
+        limits = (self._ik.position_tolerance, self._ik.orientation_tolerance)
+        missed = {arm: error for arm, error in errors.items() if error[0] > limits[0] or error[1] > limits[1]}
+        return _Rest(base_in_world, result.joint_position, targets, missed)
+
+    def _lead_by_joints(self, phase: Phase, seed: Array) -> Array:
+        """Return the seed with the arms led by their joints at their desired joints."""
+        joints = np.array(seed)
+        for arm, target in phase.targets.items():
+            part = self._robot.arm_joints[arm]
+            if isinstance(target, JointTarget):
+                joints[part] = target.position
+            elif not isinstance(target, ToolTarget | GraspFrameTarget):
+                joints[part] = self._joints[part]
+        return joints
+
+    def _targets(self, phase: Phase, base_in_world: Pose, joints: Array) -> dict[str, Pose]:
+        """Return the tool targets in ``world``, with a held deputy where its arm now takes it."""
+        self._carry_deputy(base_in_world, joints)
+        deputy_in_world = self._deputy.state.deputy_in_world
+        return {
+            arm: goal_in_world(target, self._schedule.deputy, deputy_in_world)
+            for arm, target in phase.targets.items()
+            if isinstance(target, ToolTarget | GraspFrameTarget)
+        }
+
+    def _carry_deputy(self, base_in_world: Pose, joints: Array) -> dict[str, Pose]:
+        """Return the tools of a configuration, with a held deputy moved along."""
+        tools = self._robot.tools_in_world(base_in_world, joints)
+        if self._deputy.holder:
+            self._deputy.follow(tools[self._deputy.holder], _AT_REST)
+        return tools
