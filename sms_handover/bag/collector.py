@@ -16,6 +16,7 @@ from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import BagInfo
 from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.series import RowCollector
+from sms_handover.bag.stamp import stamp_ns
 from sms_handover.errors import BagError
 from sms_handover.types import GraspEvent, TaskPhase
 
@@ -35,6 +36,7 @@ class RunCollector:
         self._prefix = prefix
         self._types = MessageTypes(roots=())
         self.arms = tuple(self._found_arms())
+        self._check_types()
         self.joints = {
             name: BlockCollector(joint_state_layout, (POSITION, VELOCITY, EFFORT)) for name in JOINT_TOPICS
         }
@@ -50,21 +52,36 @@ class RunCollector:
         }
         self.phases: list[TaskPhase] = []
         self.events: list[GraspEvent] = []
+        self._first_ns: int | None = None
+        self._newest_ns = 0
 
     def collect(self) -> None:
         """Go through the messages of the bag once."""
         takers: dict[str, Callable[[bytes], None]] = {
+            topics.JOINT_STATES: self._take_state,
             topics.BASE_ODOMETRY: self.odometry.add,
             topics.TASK_PHASE: self._decoded(topics.TASK_PHASE, lambda m: self.phases.append(task_phase(m))),
             topics.GRASP_EVENT: self._decoded(
                 topics.GRASP_EVENT, lambda m: self.events.append(grasp_event(m))
             ),
         }
-        takers.update((name, collector.add) for name, collector in self.joints.items())
+        takers.update(
+            (name, self.joints[name].add) for name in (topics.JOINT_COMMAND, topics.JOINT_REFERENCE)
+        )
         takers.update((name, self._decoded(name, rows.add)) for name, rows in self.rows.items())
         by_name = {self.full_name(name): taker for name, taker in takers.items()}
         for message in read_messages(self._info.path, by_name):
             by_name[message.topic](message.data)
+
+    def _take_state(self, data: bytes) -> None:
+        """Take a joint state; one that starts anew, after a reset, makes the events so far void."""
+        time_ns = stamp_ns(data)
+        if self._first_ns is None:
+            self._first_ns = time_ns
+        elif time_ns < self._newest_ns and time_ns <= self._first_ns:
+            self.events.clear()
+        self._newest_ns = time_ns
+        self.joints[topics.JOINT_STATES].add(data)
 
     def full_name(self, name: str) -> str:
         """Return the name that a topic of the run has in the bag."""
@@ -86,6 +103,16 @@ class RunCollector:
                 ) from error
 
         return decode
+
+    def _check_types(self) -> None:
+        """Raise BagError if a topic of a run has another type in the bag."""
+        for topic in topics.graph_topics(self.arms):
+            recorded = self._info.topics.get(self.full_name(topic.name))
+            if recorded is not None and (recorded.type, recorded.encoding) != (topic.type, "cdr"):
+                raise BagError(
+                    f"{self._info.path} holds no run of sms_handover: {recorded.name} has the type"
+                    f" {recorded.type} ({recorded.encoding}), expected is {topic.type} (cdr)"
+                )
 
     def _found_arms(self) -> Iterator[str]:
         """Yield the names of the arms whose tool pose is in the bag."""

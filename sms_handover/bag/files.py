@@ -29,10 +29,15 @@ class RawMessage(NamedTuple):
 
 
 def bag_files(path: Path) -> tuple[Path, ...]:
-    """Return the MCAP files of a bag, given its folder or a file; raises BagError if one is unusable."""
+    """Return the MCAP files of a bag, given its folder or a file; raises BagError if one is unusable.
+
+    A bag that rosbag2 has split has several, ``<name>_0.mcap``, ``<name>_1.mcap`` and so on.
+    """
     if not path.exists():
         raise BagError(f"there is no bag at {path}")
-    files = (path,) if path.is_file() else tuple(sorted(path.glob("*.mcap")))
+    files = (path,) if path.is_file() else tuple(sorted(path.glob("*.mcap"), key=_name_and_number))
+    if len({_name_and_number(file)[0] for file in files}) > 1:
+        raise BagError(f"{path} holds several bags, choose one: {', '.join(file.name for file in files)}")
     if not files:
         other = next((file.name for file in sorted(path.iterdir()) if file.suffix in {".db3", ".zstd"}), None)
         reason = (
@@ -77,6 +82,12 @@ def _file_messages(file: Path, topics: Collection[str] | None) -> Iterator[RawMe
                 schemas[record.id] = record.name
             elif isinstance(record, Channel) and (topics is None or record.topic in topics):
                 channels[record.id] = (record.topic, schemas[record.schema_id])
+
+
+def _name_and_number(file: Path) -> tuple[str, int]:
+    """Return the name of a bag and the number of one of its files, -1 without a number."""
+    name, _, number = file.stem.rpartition("_")
+    return (name, int(number)) if number.isdecimal() else (file.stem, -1)
 
 
 def _check_ends(file: Path) -> None:

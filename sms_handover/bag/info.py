@@ -1,6 +1,5 @@
 """What a bag says of itself: topics, times, loss ledger, provenance and the files attached to it."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,15 +9,11 @@ from mcap.reader import make_reader
 from mcap.records import Schema, Statistics
 from mcap.summary import Summary
 
+from sms_handover.bag.contents import PARAMETERS_FILE, ROBOT_FILE, SCHEDULE_FILE, parameters_from_json
 from sms_handover.bag.files import bag_files, damage_reported
 from sms_handover.bag.ledger import LEDGER_RECORD, Ledger
 from sms_handover.bag.provenance import PROVENANCE_RECORD
 from sms_handover.bag.summary import file_summary
-from sms_handover.errors import BagError
-
-ROBOT_FILE = "robot.urdf"  # names of the attachments that make a bag stand on its own
-SCHEDULE_FILE = "schedule.yaml"
-PARAMETERS_FILE = "parameters.json"
 
 
 @dataclass(frozen=True)
@@ -75,13 +70,7 @@ class BagInfo:
     def parameters(self) -> Mapping[str, Mapping[str, object]]:
         """Return the parameters by node and name; empty if the bag holds none."""
         text = self._text(PARAMETERS_FILE)
-        try:
-            values = {} if text is None else json.loads(text)
-        except ValueError as error:
-            raise BagError(f"{self.path}: {PARAMETERS_FILE} in the bag is not JSON: {error}") from error
-        if not isinstance(values, dict):
-            raise BagError(f"{self.path}: {PARAMETERS_FILE} in the bag is not a mapping of nodes")
-        return values
+        return {} if text is None else parameters_from_json(text)
 
     @property
     def schedule_text(self) -> str | None:

@@ -1,8 +1,7 @@
 """Read a recorded run into arrays."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
@@ -12,11 +11,10 @@ from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.series import Series
 from sms_handover.errors import BagError
 from sms_handover.run_data import Array, RunData, Stamps
-from sms_handover.types import GraspEvent, TaskPhase
-
-Event = TypeVar("Event", TaskPhase, GraspEvent)
+from sms_handover.types import TaskPhase
 
 _NO_IK = -1  # in RunData.ik_status where no solve was asked
+_MOST_NAMES = 8  # topics listed in an error message
 _REQUIRED = (topics.JOINT_STATES, topics.BASE_ODOMETRY)
 
 
@@ -25,9 +23,9 @@ def read_run(path: Path, namespace: str | None = None) -> RunData:
 
     There is a row per tick for each stamp with joint states and base odometry, and a row per
     reference period for each stamp with a joint reference; what was not recorded at such a stamp
-    is NaN. ``phases`` has an entry where the phase changes or commands are given. Joints are
-    matched by name, in the order of the first joint state. If the simulation was reset while it
-    was recorded, only what came after the last reset is read.
+    is NaN. ``phases`` has an entry per reference period. Joints are matched by name, in the order
+    of the first joint state. If the simulation was reset while it was recorded, only what came
+    after the last reset is read.
 
     ``namespace`` is the one the graph ran in; without it the bag must hold one run only. Raises
     BagError if there is no bag, it is damaged, was not closed, or holds no run of ours.
@@ -61,7 +59,6 @@ def _assemble(collector: RunCollector) -> RunData:
     periods = reference.stamp_ns
     arms = sorted(collector.arms, key=lambda arm: (_first_joint(arm, joint_names), arm))
     energy = rows(topics.ENERGY)
-    end_ns = int(ticks[-1]) if len(ticks) else -1
     return RunData(
         joint_names=joint_names,
         arms=tuple(arms),
@@ -83,8 +80,8 @@ def _assemble(collector: RunCollector) -> RunData:
         kinetic_energy=energy[:, 0].copy(),
         work=energy[:, 1].copy(),
         ik_status=np.nan_to_num(rows(topics.IK_STATUS)[:, 0], nan=_NO_IK).astype(np.int64),
-        phases=tuple(_changes(_last_run(collector.phases, end_ns))),
-        grasp_events=tuple(_last_run(collector.events, end_ns)),
+        phases=_last_run(collector.phases),
+        grasp_events=tuple(collector.events),
     )
 
 
@@ -96,11 +93,17 @@ def _find_namespace(info: BagInfo) -> str:
     if not runs:
         raise BagError(
             f"{info.path} holds no run of sms_handover: it needs the topics {' and '.join(_REQUIRED)},"
-            f" and has {', '.join(info.topics) or 'none'}"
+            f" and has {_listed(list(info.topics))}"
         )
     if len(runs) > 1:
         raise BagError(f"{info.path} holds several runs, name the namespace of one: {', '.join(runs)}")
     return runs[0]
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return names as a list that is short enough for a message."""
+    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+    return (", ".join(names[:_MOST_NAMES]) or "none") + more
 
 
 def _first_joint(arm: str, joint_names: Sequence[str]) -> int:
@@ -109,20 +112,11 @@ def _first_joint(arm: str, joint_names: Sequence[str]) -> int:
     return min(places, default=len(joint_names))
 
 
-def _last_run(events: Sequence[Event], end_ns: int) -> list[Event]:
-    """Return the events since the last reset, which takes the stamps back to the first one or before."""
+def _last_run(phases: Sequence[TaskPhase]) -> tuple[TaskPhase, ...]:
+    """Return the phases since the last reset, one per stamp, in the order of time."""
     begin = 0
-    for place in range(1, len(events)):
-        stamp_ns = events[place].stamp_ns
-        if stamp_ns < events[place - 1].stamp_ns and stamp_ns <= events[0].stamp_ns:
+    for place in range(1, len(phases)):
+        if phases[place - 1].stamp_ns > phases[place].stamp_ns <= phases[0].stamp_ns:
             begin = place
-    return [event for event in events[begin:] if event.stamp_ns <= end_ns]
-
-
-def _changes(phases: Sequence[TaskPhase]) -> Iterator[TaskPhase]:
-    """Yield the phases that differ from the one before, and those with commands."""
-    before: TaskPhase | None = None
-    for phase in phases:
-        if before is None or (phase.index, phase.name) != (before.index, before.name) or phase.commands:
-            yield phase
-        before = phase
+    by_stamp = {phase.stamp_ns: phase for phase in phases[begin:]}
+    return tuple(by_stamp[stamp_ns] for stamp_ns in sorted(by_stamp))

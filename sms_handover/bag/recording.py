@@ -1,15 +1,19 @@
 """Record the raw messages of a running graph: bag, loss ledger and clock in one object."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
+from sms_handover.bag.contents import PARAMETERS_FILE, ROBOT_FILE, SCHEDULE_FILE, parameters_json
 from sms_handover.bag.counting import LedgerKeeper
 from sms_handover.bag.ledger import LEDGER_RECORD, Ledger
 from sms_handover.bag.message_types import MessageTypes
+from sms_handover.bag.provenance import PROVENANCE_RECORD
 from sms_handover.bag.qos import Qos
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.bag.writer import BagWriter
+from sms_handover.errors import BagError
 
 PUBLISHED_COUNTS = "sms_handover_interfaces/msg/PublishedCounts"
 
@@ -43,9 +47,12 @@ class Recording:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Close the recording, on an error in the block too."""
-        with self.writer:
-            self._record_ledger()
+        """Close the recording; on an error in the block too, and then that error is the one that counts."""
+        if error is None:
+            self.close()
+        else:
+            with suppress(BagError):
+                self.close()
 
     @property
     def ledger(self) -> Ledger:
@@ -64,6 +71,27 @@ class Recording:
         self._stamped[name] = self._types.stamped(type_name)
         if type_name == PUBLISHED_COUNTS:
             self._reports.add(name)
+
+    def describe(
+        self,
+        *,
+        urdf: str | None = None,
+        schedule: str | None = None,
+        parameters: Mapping[str, Mapping[str, object]] | None = None,
+        provenance: Mapping[str, str] | None = None,
+    ) -> None:
+        """Store what makes the bag stand on its own; each is to be given once, whenever it is known.
+
+        ``urdf`` and ``schedule`` are the texts, ``parameters`` are by node and name.
+        """
+        if urdf is not None:
+            self.writer.attach(ROBOT_FILE, "application/xml", urdf.encode())
+        if schedule is not None:
+            self.writer.attach(SCHEDULE_FILE, "application/yaml", schedule.encode())
+        if parameters is not None:
+            self.writer.attach(PARAMETERS_FILE, "application/json", parameters_json(parameters).encode())
+        if provenance is not None:
+            self.writer.record(PROVENANCE_RECORD, provenance)
 
     def receive(self, topic: str, data: bytes, wall_ns: int) -> None:
         """Record the CDR bytes of one message that arrived at ``wall_ns``."""
@@ -87,14 +115,12 @@ class Recording:
 
     def close(self) -> None:
         """Write the ledger and complete the bag; a second call does nothing."""
-        if not self.writer.closed:
-            with self.writer:
-                self._record_ledger()
-
-    def _record_ledger(self) -> None:
-        """Write the ledger into the bag unless it is closed."""
-        if not self.writer.closed:
+        if self.writer.closed:
+            return
+        try:
             self.writer.record(LEDGER_RECORD, self.ledger.to_record())
+        finally:
+            self.writer.close()
 
     def _book_counts(self, data: bytes) -> None:
         """Book what a node says it has published."""

@@ -5,8 +5,8 @@
 """
 
 import os
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from io import BufferedWriter
 from pathlib import Path
@@ -66,15 +66,18 @@ class BagWriter:
         self._topics: dict[str, _Topic] = {}
         self._schemas: dict[str, int] = {}
         self._closed = False
+        self._writable = True
+        self._failure: BagError | None = None
         self._stream = _create(self.folder, self.path)
         self._mcap = Writer(self._stream, chunk_size=chunk_size, compression=CompressionType.ZSTD)
         try:
-            self._mcap.start(profile=_PROFILE, library=_LIBRARY)
-            self._describe()  # a file that is never closed still tells how its QoS texts are to be read
-            self._stream.flush()
-        except OSError as error:
-            self._stream.close()
-            raise self._failure(error) from error
+            with self._reported():
+                self._mcap.start(profile=_PROFILE, library=_LIBRARY)
+                self._describe()  # a file that is never closed still tells how its QoS texts are to be read
+                self._stream.flush()
+        except BagError:
+            self._discard()
+            raise
 
     def __enter__(self) -> "BagWriter":
         """Return the writer."""
@@ -121,13 +124,13 @@ class BagWriter:
 
     def write(self, topic: str, data: bytes, log_time_ns: int, publish_time_ns: int) -> None:
         """Append the CDR bytes of one message; the topic must have been added."""
+        entry = self._topics.get(topic)
+        if not self._writable or entry is None or log_time_ns < 0 or publish_time_ns < 0:
+            raise self._refusal(topic)
         try:
-            entry = self._topics[topic]
             self._mcap.add_message(entry.channel, log_time_ns, data, publish_time_ns)
-        except KeyError:
-            raise BagError(f"topic {topic!r} was not added to the recording in {self.folder}") from None
-        except (OSError, ValueError) as error:
-            raise self._failure(error) from error
+        except OSError as error:
+            raise self._failed(error) from error
         entry.count += 1
         if self._start_ns is None or log_time_ns < self._start_ns:
             self._start_ns = log_time_ns
@@ -138,34 +141,37 @@ class BagWriter:
 
     def flush(self) -> None:
         """Hand everything written so far to the operating system; call it also when no messages come."""
+        self._require_open()
         self._flushed_ns = self._end_ns
-        try:
+        with self._reported():
             self._mcap.flush()  # type: ignore[no-untyped-call]
-        except (OSError, ValueError) as error:
-            raise self._failure(error) from error
 
     def attach(self, name: str, media_type: str, content: bytes, wall_time_ns: int = 0) -> None:
         """Store a whole file in the bag, e.g. ``robot.urdf``."""
         self._require_open()
-        try:
+        with self._reported():
             self._mcap.add_attachment(wall_time_ns, wall_time_ns, name, media_type, content)
-        except OSError as error:
-            raise self._failure(error) from error
 
     def record(self, name: str, values: Mapping[str, str]) -> None:
         """Store a metadata record: a name with keys and texts."""
         self._require_open()
-        try:
+        with self._reported():
             self._mcap.add_metadata(name, dict(values))
-        except OSError as error:
-            raise self._failure(error) from error
 
     def close(self) -> None:
-        """Complete the bag and wait until it is on the disk; a second call does nothing."""
+        """Complete the bag and wait until it is on the disk; a second call does nothing.
+
+        After a failure of the disk the file is left as it is, without an end that would claim
+        that it is complete, and BagError is raised.
+        """
         if self._closed:
             return
-        self._closed = True
-        try:
+        self._closed, self._writable = True, False
+        if self._failure is not None:
+            with suppress(OSError):
+                self._stream.close()
+            raise self._failure
+        with self._reported():
             with self._stream as stream:
                 self._mcap.flush()  # type: ignore[no-untyped-call]
                 self._describe()
@@ -174,8 +180,6 @@ class BagWriter:
                 os.fsync(stream.fileno())
             _write_synced(self.folder / METADATA_FILE, to_yaml({ROSBAG2_KEY: self._information()}))
             _sync_folder(self.folder)
-        except (OSError, ValueError) as error:
-            raise self._failure(error) from error
 
     def _describe(self) -> None:
         """Write the record from which rosbag2 reads the metadata if ``metadata.yaml`` is lost."""
@@ -191,23 +195,46 @@ class BagWriter:
         return bag_information(self.path.name, start_ns, max(start_ns, self._end_ns), topics)
 
     def _require_open(self) -> None:
-        """Raise BagError if the bag has been closed."""
-        if self._closed:
-            raise BagError(f"the recording in {self.folder} is closed")
+        """Raise BagError if nothing can be written any more."""
+        if not self._writable:
+            raise self._failure or BagError(f"the recording in {self.folder} is closed")
 
-    def _failure(self, error: Exception) -> BagError:
-        """Return the error for the user after the file system refused something."""
-        if self._closed and not isinstance(error, OSError):
-            return BagError(f"the recording in {self.folder} is closed")
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        return BagError(f"cannot write the recording {self.path}: {reason}")
+    def _refusal(self, topic: str) -> BagError:
+        """Return why a message cannot be written."""
+        if not self._writable:
+            return self._failure or BagError(f"the recording in {self.folder} is closed")
+        if topic not in self._topics:
+            return BagError(f"topic {topic!r} was not added to the recording in {self.folder}")
+        return BagError(f"a message on {topic!r} has a negative time")
+
+    @contextmanager
+    def _reported(self) -> Iterator[None]:
+        """Turn an error of the file system into one for the user, and remember it."""
+        try:
+            yield
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def _failed(self, error: OSError) -> BagError:
+        """Remember that the disk refused something: what follows would not be a readable file."""
+        self._writable = False
+        self._failure = BagError(f"cannot write the recording {self.path}: {error.strerror}")
+        return self._failure
+
+    def _discard(self) -> None:
+        """Remove a bag that could not even be begun."""
+        self._closed = True
+        with suppress(OSError):
+            self._stream.close()
+        with suppress(OSError):
+            self.path.unlink()
+            self.folder.rmdir()
 
 
 def _create(folder: Path, path: Path) -> BufferedWriter:
     """Create the folder, which must not exist, and open the file in it."""
     try:
         folder.mkdir()
-        return path.open("xb")
     except FileExistsError:
         raise BagError(
             f"{folder} exists already: a recording never overwrites, choose another output folder"
@@ -216,6 +243,11 @@ def _create(folder: Path, path: Path) -> BufferedWriter:
         raise BagError(f"cannot create {folder}: its parent folder does not exist") from None
     except OSError as error:
         raise BagError(f"cannot create the recording {folder}: {error.strerror}") from error
+    try:
+        return path.open("xb")
+    except OSError as error:
+        folder.rmdir()
+        raise BagError(f"cannot create the recording {path}: {error.strerror}") from error
 
 
 def _write_synced(path: Path, text: str) -> None:
