@@ -58,7 +58,7 @@ class JointController:
     def step(self, state: RobotState) -> JointCommand:
         """Return the command that answers a state; zero efforts until a first reference has come."""
         if not self._track.ready:
-            return JointCommand(state.stamp_ns, [0.0] * self._robot.n_joints)
+            return JointCommand(state.stamp_ns, np.zeros(self._robot.n_joints))
         effort = self._law.step(state, self._track.at(state.stamp_ns), self._dt)
         return JointCommand(state.stamp_ns, effort)
 
@@ -71,7 +71,10 @@ def make_law(robot: RobotModel, gains: Gains) -> ControlLaw[Any]:
 def check_stability(
     robot: RobotModel, gains_by_phase: Sequence[Gains], dt: float, q: Array
 ) -> tuple[LoopStability, ...]:
-    """Return the stability of the sampled loop of each gain set at rest in q (7 + n,); raises UnstableLoopError."""
+    """Return the stability of the sampled loop of each gain set at rest in q (7 + n,).
+
+    Raises UnstableLoopError where one diverges.
+    """
     inertia = reduced_dynamics(robot, q, np.zeros(robot.pin.nv)).inertia
     found = []
     for gains in gains_by_phase:

@@ -60,9 +60,7 @@ class NmpcLaw(ControlLaw[NmpcGains]):
         dynamics = reduced_dynamics(robot, robot.q_of(state), robot.v_of(state))
         error = state.joint_position - desired.position
         error_rate = state.joint_velocity - desired.velocity
-        acceleration = (
-            desired.acceleration - gains.position_gain * error - gains.velocity_gain * error_rate
-        )
+        acceleration = desired.acceleration - gains.position_gain * error - gains.velocity_gain * error_rate
         effort = dynamics.inertia @ acceleration + dynamics.bias
         return np.clip(effort, -robot.effort_limit, robot.effort_limit)
 

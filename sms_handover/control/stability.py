@@ -13,7 +13,7 @@ ROUNDING = 1e-9  # [-] eigenvalues of the sampled loop are not known better than
 
 @dataclass(frozen=True)
 class LoopStability:
-    """Spectral radius of the sampled closed loop and the joint that moves most in its fastest-growing mode."""
+    """Spectral radius of the sampled loop and the joint that moves most in its fastest-growing mode."""
 
     spectral_radius: float
     joint: str

@@ -70,7 +70,8 @@ class PoseResidual:
         for index, (frame_id, target) in enumerate(self._targets):
             tool = pin.updateFramePlacement(robot.pin, robot.data, frame_id)
             turn = target.rotation.T @ tool.rotation
-            body = pin.getFrameJacobian(robot.pin, robot.data, frame_id, pin.ReferenceFrame.LOCAL)[:, BASE_NV:]
+            frame = pin.ReferenceFrame.LOCAL
+            body = pin.getFrameJacobian(robot.pin, robot.data, frame_id, frame)[:, BASE_NV:]
             row = _ROWS * index
             values[row : row + 3] = tool.translation - target.translation
             values[row + 3 : row + 6] = pin.log3(turn)

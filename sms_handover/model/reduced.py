@@ -60,4 +60,3 @@ def generalized_jacobian(robot: RobotModel, q: Array, arm: str) -> Array:
     """
     jacobian = tool_jacobian(robot, q, arm)
     return jacobian[:, BASE_NV:] + jacobian[:, :BASE_NV] @ base_twist_per_joint_rate(robot, q)
-

@@ -44,7 +44,7 @@ class FreeFloatingPlant:
     def __init__(
         self, robot: RobotModel, parameters: PlantParameters, initial: InitialState, tick_ns: int
     ) -> None:
-        """Place robot and deputy at rest; raises ConfigurationError where a joint starts outside its limits."""
+        """Place robot and deputy at rest; raises ConfigurationError on a joint outside its limits."""
         self._robot = robot
         self._tableau = TABLEAUS[parameters.integrator]
         self._tolerance = parameters.grasp_tolerance
@@ -138,8 +138,7 @@ class FreeFloatingPlant:
         model, data = self._robot.pin, self._robot.data
 
         def acceleration(q: Array, v: Array) -> Array:
-            result: Array = pin.aba(model, data, q, v, generalized)
-            return result.copy()
+            return np.array(pin.aba(model, data, q, v, generalized))
 
         before = self._q
         self._q, self._v = rkmk_step(model, self._tableau, acceleration, before, self._v, self._tick_s)

@@ -3,9 +3,8 @@
 import numpy as np
 
 from sms_handover.control.controller import Gains, JointController
-from sms_handover.control.parameters import ControllerParameters, gains_of
+from sms_handover.control.parameters import LAWS, ControllerParameters, gains_of
 from sms_handover.errors import UnknownNameError
-from sms_handover.control.parameters import LAWS
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
 from sms_handover.plant.parameters import PlantParameters

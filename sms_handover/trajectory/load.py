@@ -33,7 +33,7 @@ def load_schedule(path: Path, robot: RobotModel, reference_period_ns: int) -> Sc
     initial.refuse_unknown(("base_in_world", "joints"))
     deputy = _deputy(root.section("deputy"))
     joints = _initial_joints(initial.section("joints"), robot)
-    phases = []
+    phases: list[Phase] = []
     for item in root.sections("phases"):
         phases.append(_phase(item, robot, deputy, phases[-1].end_ns if phases else 0))
     if not phases:
@@ -95,7 +95,9 @@ def _phase(section: Section, robot: RobotModel, deputy: DeputyDescription, previ
     if section.has("motion"):
         motion_ns = seconds_to_ns(section.number("motion", "s", minimum=1e-9))
         if motion_ns > duration_ns:
-            raise section.error(f"phase {name!r}: 'motion' is longer than the phase", section.line_of("motion"))
+            raise section.error(
+                f"phase {name!r}: 'motion' is longer than the phase", section.line_of("motion")
+            )
     arms = section.section("arms")
     arms.refuse_unknown(robot.arms)
     targets = {arm: _target(arms, arm, robot, deputy) for arm in robot.arms}
@@ -123,7 +125,7 @@ def _target(arms: Section, arm: str, robot: RobotModel, deputy: DeputyDescriptio
         return JointTarget(_joints(section, "joints", arm, robot))
     if kinds[0] == "tool_in_world":
         return ToolTarget(_pose(section.section("tool_in_world")))
-    offset = Pose([0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0])
+    offset = Pose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
     if section.has("tool_in_grasp_frame"):
         offset = _pose(section.section("tool_in_grasp_frame"))
     return GraspFrameTarget(_grasp_frame(section, "grasp_frame", deputy), offset)

@@ -73,7 +73,7 @@ class Section:
         """Return the plain value under a key."""
         loader = yaml.SafeLoader("")
         try:
-            return loader.construct_object(self._get(key), deep=True)  # type: ignore[no-untyped-call]
+            return loader.construct_object(self._get(key), deep=True)
         except yaml.YAMLError as error:
             raise self.error(f"{key!r}: {error}", self.line_of(key)) from error
 
