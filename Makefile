@@ -57,7 +57,7 @@ $(VENV)/.interfaces: $(VENV)/.environment $(INTERFACES) .ci/constraints.txt
 	$(PIP) ./interfaces
 	@touch $@
 
-$(VENV)/.package: $(VENV)/.interfaces $(METADATA)
+$(VENV)/.package: $(METADATA) | $(VENV)/.interfaces
 	$(PIP) --editable .
 	@touch $@
 

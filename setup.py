@@ -66,7 +66,7 @@ setup(
         "ros-jazzy-common-interfaces>=5.3.6,<5.4",
         "ros-jazzy-rmw-fastrtps-cpp>=8.4.3,<8.5",
         "sms_handover_interfaces",
-        "mcap>=1.3,<2",
+        "mcap>=1.5,<2",
         "numpy>=2.0,<3",
         "pin>=4.0,<5",
         "pyyaml>=6,<7",
@@ -74,9 +74,9 @@ setup(
     ],
     extras_require={
         "test": [
-            "mcap-ros2-support>=0.5,<1",
+            "mcap-ros2-support>=0.5.7,<1",
             "mypy>=1.15",
-            "pytest>=8",
+            "pytest>=8.4",
             "ruff>=0.6",
             "types-PyYAML",
             "types-setuptools",
