@@ -1,4 +1,7 @@
-"""Messages and the values of the core, one pair of functions each; every number keeps its bits."""
+"""Messages from the values of the core and back; every number keeps its bits.
+
+Phases and grasp events are read back by :mod:`sms_handover.bag.decode`, which reads fields by name.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -7,12 +10,10 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, PoseStamped, Quaternion, Vector3, Vector3Stamped
 from geometry_msgs.msg import Pose as PoseMessage
 from sensor_msgs.msg import JointState
-from sms_handover_interfaces.msg import (
-    EnergyStamped,
-    IkStatus as IkStatusMessage,
-)
+from sms_handover_interfaces.msg import EnergyStamped
 from sms_handover_interfaces.msg import GraspCommand as GraspCommandMessage
 from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
+from sms_handover_interfaces.msg import IkStatus as IkStatusMessage
 from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
 from std_msgs.msg import Header
 
@@ -36,19 +37,16 @@ _ACTIONS = {
     GraspAction.RELEASE: GraspCommandMessage.RELEASE,
     GraspAction.TRANSFER: GraspCommandMessage.TRANSFER,
 }
-_ACTION_OF = {number: action for action, number in _ACTIONS.items()}
 _GRASP_STATUS = {
     GraspStatus.SUCCEEDED: GraspEventMessage.SUCCEEDED,
     GraspStatus.MISSED: GraspEventMessage.MISSED,
     GraspStatus.REJECTED: GraspEventMessage.REJECTED,
 }
-_GRASP_STATUS_OF = {number: status for status, number in _GRASP_STATUS.items()}
 _IK_STATUS = {
     IkStatus.CONVERGED: IkStatusMessage.CONVERGED,
     IkStatus.STALLED: IkStatusMessage.STALLED,
     IkStatus.ITERATION_LIMIT: IkStatusMessage.ITERATION_LIMIT,
 }
-_IK_STATUS_OF = {number: status for status, number in _IK_STATUS.items()}
 
 
 def time_message(stamp_ns: int) -> Time:
@@ -76,7 +74,7 @@ def pose_message(pose: Pose) -> PoseMessage:
 def pose_of_message(message: PoseMessage) -> Pose:
     """Return the pose in a message."""
     p, o = message.position, message.orientation
-    return Pose([p.x, p.y, p.z], [o.x, o.y, o.z, o.w])
+    return Pose(np.array([p.x, p.y, p.z]), np.array([o.x, o.y, o.z, o.w]))
 
 
 def pose_stamped(pose: Pose, stamp_ns: int) -> PoseStamped:
@@ -121,12 +119,6 @@ def phase_message(phase: TaskPhase) -> TaskPhaseMessage:
     )
 
 
-def phase_of_message(message: TaskPhaseMessage) -> TaskPhase:
-    """Return the phase in a message."""
-    commands = tuple(_command_of(command) for command in message.commands)
-    return TaskPhase(stamp_ns_of(message.header.stamp), int(message.index), message.name, commands)
-
-
 def event_message(event: GraspEvent) -> GraspEventMessage:
     """Return a grasp event as a message."""
     return GraspEventMessage(
@@ -137,19 +129,6 @@ def event_message(event: GraspEvent) -> GraspEventMessage:
         angle_error=event.angle_error,
         relative_speed=event.relative_speed,
         detail=event.detail,
-    )
-
-
-def event_of_message(message: GraspEventMessage) -> GraspEvent:
-    """Return the grasp event in a message."""
-    return GraspEvent(
-        stamp_ns_of(message.header.stamp),
-        _command_of(message.command),
-        _GRASP_STATUS_OF[message.status],
-        message.position_error,
-        message.angle_error,
-        message.relative_speed,
-        message.detail,
     )
 
 
@@ -167,20 +146,6 @@ def ik_status_message(result: IkResult, stamp_ns: int) -> IkStatusMessage:
     )
 
 
-def ik_result_of(joint_position: Array, message: IkStatusMessage) -> IkResult:
-    """Return an IK result from its joints and the status message."""
-    return IkResult(
-        joint_position=joint_position,
-        status=_IK_STATUS_OF[message.status],
-        iterations=int(message.iterations),
-        position_error=message.position_error,
-        orientation_error=message.orientation_error,
-        limit_margin=message.limit_margin,
-        manipulability=message.manipulability,
-        seed_distance=message.seed_distance,
-    )
-
-
 def _command_message(command: GraspCommand) -> GraspCommandMessage:
     """Return a grasp command as a message."""
     return GraspCommandMessage(
@@ -189,8 +154,3 @@ def _command_message(command: GraspCommand) -> GraspCommandMessage:
         grasp_frame=command.grasp_frame,
         from_arm=command.from_arm,
     )
-
-
-def _command_of(message: GraspCommandMessage) -> GraspCommand:
-    """Return the grasp command in a message."""
-    return GraspCommand(_ACTION_OF[message.action], message.arm, message.grasp_frame, message.from_arm)

@@ -7,7 +7,7 @@ from sms_handover.errors import GraphError
 
 
 def message_class(type_name: str) -> Any:
-    """Return the class of a type such as ``sensor_msgs/msg/JointState``; raises GraphError if not installed."""
+    """Return the class of a type such as ``sensor_msgs/msg/JointState``; raises GraphError if it lacks."""
     package, kind, name = type_name.split("/")
     try:
         return getattr(import_module(f"{package}.{kind}"), name)

@@ -78,7 +78,9 @@ def _descriptor(spec: ParameterSpec, hint: Any) -> ParameterDescriptor:
         low = -_LARGEST if spec.minimum is None else spec.minimum
         high = _LARGEST if spec.maximum is None else spec.maximum
         if hint is float:
-            descriptor.floating_point_range = [FloatingPointRange(from_value=float(low), to_value=float(high))]
+            descriptor.floating_point_range = [
+                FloatingPointRange(from_value=float(low), to_value=float(high))
+            ]
         if hint is int:
             top = _LARGEST_INT if spec.maximum is None else int(high)
             descriptor.integer_range = [IntegerRange(from_value=int(low), to_value=top)]

@@ -2,26 +2,32 @@
 
 from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSProfile, QoSReliabilityPolicy
 
+from sms_handover.bag.qos import Durability, History, Qos, Reliability
 from sms_handover.topics import Topic
 
-LATCHED_DEPTH = 100  # [messages] kept for subscribers that come late
+LOSSLESS = QoSProfile(
+    history=QoSHistoryPolicy.KEEP_ALL,
+    reliability=QoSReliabilityPolicy.RELIABLE,
+    durability=QoSDurabilityPolicy.VOLATILE,
+)  # a slow reader holds the writer back instead of losing messages
+LATCHED = QoSProfile(
+    history=QoSHistoryPolicy.KEEP_LAST,
+    depth=100,  # [messages] kept for subscribers that come late
+    reliability=QoSReliabilityPolicy.RELIABLE,
+    durability=QoSDurabilityPolicy.TRANSIENT_LOCAL,
+)
 
 
 def profile_of(topic: Topic) -> QoSProfile:
-    """Return the profile with which a topic is published and subscribed.
+    """Return the profile with which a topic of the graph is published and subscribed."""
+    return LATCHED if topic.latched else LOSSLESS
 
-    Reliable and KEEP_ALL, so a slow reader holds the writer back instead of losing messages; a
-    latched topic keeps its last messages for late subscribers.
-    """
-    if topic.latched:
-        return QoSProfile(
-            history=QoSHistoryPolicy.KEEP_LAST,
-            depth=LATCHED_DEPTH,
-            reliability=QoSReliabilityPolicy.RELIABLE,
-            durability=QoSDurabilityPolicy.TRANSIENT_LOCAL,
-        )
-    return QoSProfile(
-        history=QoSHistoryPolicy.KEEP_ALL,
-        reliability=QoSReliabilityPolicy.RELIABLE,
-        durability=QoSDurabilityPolicy.VOLATILE,
+
+def stored(profile: QoSProfile) -> Qos:
+    """Return a profile in the form that a recording keeps."""
+    return Qos(
+        reliability=Reliability(profile.reliability.name.lower()),
+        durability=Durability(profile.durability.name.lower()),
+        history=History(profile.history.name.lower()),
+        depth=profile.depth,
     )

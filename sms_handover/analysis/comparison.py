@@ -1,0 +1,60 @@
+"""Several runs side by side, and the paper's claims where they are a pair of NMPC and PID."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from sms_handover.analysis.base_motion import BaseMotion
+from sms_handover.analysis.claims import Claim, judge
+from sms_handover.analysis.metrics import RunMetrics, common_settling, measure
+from sms_handover.run_data import RunData
+
+NMPC = "nmpc"
+PID = "pid"
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """The metrics of every run by its name; the drift of the base per run and phase; the claims.
+
+    ``phase_names`` has every phase that any run has. The drift of a phase is taken over one window for
+    all runs, from when the slowest of those that settle has settled. ``claims`` is empty unless
+    exactly one run is under NMPC and one under PID.
+    """
+
+    runs: Mapping[str, RunMetrics]
+    phase_names: tuple[str, ...]
+    drift: Mapping[str, Mapping[str, BaseMotion]]
+    claims: tuple[Claim, ...]
+
+    def __post_init__(self) -> None:
+        """Make the mappings immutable."""
+        object.__setattr__(self, "runs", MappingProxyType(dict(self.runs)))
+        drift = {name: MappingProxyType(dict(phases)) for name, phases in self.drift.items()}
+        object.__setattr__(self, "drift", MappingProxyType(drift))
+
+
+def compare(runs: Mapping[str, RunData], laws: Mapping[str, str] | None = None) -> Comparison:
+    """Return the comparison of runs by name.
+
+    ``laws`` has the control law of each run; without it a run whose name holds the word ``nmpc`` or
+    ``pid`` is taken to be under that law.
+    """
+    metrics = {name: measure(run) for name, run in runs.items()}
+    names = tuple(dict.fromkeys(item.phase.name for run in metrics.values() for item in run.phases))
+    begins = {name: common_settling(metrics.values(), name) for name in names}
+    drift = {
+        run: {name: item.drift(name, begin) for name, begin in begins.items()}
+        for run, item in metrics.items()
+    }
+    law_of = {name: (laws or {}).get(name, _law_in(name)) for name in runs}
+    pair = [[item for name, item in metrics.items() if law_of[name] == law] for law in (NMPC, PID)]
+    claims = judge(pair[0][0], pair[1][0]) if all(len(found) == 1 for found in pair) else ()
+    return Comparison(metrics, names, drift, claims)
+
+
+def _law_in(name: str) -> str:
+    """Return the control law that a run's name tells of, '' if it tells of none or of both."""
+    words = set(re.split(r"[^a-z0-9]+", name.casefold())) & {NMPC, PID}
+    return words.pop() if len(words) == 1 else ""

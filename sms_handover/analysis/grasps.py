@@ -1,0 +1,45 @@
+"""Who held the deputy, from the grasp events of a run."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Protocol
+
+from sms_handover.types import GraspAction, GraspEvent, GraspStatus
+
+
+class Tolerance(Protocol):
+    """How far a tool may be from a grasp frame when it closes: m, rad, m/s."""
+
+    @property
+    def position(self) -> float:
+        """Distance in m."""
+
+    @property
+    def angle(self) -> float:
+        """Angle in rad."""
+
+    @property
+    def speed(self) -> float:
+        """Relative speed in m/s."""
+
+
+@dataclass(frozen=True)
+class Hold:
+    """From ``since_ns`` on ``holder`` has the deputy; '' while it floats. ``giver`` had it before."""
+
+    since_ns: int
+    holder: str
+    giver: str
+
+
+def holds(events: Iterable[GraspEvent]) -> tuple[Hold, ...]:
+    """Return every change of who holds the deputy, in the order of time; only what succeeded counts."""
+    changes: list[Hold] = []
+    holder = ""
+    for event in events:
+        if event.status is not GraspStatus.SUCCEEDED:
+            continue
+        after = "" if event.command.action is GraspAction.RELEASE else event.command.arm
+        changes.append(Hold(event.stamp_ns, after, holder))
+        holder = after
+    return tuple(changes)

@@ -1,0 +1,61 @@
+"""Plain-text tables with a column per run, wrapped into several blocks where they would be too wide."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from math import isnan
+from typing import TypeVar
+
+T = TypeVar("T")
+
+WIDTH = 100  # [characters] no line is longer
+MISSING = "-"
+_LONGEST_NAME = 24  # [characters] of a run; longer ones keep their end
+_GAP = "  "
+
+
+@dataclass(frozen=True)
+class Row:
+    """A label with its unit, and one cell per run; a subheading has none."""
+
+    label: str
+    cells: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Section:
+    """Rows under a title, beside which the names of the runs are printed."""
+
+    title: str
+    rows: tuple[Row, ...]
+
+
+def number(value: float, missing: str = MISSING) -> str:
+    """Return a number with four significant digits."""
+    return missing if isnan(value) else f"{value:.4g}"
+
+
+def row(label: str, items: Iterable[T | None], value: Callable[[T], float], missing: str = MISSING) -> Row:
+    """Return a row with a number of every item; ``missing`` stands for NaN, a dash for no item."""
+    return Row(label, tuple(MISSING if item is None else number(value(item), missing) for item in items))
+
+
+def layout(names: Sequence[str], sections: Sequence[Section]) -> list[str]:
+    """Return the lines of the sections, with as many runs side by side as fit."""
+    short = [name if len(name) <= _LONGEST_NAME else f"...{name[3 - _LONGEST_NAME :]}" for name in names]
+    rows = [item for section in sections for item in section.rows]
+    label = max([len(item.label) for item in rows if item.cells], default=0)
+    cell = max(map(len, [*short, *(text for item in rows for text in item.cells)]), default=0)
+    at_once = max(1, (WIDTH - label) // (cell + len(_GAP)))
+    lines = []
+    for first in range(0, max(len(short), 1), at_once):
+        columns = slice(first, first + at_once)
+        for section in sections:
+            head = _line(Row(section.title, tuple(short[columns])), label, cell)
+            lines += ["", head, "-" * len(head)]
+            lines += [_line(Row(item.label, item.cells[columns]), label, cell) for item in section.rows]
+    return lines
+
+
+def _line(item: Row, label: int, cell: int) -> str:
+    """Return one row with its cells to the right."""
+    return item.label.ljust(label) + "".join(_GAP + text.rjust(cell) for text in item.cells)

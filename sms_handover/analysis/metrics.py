@@ -1,0 +1,89 @@
+"""Everything that is measured on one run."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import isnan, nan
+from types import MappingProxyType
+
+from sms_handover.analysis.base_motion import UNKNOWN_MOTION, BaseMotion, base_motion
+from sms_handover.analysis.numbers import largest
+from sms_handover.analysis.phases import PhaseSpan, phase_spans
+from sms_handover.analysis.receipts import IkOutcomes, PhysicsResiduals, ik_outcomes, physics_residuals
+from sms_handover.analysis.torque import JointTorque, joint_torque
+from sms_handover.analysis.tracking import ToolTracking, tool_tracking
+from sms_handover.run_data import RunData
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseMetrics:
+    """One phase: every arm's tracking, the motion of the base over it, and the torques."""
+
+    phase: PhaseSpan
+    tools: Mapping[str, ToolTracking]
+    base: BaseMotion
+    torque: JointTorque
+
+    def __post_init__(self) -> None:
+        """Make the mapping immutable."""
+        object.__setattr__(self, "tools", MappingProxyType(dict(self.tools)))
+
+    @property
+    def settling_time(self) -> float:
+        """Time in s from the start after which every tool stays in its band; NaN if one does not."""
+        times = [tool.settling_time for tool in self.tools.values()]
+        return max(times) if times and not any(map(isnan, times)) else nan
+
+
+@dataclass(frozen=True, eq=False)
+class RunMetrics:
+    """One run: its phases in the order of time, and what holds for the whole of it."""
+
+    run: RunData
+    phases: tuple[PhaseMetrics, ...]
+    torque: JointTorque
+    physics: PhysicsResiduals
+    ik: IkOutcomes
+
+    def phase(self, name: str) -> PhaseMetrics | None:
+        """Return the phase of a name, None if the run has none."""
+        return next((item for item in self.phases if item.phase.name == name), None)
+
+    def drift(self, name: str, begin: float) -> BaseMotion:
+        """Return the motion of the base from ``begin`` s after the start of a phase to its end.
+
+        NaN throughout if the run has no such phase, or its own tools have not settled by then.
+        """
+        found = self.phase(name)
+        if found is None or not found.settling_time <= begin:
+            return UNKNOWN_MOTION
+        return base_motion(self.run, found.phase, begin)
+
+
+def common_settling(runs: Iterable[RunMetrics], name: str) -> float:
+    """Return the time in s after the start of a phase at which the slowest run has settled.
+
+    Runs that never settle in it, or do not have it, are left out; NaN if no run is left.
+    """
+    found = [phase for phase in (run.phase(name) for run in runs) if phase is not None]
+    return largest([phase.settling_time for phase in found])
+
+
+def measure(run: RunData) -> RunMetrics:
+    """Return all metrics of a run."""
+    return RunMetrics(
+        run=run,
+        phases=tuple(_measure_phase(run, phase) for phase in phase_spans(run)),
+        torque=joint_torque(run),
+        physics=physics_residuals(run),
+        ik=ik_outcomes(run),
+    )
+
+
+def _measure_phase(run: RunData, phase: PhaseSpan) -> PhaseMetrics:
+    """Return the metrics of one phase."""
+    return PhaseMetrics(
+        phase,
+        {arm: tool_tracking(run, phase, arm) for arm in run.arms},
+        base_motion(run, phase),
+        joint_torque(run, phase),
+    )

@@ -1,0 +1,44 @@
+"""Small operations on recorded arrays, in which NaN stands for what was not recorded."""
+
+from math import nan
+
+import numpy as np
+import numpy.typing as npt
+
+from sms_handover.types import Array
+
+
+def largest(values: npt.ArrayLike) -> float:
+    """Return the largest of the values that are there, NaN if none is."""
+    array = np.asarray(values, dtype=np.float64)
+    known = array[~np.isnan(array)]
+    return float(known.max()) if known.size else nan
+
+
+def mean(values: npt.ArrayLike) -> float:
+    """Return the mean of the values, NaN if there is none."""
+    array = np.asarray(values, dtype=np.float64)
+    return float(array.mean()) if array.size else nan
+
+
+def lengths(rows: Array) -> Array:
+    """Return the Euclidean length of every row."""
+    result: Array = np.sqrt(np.sum(rows * rows, axis=-1))
+    return result
+
+
+def complete(*tables: Array) -> npt.NDArray[np.bool_]:
+    """Tell for every row whether it is free of NaN in all tables."""
+    return np.asarray(np.all([np.all(np.isfinite(table), axis=1) for table in tables], axis=0))
+
+
+def angle_between(a: Array, b: Array) -> Array:
+    """Return the angle in rad of the rotations from ``a`` to ``b``, quaternions (..., 4) x y z w.
+
+    2 atan2(|v|, |w|) of the relative quaternion (v, w): precise near zero, and the same for q and -q.
+    """
+    a_v, a_w, b_v, b_w = a[..., :3], a[..., 3:], b[..., :3], b[..., 3:]
+    vector = a_w * b_v - b_w * a_v - np.cross(a_v, b_v)
+    scalar = np.sum(a * b, axis=-1)
+    result: Array = 2.0 * np.arctan2(lengths(vector), np.abs(scalar))
+    return result

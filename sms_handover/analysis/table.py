@@ -1,0 +1,189 @@
+"""A comparison of runs as plain text: metrics, receipts, and the verdicts on the paper's claims."""
+
+from collections.abc import Callable, Mapping, Sequence
+from textwrap import wrap
+
+from sms_handover.analysis.base_motion import BaseMotion
+from sms_handover.analysis.claims import Claim
+from sms_handover.analysis.comparison import Comparison, compare
+from sms_handover.analysis.grasps import Tolerance
+from sms_handover.analysis.layout import MISSING, WIDTH, Row, Section, layout, number, row
+from sms_handover.analysis.metrics import PhaseMetrics, RunMetrics
+from sms_handover.analysis.numbers import largest
+from sms_handover.analysis.tracking import Motion, ToolTracking
+from sms_handover.run_data import RunData
+from sms_handover.types import GraspAction, GraspCommand
+from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
+
+_MICRO = 1e6
+_NEVER = "never"
+_VERDICTS = {True: "HOLDS", False: "DOES NOT HOLD"}
+
+
+def comparison_table(
+    runs: Mapping[str, RunData],
+    *,
+    laws: Mapping[str, str] | None = None,
+    tolerance: Tolerance | None = None,
+) -> str:
+    """Return a table of the runs, by name, and the verdicts on the paper's claims if they are a pair.
+
+    ``laws`` has the control law of each run, otherwise it is read from the name; ``tolerance`` is
+    printed beside the values that a grasp reached.
+    """
+    return render(compare(runs, laws), tolerance)
+
+
+def render(comparison: Comparison, tolerance: Tolerance | None = None) -> str:
+    """Return the table of a comparison."""
+    runs = list(comparison.runs.values())
+    sections = [
+        Section("Grasp events", _grasp_rows(runs, tolerance)),
+        *(_phase_section(comparison, name) for name in comparison.phase_names),
+        Section("Torque over the whole run, peak / RMS [N m]", _torque_rows(runs)),
+        Section("Physics and inverse kinematics", _receipt_rows(runs)),
+    ]
+    lines = layout(list(comparison.runs), sections)
+    if comparison.claims:
+        held = sum(claim.holds for claim in comparison.claims)
+        lines += ["", f"Claims of the paper: {held} of {len(comparison.claims)} hold"]
+        for claim in comparison.claims:
+            lines += _claim_lines(claim)
+    return "\n".join(lines[1:]) + "\n"
+
+
+def _grasp_rows(runs: Sequence[RunMetrics], tolerance: Tolerance | None) -> tuple[Row, ...]:
+    """Return what came of every grasp command, with the values reached where it closed."""
+    by_run = [{(event.stamp_ns, event.command): event for event in item.run.grasp_events} for item in runs]
+    keys = dict.fromkeys(key for events in by_run for key in events)
+    reached = (
+        ("distance", "mm", MM_PER_M, "position"),
+        ("angle", "deg", DEG_PER_RAD, "angle"),
+        ("relative speed", "mm/s", MM_PER_M, "speed"),
+    )
+    rows = []
+    for key in sorted(keys, key=lambda key: key[0]):
+        stamp_ns, command = key
+        events = [found.get(key) for found in by_run]
+        label = f"{ns_to_seconds(stamp_ns):g} s: {_in_words(command)}"
+        rows.append(Row(label, tuple(event.status.value if event else MISSING for event in events)))
+        if command.action is GraspAction.RELEASE:
+            continue
+        for what, unit, scale, name in reached:
+            allowed = f", allowed {getattr(tolerance, name) * scale:g}" if tolerance else ""
+            values = [None if e is None else (e.position_error, e.angle_error, e.relative_speed) for e in events]
+            place = ("position", "angle", "speed").index(name)
+            rows.append(row(f"  {what} [{unit}]{allowed}", values, _item(place, scale)))
+    return tuple(rows) or (Row("none"),)
+
+
+def _item(place: int, scale: float) -> Callable[[Sequence[float]], float]:
+    """Return a function that takes one value of several, in another unit."""
+    return lambda values: values[place] * scale
+
+
+def _in_words(command: GraspCommand) -> str:
+    """Return a grasp command as a short sentence."""
+    if command.action is GraspAction.RELEASE:
+        return f"{command.arm} lets go"
+    giver = f" from {command.from_arm}" if command.from_arm else ""
+    return f"{command.arm} takes {command.grasp_frame}{giver}"
+
+
+def _phase_section(comparison: Comparison, name: str) -> Section:
+    """Return the section of one phase: every tool, then the base."""
+    phases = [item.phase(name) for item in comparison.runs.values()]
+    spans = [item.phase for item in phases if item]
+    rows: list[Row] = []
+    for arm in dict.fromkeys(arm for item in phases if item for arm in item.tools):
+        rows += _tool_rows(arm, phases)
+    rows.append(Row("base"))
+    rows.append(row("  position change [mm]", phases, lambda item: item.base.position_change * MM_PER_M))
+    rows.append(row("  attitude change [deg]", phases, lambda item: item.base.attitude_change * DEG_PER_RAD))
+    drifts = [drift[name] for drift in comparison.drift.values()]
+    begin = largest([drift.begin for drift in drifts])
+    rows.append(Row(f"base, from {number(begin, _NEVER)} s on, when all runs have settled"))
+    rows += [row(label, drifts, value) for label, value in _DRIFT]
+    begin_s, end_s = (ns_to_seconds(time_ns) for time_ns in (spans[0].start_ns, spans[0].end_ns))
+    return Section(f"Phase {name}, {begin_s:g} to {end_s:g} s", tuple(rows))
+
+
+_DRIFT: tuple[tuple[str, Callable[[BaseMotion], float]], ...] = (
+    ("  position drift [um/s]", lambda drift: drift.position_rate * _MICRO),
+    ("  attitude drift [urad/s]", lambda drift: drift.attitude_rate * _MICRO),
+    ("  mean speed [um/s]", lambda drift: drift.mean_speed * _MICRO),
+    ("  mean turn rate [urad/s]", lambda drift: drift.mean_turn_rate * _MICRO),
+)
+_MOVING: tuple[tuple[str, Callable[[ToolTracking], float]], ...] = (
+    ("  step length [mm]", lambda tool: tool.step_length * MM_PER_M),
+    ("  overshoot [mm]", lambda tool: tool.overshoot * MM_PER_M),
+    ("  overshoot [% of step]", lambda tool: tool.overshoot_ratio * 100.0),
+)
+_HELD: tuple[tuple[str, Callable[[ToolTracking], float]], ...] = (
+    ("  largest error [mm]", lambda tool: tool.largest_error * MM_PER_M),
+)
+_EITHER: tuple[tuple[str, Callable[[ToolTracking], float]], ...] = (
+    ("  steady-state error [mm]", lambda tool: tool.steady_state_error * MM_PER_M),
+    ("  final error [mm]", lambda tool: tool.final_error * MM_PER_M),
+    ("  final angle error [deg]", lambda tool: tool.final_orientation_error * DEG_PER_RAD),
+)
+
+
+def _tool_rows(arm: str, phases: Sequence[PhaseMetrics | None]) -> list[Row]:
+    """Return the rows of one arm in one phase."""
+    tools = [item.tools.get(arm) if item else None for item in phases]
+    torques = [item.torque.of_arm(arm) if item else None for item in phases]
+    kinds = {tool.motion for tool in tools if tool}
+    kind = " or ".join(motion.value for motion in Motion if motion in kinds)
+    rows = [Row(f"{arm} ({kind})")]
+    rows += [row(label, tools, value) for label, value in (_HELD if kinds == {Motion.HOLD} else _MOVING)]
+    rows.append(row("  settling time [s]", tools, lambda tool: tool.settling_time, _NEVER))
+    rows += [row(label, tools, value) for label, value in _EITHER]
+    rows.append(row("  peak torque [N m]", torques, lambda torque: largest(torque.peak)))
+    rows.append(row("  control effort [(N m)^2 s]", torques, lambda torque: float(torque.effort.sum())))
+    return rows
+
+
+def _torque_rows(runs: Sequence[RunMetrics]) -> tuple[Row, ...]:
+    """Return the torques of every joint over the whole run."""
+    torques = [item.torque for item in runs]
+    joints = dict.fromkeys(name for torque in torques for name in torque.joint_names)
+    return (
+        *(Row(name, tuple(_peak_and_rms(item, name) for item in runs)) for name in joints),
+        row("control effort [(N m)^2 s]", torques, lambda torque: float(torque.effort.sum())),
+        row("saturated ticks, worst joint", torques, lambda torque: largest(torque.saturated_ticks)),
+        row("ticks at the peak, worst joint", torques, lambda torque: largest(torque.ticks_at_peak)),
+    )
+
+
+def _peak_and_rms(metrics: RunMetrics, joint: str) -> str:
+    """Return the two figures of a joint as one cell."""
+    torque = metrics.torque
+    if joint not in torque.joint_names:
+        return MISSING
+    place = torque.joint_names.index(joint)
+    return f"{torque.peak[place]:.3g} / {torque.rms[place]:.3g}"
+
+
+def _receipt_rows(runs: Sequence[RunMetrics]) -> tuple[Row, ...]:
+    """Return the conservation laws and the outcomes of inverse kinematics."""
+    return (
+        row("largest linear momentum [kg m/s]", runs, lambda item: item.physics.linear_momentum),
+        row("largest angular momentum [kg m^2/s]", runs, lambda item: item.physics.angular_momentum),
+        row("largest |dE - W| / max E [-]", runs, lambda item: item.physics.energy),
+        row("peak kinetic energy [J]", runs, lambda item: item.physics.peak_kinetic_energy),
+        row("IK solves", runs, lambda item: float(item.ik.solves)),
+        row("IK solves that failed", runs, lambda item: float(item.ik.failures)),
+    )
+
+
+def _claim_lines(claim: Claim) -> list[str]:
+    """Return the verdict, the paper's words and the figures of a claim."""
+    missing = _NEVER if claim.name == "settling" else MISSING
+    quote = wrap(f'Paper: "{claim.paper}"', WIDTH, initial_indent="  ", subsequent_indent="  ")
+    rows = [
+        Row(f"  {item.label} [{item.unit}]", (number(item.nmpc, missing), number(item.pid, missing)))
+        for item in claim.findings
+    ]
+    heading = wrap(f"{_VERDICTS[claim.holds]}: {claim.text}", WIDTH, subsequent_indent="  ")
+    return ["", *heading, *quote, *layout(("NMPC", "PID"), [Section("", tuple(rows))])[1:]]

@@ -1,0 +1,306 @@
+"""The plant node."""
+
+from collections.abc import Sequence
+from time import monotonic
+from typing import Any
+
+import numpy as np
+from rclpy.executors import Executor
+from rosgraph_msgs.msg import Clock
+from sms_handover_interfaces.msg import RunState
+from sms_handover_interfaces.srv import StepTicks
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
+
+from sms_handover.bag.decode import task_phase
+from sms_handover.bag.stamp import stamp_ns
+from sms_handover.frames import BASE, WORLD
+from sms_handover.plant.parameters import PlantParameters
+from sms_handover.ros.convert import (
+    energy_message,
+    event_message,
+    header,
+    pose_stamped,
+    stamp_ns_of,
+    time_message,
+    vector_stamped,
+)
+from sms_handover.ros.graph_node import GraphNode
+from sms_handover.ros.loop_clock import LoopClock
+from sms_handover.ros.main import Stop, run_node
+from sms_handover.ros.stamp_sync import StampSync
+from sms_handover.ros.wire import JointStateWire, StateWire
+from sms_handover.simulation.parameters import LOCKSTEP
+from sms_handover.simulation.scenario import load_task
+from sms_handover.simulation.wiring import make_plant
+from sms_handover.topics import (
+    ANGULAR_MOMENTUM,
+    BASE_ODOMETRY,
+    CLOCK,
+    CLOCK_PERIOD_NS,
+    DEPUTY_POSE,
+    ENERGY,
+    GRASP_EVENT,
+    JOINT_COMMAND,
+    JOINT_STATES,
+    LINEAR_MOMENTUM,
+    LOOP_TIMING,
+    PLANT,
+    ROBOT_DESCRIPTION,
+    RUN_READY,
+    RUN_STATE,
+    TASK_PHASE,
+    tool_pose,
+)
+from sms_handover.types import JointCommand
+
+_TIMING_PERIOD_S = 1.0  # [s] of wall time
+
+
+class PlantNode(GraphNode[PlantParameters]):
+    """Publishes the state of every tick and integrates to the next.
+
+    In lock step it waits for the command of that tick, and at a reference period for the task phase
+    too; in real time a tick begins when the wall clock says so, with the last command held.
+    """
+
+    def __init__(self) -> None:
+        """Place robot and deputy at the start of the schedule."""
+        super().__init__(PLANT, PlantParameters)
+        schedule = load_task(self.common, self.robot)
+        self._plant = make_plant(self.robot, schedule, self.common, self.parameters)
+        self._last_tick = self.common.last_tick(schedule.end_ns)
+        self._lockstep = self.common.mode == LOCKSTEP
+        self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
+        self._command_wire = JointStateWire(self.robot.joint_names, ("effort",))
+        self._inputs: StampSync[Any] = StampSync()
+        self._loop_clock = LoopClock(self.common.tick_ns)
+        self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
+        self._run_state = RunState.WAITING
+        self._steps_left = 0
+        self._reset_asked = False
+        self._waiting_for = set(self.common.peers) - {PLANT}
+        self._make_endpoints()
+        self.create_timer(_TIMING_PERIOD_S, self._publish_timing)
+
+    def on_matched(self) -> None:
+        """Say what robot this is; the run begins when the other nodes are ready too."""
+        self._publish[ROBOT_DESCRIPTION].publish(String(data=self.robot.urdf))
+        self._begin_if_ready()
+
+    def diagnostic_values(self) -> dict[str, object]:
+        """Return how far the run is and which joints were saturated."""
+        saturated = {f"saturated_{k}": v for k, v in self._plant.saturated_ticks.items() if v}
+        return {"tick": self._plant.tick, "holder": self._plant.deputy.holder or "none", **saturated}
+
+    def diagnostic_stamp_ns(self) -> int:
+        """Return simulation time."""
+        return self._plant.stamp_ns
+
+    def run(self, executor: Executor, stop: Stop) -> int:
+        """Handle events until asked to stop, and in real time begin every tick at its deadline."""
+        while not self._lockstep and not stop.asked and not self.finished:
+            executor.spin_once(timeout_sec=self._loop_clock.wait_s())
+            if self._run_state == RunState.RUNNING and self._loop_clock.due():
+                self._tick_now()
+        return super().run(executor, stop)
+
+    def _make_endpoints(self) -> None:
+        """Make publishers, subscriptions and services."""
+        names = [JOINT_STATES, BASE_ODOMETRY, DEPUTY_POSE, GRASP_EVENT, LINEAR_MOMENTUM, ANGULAR_MOMENTUM]
+        names += [ENERGY, ROBOT_DESCRIPTION, RUN_STATE, LOOP_TIMING, CLOCK]
+        names += [tool_pose(arm) for arm in self.robot.arms]
+        self._publish = {name: self.endpoints.publisher(name) for name in names}
+        self.endpoints.subscribe(JOINT_COMMAND, self._on_command, raw=True)
+        self.endpoints.subscribe(TASK_PHASE, self._on_phase)
+        self.endpoints.subscribe(RUN_READY, self._on_ready)
+        self.create_service(SetBool, "~/pause", self._on_pause)
+        self.create_service(StepTicks, "~/step", self._on_step)
+        self.create_service(Trigger, "~/reset", self._on_reset)
+        self.create_service(Trigger, "~/finish", self._on_finish)
+
+    # The start of the run
+
+    def _on_ready(self, message: String) -> None:
+        """Note that another node is ready."""
+        self._waiting_for.discard(message.data)
+        self._begin_if_ready()
+
+    def _begin_if_ready(self) -> None:
+        """Begin the run once every node is ready."""
+        if self._run_state == RunState.WAITING and not self._waiting_for and not self.endpoints.unmatched:
+            self._enter(RunState.RUNNING, "")
+            self._loop_clock.start()
+            self._publish_state()
+
+    # One tick
+
+    def _publish_state(self) -> None:
+        """Publish the state of this tick and, each reference period, everything that goes with it."""
+        plant = self._plant
+        now_ns = plant.stamp_ns
+        if now_ns % CLOCK_PERIOD_NS == 0:
+            self._publish[CLOCK].publish(Clock(clock=time_message(now_ns)))
+        if plant.tick % self.common.ticks_per_reference == 0:
+            self._publish_period(now_ns)
+        joints, odometry = self._state_wire.pack(plant.state)
+        self._publish[JOINT_STATES].publish(joints)
+        self._publish[BASE_ODOMETRY].publish(odometry)
+
+    def _publish_period(self, now_ns: int) -> None:
+        """Publish poses, momenta and energy of a reference period."""
+        receipt = self._plant.receipt
+        self._publish[DEPUTY_POSE].publish(pose_stamped(self._plant.deputy.deputy_in_world, now_ns))
+        for arm, pose in self._plant.tools_in_world.items():
+            self._publish[tool_pose(arm)].publish(pose_stamped(pose, now_ns))
+        self._publish[LINEAR_MOMENTUM].publish(vector_stamped(receipt.linear_momentum, now_ns))
+        self._publish[ANGULAR_MOMENTUM].publish(vector_stamped(receipt.angular_momentum, now_ns))
+        self._publish[ENERGY].publish(energy_message(receipt.kinetic_energy, self._plant.work, now_ns))
+
+    def _on_command(self, data: bytes) -> None:
+        """Take a command; in lock step it may complete the tick."""
+        if self._lockstep:
+            self._inputs.add(stamp_ns(data), JOINT_COMMAND, data)
+            self._advance()
+        else:
+            self._command = self._read_command(data)
+
+    def _on_phase(self, message: Any) -> None:
+        """Take the phase of the task; in lock step it may complete the tick."""
+        if self._lockstep:
+            self._inputs.add(stamp_ns_of(message.header.stamp), TASK_PHASE, message)
+            self._advance()
+        else:
+            self._execute(message)
+
+    def _advance(self) -> None:
+        """Integrate one tick if its command has come and nothing holds the plant back (lock step)."""
+        if self._run_state == RunState.PAUSED and self._steps_left == 0 and not self._reset_asked:
+            return
+        with_phase = self._plant.tick % self.common.ticks_per_reference == 0
+        names = (JOINT_COMMAND, TASK_PHASE) if with_phase else (JOINT_COMMAND,)
+        inputs = self._inputs.take(self._plant.stamp_ns, names)
+        if inputs is None or self.finished:
+            return
+        if self._reset_asked:
+            self._begin_anew()
+            return
+        if with_phase:
+            self._execute(inputs[TASK_PHASE])
+        if self._plant.tick == self._last_tick:
+            self._finish("the whole run is done")
+            return
+        self._plant.step(self._read_command(inputs[JOINT_COMMAND]))
+        self._loop_clock.ticked()
+        if self._steps_left:
+            self._steps_left -= 1
+            if self._steps_left == 0:
+                self._enter(RunState.PAUSED, "stepped")
+        self._publish_state()
+
+    def _tick_now(self) -> None:
+        """Integrate one tick with the last command that came (real time)."""
+        self._loop_clock.ticked(held=self._command.stamp_ns != self._plant.stamp_ns)
+        self._plant.step(self._command)
+        self._publish_state()
+        if self._reset_asked:
+            self._begin_anew()
+        elif self._plant.tick == self._last_tick:
+            self._finish("the whole run is done")
+
+    def _read_command(self, data: bytes) -> JointCommand:
+        """Return the command in a message."""
+        return JointCommand(stamp_ns(data), self._command_wire.read(data)["effort"])
+
+    def _execute(self, phase: Any) -> None:
+        """Carry out the grasp commands of a phase and tell what came of them."""
+        for event in self._plant.execute(task_phase(phase).commands):
+            self._publish[GRASP_EVENT].publish(event_message(event))
+            self.get_logger().info(f"{event.command.action.value}: {event.status.value}, {event.detail}")
+
+    # Pause, step, reset, end
+
+    def _on_pause(self, request: Any, response: Any) -> Any:
+        """Pause or resume."""
+        response.success = self._run_state in (RunState.RUNNING, RunState.PAUSED)
+        response.message = "" if response.success else "the run has not begun or is over"
+        if response.success and request.data and self._run_state == RunState.RUNNING:
+            self._enter(RunState.PAUSED, "on request")
+        elif response.success and not request.data and self._run_state == RunState.PAUSED:
+            self._steps_left = 0
+            self._enter(RunState.RUNNING, "")
+            self._loop_clock.start()
+            self._advance()
+        return response
+
+    def _on_step(self, request: Any, response: Any) -> Any:
+        """Let a paused plant go on for some ticks."""
+        response.success = self._lockstep and self._run_state == RunState.PAUSED and request.ticks > 0
+        if response.success:
+            self._steps_left = min(request.ticks, self._last_tick - self._plant.tick)
+            target_ns = self._plant.stamp_ns + self._steps_left * self.common.tick_ns
+            response.stamp = time_message(target_ns)
+            self._advance()
+        else:
+            response.message = "only a plant that is paused in lock step can step, by at least one tick"
+        return response
+
+    def _on_reset(self, request: Any, response: Any) -> Any:
+        """Begin the run anew as soon as this tick has been answered, so that no answer is left over."""
+        response.success = self._run_state != RunState.WAITING
+        response.message = "" if response.success else "the run has not begun"
+        if response.success and self.finished:
+            self._begin_anew()
+        elif response.success:
+            self._reset_asked = True
+            if self._lockstep:
+                self._advance()
+        return response
+
+    def _on_finish(self, request: Any, response: Any) -> Any:
+        """End the run at this tick."""
+        response.success = not self.finished
+        if response.success:
+            self._finish("stopped on request")
+        return response
+
+    def _begin_anew(self) -> None:
+        """Go back to time zero; the other nodes do so when they see the state of that time."""
+        self._reset_asked = False
+        self.finished = False
+        self._plant.reset()
+        self._inputs.reset()
+        self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
+        if self._run_state != RunState.PAUSED:
+            self._enter(RunState.RUNNING, "reset")
+        self._loop_clock.start()
+        self._publish_state()
+
+    def _finish(self, detail: str) -> None:
+        """Say that the run is over; every node then tells its counts."""
+        self.finished = True
+        self._enter(RunState.FINISHED, detail)
+        self.publish_counts()
+
+    def _enter(self, state: int, detail: str) -> None:
+        """Change the state of the run and tell everybody."""
+        self._run_state = state
+        message = RunState(header=header(self._plant.stamp_ns), state=state, tick=self._plant.tick)
+        message.detail = detail
+        self._publish[RUN_STATE].publish(message)
+
+    def _publish_timing(self) -> None:
+        """Publish how the loop has kept time over the last second, and say what it waits for."""
+        if self._run_state == RunState.RUNNING and not self.finished:
+            message = self._loop_clock.report(monotonic())
+            message.header = header(self._plant.stamp_ns)
+            self._publish[LOOP_TIMING].publish(message)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node."""
+    return run_node(PlantNode, args)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

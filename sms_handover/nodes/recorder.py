@@ -1,0 +1,222 @@
+"""The recorder node."""
+
+from collections.abc import Callable, Sequence
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+from time import monotonic, time_ns
+
+from geometry_msgs.msg import PoseStamped
+from rclpy.executors import Executor
+from rclpy.qos import QoSDurabilityPolicy, QoSProfile, QoSReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from sms_handover_interfaces.msg import PublishedCounts
+
+from sms_handover.bag.ledger import ledger_table
+from sms_handover.bag.parameters import RecorderParameters
+from sms_handover.bag.provenance import provenance
+from sms_handover.bag.recording import Recording
+from sms_handover.bag.stamp import stamp_ns
+from sms_handover.bag.transforms import TF_TYPE, transforms_cdr
+from sms_handover.errors import BagError, ConfigurationError, SmsHandoverError
+from sms_handover.frames import BASE, DEPUTY, WORLD
+from sms_handover.model.link_tree import link_transforms
+from sms_handover.ros.convert import pose_of_message
+from sms_handover.ros.graph_node import GraphNode
+from sms_handover.ros.main import EXIT_OK, Stop, run_node
+from sms_handover.ros.message_types import message_class
+from sms_handover.ros.peer_parameters import PeerParameters
+from sms_handover.ros.qos import LOSSLESS, profile_of, stored
+from sms_handover.ros.stamp_sync import StampSync
+from sms_handover.ros.wire import StateWire
+from sms_handover.simulation.parameters import LOCKSTEP
+from sms_handover.simulation.scenario import load_task
+from sms_handover.topics import (
+    BASE_ODOMETRY,
+    CLOCK_PERIOD_NS,
+    DEPUTY_POSE,
+    JOINT_STATES,
+    PLANT,
+    RECORDER,
+    RUN_PUBLISHED,
+    TF,
+    Rate,
+    Topic,
+)
+from sms_handover.types import Pose
+
+EXIT_LOSS = 3  # the bag is whole, but messages are missing in it
+
+_POLL_S = 0.05  # [s] of wall time between two looks at what else is to be done
+_DISCOVERY_PERIOD_S = 1.0  # [s] of wall time between two looks for topics beyond the graph
+_TF_INPUTS = (JOINT_STATES, BASE_ODOMETRY, DEPUTY_POSE)
+
+
+class RecorderNode(GraphNode[RecorderParameters]):
+    """Writes every message of the graph, as it came, to a rosbag2 MCAP bag.
+
+    It ends by itself when the run has ended and everything that the other nodes have published has come.
+    """
+
+    def __init__(self) -> None:
+        """Create the bag; raises BagError if it cannot, ConfigurationError on a bad parameter."""
+        super().__init__(RECORDER, RecorderParameters)
+        schedule = load_task(self.common, self.robot)
+        folder = self.parameters.folder or datetime.now().strftime("handover_%Y_%m_%d-%H_%M_%S")
+        try:
+            self._recording = Recording(Path(folder))
+        except BagError as error:
+            raise ConfigurationError(str(error)) from error
+        self._recording.describe(urdf=self.robot.urdf, schedule=schedule.text, provenance=provenance())
+        self._others = [peer for peer in self.common.peers if peer != RECORDER]
+        self._peer_parameters = PeerParameters(self, self.common.peers)
+        self._described = False
+        self._reported: set[str] = set()
+        self._last_message = monotonic()
+        self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
+        self._tf: StampSync[bytes] = StampSync()
+        self._topics: set[str] = set()
+        for topic in self.endpoints.topics:
+            self._record(topic)
+        self._recording.add_topic(TF, TF_TYPE, (stored(LOSSLESS),), self.common.reference_ns)
+        self._topics.add(TF)
+        if self.parameters.record_all:
+            self.create_timer(_DISCOVERY_PERIOD_S, self._look_for_topics)
+
+    def prepared(self) -> bool:
+        """Tell whether the parameters of every node have been written into the bag."""
+        if not self._described and self._peer_parameters.poll():
+            self._recording.describe(parameters=self._peer_parameters.values)
+            self._described = True
+        return self._described
+
+    def on_end(self) -> None:
+        """Do nothing: the recorder ends when everything has come."""
+
+    def diagnostic_values(self) -> dict[str, object]:
+        """Return how much has been recorded."""
+        counts = self._recording.writer.message_counts
+        return {"messages": sum(counts.values()), "topics": len(counts)}
+
+    def diagnostic_stamp_ns(self) -> int:
+        """Return the newest simulation time recorded."""
+        return self._recording.simulation_ns
+
+    def run(self, executor: Executor, stop: Stop) -> int:
+        """Record until the run is over and everything has come, or until asked to stop; close the bag."""
+        try:
+            while not stop.asked and not self._drained():
+                executor.spin_once(timeout_sec=_POLL_S)
+            if stop.asked:
+                self._take_the_rest(executor)
+        finally:
+            self._recording.close()
+        ledger = self._recording.ledger
+        print(ledger_table(ledger))
+        return EXIT_OK if ledger.complete else EXIT_LOSS
+
+    def _drained(self) -> bool:
+        """Tell whether the run is over and nothing is to be expected any more."""
+        if not self.finished:
+            return False
+        if self._reported.issuperset(self._others) and self._recording.ledger.complete:
+            return True
+        return monotonic() - self._last_message > self.parameters.drain_timeout
+
+    def _take_the_rest(self, executor: Executor) -> None:
+        """Take what is on the way when the recorder is asked to stop before the end of the run."""
+        self._last_message = monotonic()
+        while monotonic() - self._last_message < _POLL_S:
+            executor.spin_once(timeout_sec=_POLL_S)
+
+    def _record(self, topic: Topic) -> None:
+        """Record a topic of the graph."""
+        profile = profile_of(topic)
+        name = self.resolve_topic_name(topic.name)
+        periods = {
+            Rate.TICK: self.common.tick_ns,
+            Rate.REFERENCE: self.common.reference_ns,
+            Rate.CLOCK: CLOCK_PERIOD_NS,
+        }
+        evenly = self.common.mode == LOCKSTEP or topic.publishers == (PLANT,)
+        self._open(name, topic.type, profile, periods.get(topic.rate, 0) if evenly else 0)
+        receive: Callable[[bytes], None] = partial(self._receive, name)
+        if topic.name in _TF_INPUTS:
+            receive = partial(self._receive_for_tf, topic.name, name)
+        elif topic.name == RUN_PUBLISHED:
+            receive = partial(self._receive_counts, name)
+        self.endpoints.subscribe(topic.name, receive, raw=True)
+
+    def _open(self, name: str, type_name: str, profile: QoSProfile, period_ns: int) -> None:
+        """Open a topic in the bag."""
+        self._recording.add_topic(name, type_name, (stored(profile),), period_ns)
+        self._topics.add(name)
+
+    def _receive(self, name: str, data: bytes) -> None:
+        """Record one message."""
+        self._last_message = monotonic()
+        self._recording.receive(name, data, time_ns())
+
+    def _receive_counts(self, name: str, data: bytes) -> None:
+        """Record what a node has published in all, and note that it has told."""
+        self._receive(name, data)
+        self._reported.add(deserialize_message(data, PublishedCounts).node)
+
+    def _receive_for_tf(self, topic: str, name: str, data: bytes) -> None:
+        """Record one message and, each reference period, the transforms that follow from it."""
+        self._receive(name, data)
+        stamp = stamp_ns(data)
+        if stamp % self.common.reference_ns:
+            return
+        if stamp == 0:
+            self._tf.reset()
+        self._tf.add(stamp, topic, data)
+        inputs = self._tf.take(stamp, _TF_INPUTS)
+        if inputs is None:
+            return
+        state = self._state_wire.read(inputs[JOINT_STATES], inputs[BASE_ODOMETRY])
+        transforms = link_transforms(self.robot, state.base_in_world, state.joint_position)
+        transforms.append((WORLD, DEPUTY, _pose(inputs[DEPUTY_POSE])))
+        data = transforms_cdr(self._recording.writer.types, transforms, stamp)
+        self._recording.receive_at(TF, data, stamp, time_ns())
+
+    def _look_for_topics(self) -> None:
+        """Record topics beyond the graph, with the quality of service that their publishers offer."""
+        for name, type_names in self.get_topic_names_and_types():
+            publishers = self.get_publishers_info_by_topic(name)
+            if name in self._topics or not publishers:
+                continue
+            self._topics.add(name)
+            offers = [publisher.qos_profile for publisher in publishers]
+            try:
+                self._recording.add_topic(name, type_names[0], [stored(offer) for offer in offers])
+                kind = message_class(type_names[0])
+            except SmsHandoverError as error:
+                self.get_logger().warning(f"{name} is not recorded: {error}")
+                continue
+            self.create_subscription(kind, name, partial(self._receive, name), _weakest(offers), raw=True)
+
+
+def _weakest(offers: Sequence[QoSProfile]) -> QoSProfile:
+    """Return a profile that every one of the offered ones can serve."""
+    reliable = all(offer.reliability == QoSReliabilityPolicy.RELIABLE for offer in offers)
+    latched = all(offer.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
+    return QoSProfile(
+        history=LOSSLESS.history,
+        reliability=LOSSLESS.reliability if reliable else QoSReliabilityPolicy.BEST_EFFORT,
+        durability=QoSDurabilityPolicy.TRANSIENT_LOCAL if latched else QoSDurabilityPolicy.VOLATILE,
+    )
+
+
+def _pose(data: bytes) -> Pose:
+    """Return the pose in the bytes of a PoseStamped."""
+    return pose_of_message(deserialize_message(data, PoseStamped).pose)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node."""
+    return run_node(RecorderNode, args)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,154 @@
+"""The trajectory node."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from sms_handover_interfaces.srv import SolveIK
+
+from sms_handover.bag.stamp import stamp_ns
+from sms_handover.errors import GraphError
+from sms_handover.frames import BASE, WORLD
+from sms_handover.ros.convert import (
+    joint_positions_message,
+    joints_in_order,
+    phase_message,
+    pose_message,
+    pose_of_message,
+    pose_stamped,
+    stamp_ns_of,
+)
+from sms_handover.ros.graph_node import GraphNode
+from sms_handover.ros.main import run_node
+from sms_handover.ros.stamp_sync import StampSync
+from sms_handover.ros.wire import JointStateWire, StateWire
+from sms_handover.simulation.scenario import load_task
+from sms_handover.topics import (
+    BASE_ODOMETRY,
+    DEPUTY_POSE,
+    IK_STATUS,
+    JOINT_REFERENCE,
+    JOINT_STATES,
+    SOLVE_IK,
+    TASK_PHASE,
+    TRAJECTORY,
+    target_pose,
+)
+from sms_handover.trajectory.generator import Targets, TrajectoryGenerator
+from sms_handover.trajectory.parameters import TrajectoryParameters
+from sms_handover.types import Array, RobotState, TaskPhase
+
+_INPUTS = (JOINT_STATES, BASE_ODOMETRY, DEPUTY_POSE)
+
+
+class TrajectoryNode(GraphNode[TrajectoryParameters]):
+    """Each reference period: targets from the schedule, joints from ``solve_ik``, and the reference.
+
+    While a request is under way a later state waits; in lock step none comes.
+    """
+
+    def __init__(self) -> None:
+        """Read the schedule; raises ScheduleError."""
+        super().__init__(TRAJECTORY, TrajectoryParameters)
+        schedule = load_task(self.common, self.robot)
+        self._generator = TrajectoryGenerator(self.robot, schedule, self.parameters)
+        self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
+        self._reference_wire = JointStateWire(self.robot.joint_names, ("position", "velocity"))
+        self._inputs: StampSync[Any] = StampSync()
+        self._stamp_ns = -1
+        self._failures = 0
+        self._solver = self.create_client(SolveIK, SOLVE_IK)
+        self._phase = self.endpoints.publisher(TASK_PHASE)
+        self._ik_status = self.endpoints.publisher(IK_STATUS)
+        self._reference = self.endpoints.publisher(JOINT_REFERENCE)
+        self._targets = {arm: self.endpoints.publisher(target_pose(arm)) for arm in self.robot.arms}
+        for topic in (JOINT_STATES, BASE_ODOMETRY):
+            self.endpoints.subscribe(topic, self._taker(topic), raw=True)
+        self.endpoints.subscribe(DEPUTY_POSE, self._on_deputy)
+
+    def prepared(self) -> bool:
+        """Tell whether the IK service is there."""
+        return bool(self._solver.service_is_ready())
+
+    def diagnostic_values(self) -> dict[str, object]:
+        """Return how many references were given and how many IK requests did not converge."""
+        return {"references": self._reference.count, "ik_not_converged": self._failures}
+
+    def diagnostic_stamp_ns(self) -> int:
+        """Return the stamp of the last reference."""
+        return max(self._stamp_ns, 0)
+
+    def _taker(self, topic: str) -> Any:
+        """Return the callback of a raw topic, which skips what is not on a reference period."""
+        period_ns = self.common.reference_ns
+
+        def callback(data: bytes) -> None:
+            stamp = stamp_ns(data)
+            if stamp % period_ns == 0:
+                self._take(topic, stamp, data)
+
+        return callback
+
+    def _on_deputy(self, message: Any) -> None:
+        """Take the pose of the deputy."""
+        self._take(DEPUTY_POSE, stamp_ns_of(message.header.stamp), message)
+
+    def _take(self, topic: str, stamp: int, value: Any) -> None:
+        """Take one input; time zero behind a later time begins the run anew."""
+        if stamp == 0 and self._stamp_ns >= 0:
+            self._inputs.reset()
+            self._generator.reset()
+            self._stamp_ns = -1
+        self._inputs.add(stamp, topic, value)
+        inputs = self._inputs.take(stamp, _INPUTS)
+        if inputs is None:
+            return
+        self._stamp_ns = stamp
+        state = self._state_wire.read(inputs[JOINT_STATES], inputs[BASE_ODOMETRY])
+        phase, targets = self._generator.targets(state, pose_of_message(inputs[DEPUTY_POSE].pose))
+        if targets.tool_in_world:
+            self._ask(state, phase, targets)
+        else:
+            self._publish(state, phase, targets, targets.joint_position)
+
+    def _ask(self, state: RobotState, phase: TaskPhase, targets: Targets) -> None:
+        """Ask the IK service, and publish when it has answered."""
+        question = self._generator.ik_request(state, targets)
+        request = SolveIK.Request(
+            base_in_world=pose_message(question.base_in_world),
+            seed=joint_positions_message(self.robot.joint_names, question.seed, state.stamp_ns),
+            arms=list(question.tool_in_world),
+            tool_in_world=[pose_message(pose) for pose in question.tool_in_world.values()],
+        )
+        future = self._solver.call_async(request)
+        future.add_done_callback(lambda done: self._on_solution(state, phase, targets, done.result()))
+
+    def _on_solution(self, state: RobotState, phase: TaskPhase, targets: Targets, answer: Any) -> None:
+        """Publish the reference that follows from a solution, converged or not."""
+        if not answer.valid:
+            raise GraphError(f"the IK service refused a request: {answer.message}")
+        self._failures += answer.status.status != answer.status.CONVERGED
+        self._ik_status.publish(answer.status)
+        solution = answer.solution
+        joints = joints_in_order(self.robot.joint_names, solution.name, solution.position)
+        self._publish(state, phase, targets, joints)
+
+    def _publish(self, state: RobotState, phase: TaskPhase, targets: Targets, joints: Array) -> None:
+        """Publish phase, targets and reference of one period."""
+        reference, targets_in_world = self._generator.reference(state, targets, joints)
+        for arm, pose in targets_in_world.items():
+            self._targets[arm].publish(pose_stamped(pose, state.stamp_ns))
+        self._phase.publish(phase_message(phase))
+        self._reference.publish(
+            self._reference_wire.pack(
+                state.stamp_ns, position=reference.position, velocity=reference.velocity
+            )
+        )
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node."""
+    return run_node(TrajectoryNode, args)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

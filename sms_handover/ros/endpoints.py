@@ -1,0 +1,112 @@
+"""The publishers and subscriptions of a node, made from the table of topics and counted."""
+
+from collections.abc import Callable, Collection
+from time import monotonic, sleep
+from typing import Any
+
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.subscription import Subscription
+
+from sms_handover.errors import GraphError
+from sms_handover.ros.message_types import message_class
+from sms_handover.ros.qos import profile_of
+from sms_handover.topics import RECORDER, Topic
+
+_RclError = rclpy_implementation.RCLError
+
+_RETRY_S = 0.001  # [s] between two tries to publish while a reader is behind
+_PATIENCE_S = 30.0  # [s] after which a reader that takes nothing is given up
+
+
+class Endpoints:
+    """Makes a node's publishers and subscriptions, tells when all have matched, counts what it publishes."""
+
+    def __init__(self, node: Node, topics: Collection[Topic], peers: Collection[str]) -> None:
+        """Prepare for a node among ``peers``, which are the nodes that take part in this run."""
+        self._node = node
+        self._topics = {topic.name: topic for topic in topics}
+        self._peers = frozenset(peers)
+        self._publishers: dict[str, CountedPublisher] = {}
+        self._subscriptions: dict[str, Subscription] = {}
+
+    def publisher(self, name: str) -> "CountedPublisher":
+        """Return a publisher on a topic of the table."""
+        topic = self._topics[name]
+        publisher = self._node.create_publisher(message_class(topic.type), topic.name, profile_of(topic))
+        self._publishers[name] = CountedPublisher(publisher)
+        return self._publishers[name]
+
+    def subscribe(self, name: str, callback: Callable[[Any], None], *, raw: bool = False) -> None:
+        """Call ``callback`` with every message of a topic of the table, as CDR bytes if ``raw``."""
+        topic = self._topics[name]
+        self._subscriptions[name] = self._node.create_subscription(
+            message_class(topic.type), topic.name, callback, profile_of(topic), raw=raw
+        )
+
+    @property
+    def unmatched(self) -> list[str]:
+        """Return in words what has not been found yet of the endpoints of the peers."""
+        me = self._node.get_name()
+        missing = []
+        for name, publisher in self._publishers.items():
+            readers = (self._peers & set(self._topics[name].subscribers)) - {me}
+            expected = len(readers) + (RECORDER in self._peers)
+            found = publisher.subscription_count
+            if found < expected:
+                missing.append(f"{found} of {expected} subscriptions of {name}")
+        for name, subscription in self._subscriptions.items():
+            expected = len((self._peers & set(self._topics[name].publishers)) - {me})
+            found = subscription.get_publisher_count()
+            if found < expected:
+                missing.append(f"{found} of {expected} publishers of {name}")
+        return missing
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Return how many messages have been published on each topic, by its full name."""
+        return {publisher.topic_name: publisher.count for publisher in self._publishers.values()}
+
+    @property
+    def topics(self) -> tuple[Topic, ...]:
+        """Return every topic of the graph."""
+        return tuple(self._topics.values())
+
+
+class CountedPublisher:
+    """A publisher that counts, and waits when a reader is too far behind."""
+
+    def __init__(self, publisher: Publisher) -> None:
+        """Wrap a publisher of rclpy."""
+        self._publisher = publisher
+        self.count = 0
+
+    @property
+    def topic_name(self) -> str:
+        """Return the full name of the topic."""
+        return str(self._publisher.topic_name)
+
+    @property
+    def subscription_count(self) -> int:
+        """Return the number of matched subscriptions."""
+        return int(self._publisher.get_subscription_count())
+
+    def publish(self, message: Any) -> None:
+        """Publish a message or CDR bytes; raises GraphError if a reader takes nothing for a long time.
+
+        With KEEP_ALL history a full queue refuses the message; that is the back-pressure, so it is
+        tried again.
+        """
+        begin = 0.0
+        while True:
+            try:
+                self._publisher.publish(message)
+            except _RclError as error:
+                begin = begin or monotonic()
+                if monotonic() - begin > _PATIENCE_S:
+                    raise GraphError(f"a reader of {self.topic_name} is stuck: {error}") from error
+                sleep(_RETRY_S)
+            else:
+                self.count += 1
+                return

@@ -1,0 +1,120 @@
+"""What every node of the graph does alike: parameters, matching, readiness, counts, diagnostics."""
+
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.executors import Executor
+from sms_handover_interfaces.msg import PublishedCounts, RunState
+from std_msgs.msg import String
+
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.parameters import EVERY_NODE
+from sms_handover.ros.convert import stamp_ns_of, time_message
+from sms_handover.ros.endpoints import Endpoints
+from sms_handover.ros.main import EXIT_OK, RunnableNode, Stop, spin
+from sms_handover.ros.parameters import declare, refuse_unknown
+from sms_handover.simulation.parameters import CommonParameters
+from sms_handover.simulation.scenario import load_robot_model
+from sms_handover.topics import DIAGNOSTICS, PLANT, RUN_PUBLISHED, RUN_READY, RUN_STATE, graph_topics
+
+P = TypeVar("P")
+
+_DIAGNOSTICS_PERIOD_S = 1.0  # [s] of wall time
+_MATCHING_PERIOD_S = 0.02  # [s] of wall time between two looks at who has matched
+
+
+class GraphNode(RunnableNode, Generic[P]):
+    """A node with its parameter group ``P``, its endpoints, and its part in start and end of a run.
+
+    A run starts when every node has found the endpoints it needs and has said so on ``run/ready``;
+    when the plant says that it has ended, every node tells how much it has published.
+    """
+
+    def __init__(self, name: str, group: type[P]) -> None:
+        """Declare the parameters and load the robot; raises ConfigurationError."""
+        super().__init__(name, automatically_declare_parameters_from_overrides=True)
+        self.common: CommonParameters = declare(self, CommonParameters, "common.yaml", EVERY_NODE)
+        self.parameters: P = declare(self, group, f"{name}.yaml", name)
+        refuse_unknown(self, CommonParameters, group)
+        self.robot: RobotModel = load_robot_model(self.common)
+        self.endpoints = Endpoints(self, graph_topics(self.robot.arms), self.common.peers)
+        self.finished = False
+        self._counts = self.endpoints.publisher(RUN_PUBLISHED)
+        self._diagnostics = self.endpoints.publisher(DIAGNOSTICS)
+        if name != PLANT:
+            self._ready = self.endpoints.publisher(RUN_READY)
+            self.endpoints.subscribe(RUN_STATE, self._on_run_state)
+        self._matching = self.create_timer(_MATCHING_PERIOD_S, self._look_for_peers)
+        self.create_timer(_DIAGNOSTICS_PERIOD_S, self._publish_diagnostics)
+
+    def run(self, executor: Executor, stop: Stop) -> int:
+        """Handle events until asked to stop, and return the exit code; a node may override this."""
+        spin(executor, stop)
+        return EXIT_OK
+
+    def prepared(self) -> bool:
+        """Tell whether this node has what it needs besides its topics; a node may override this."""
+        return True
+
+    def on_matched(self) -> None:
+        """Do what is due once every endpoint has matched: by default, say that this node is ready."""
+        self._ready.publish(String(data=self.get_name()))
+
+    def on_end(self) -> None:
+        """Do what is due at the end of the run: by default, tell what has been published."""
+        self.publish_counts()
+
+    def diagnostic_values(self) -> dict[str, object]:
+        """Return what the diagnostics of this node tell; a node may override this."""
+        return {}
+
+    def diagnostic_stamp_ns(self) -> int:
+        """Return the simulation time of the diagnostics; a node may override this."""
+        return 0
+
+    def publish_counts(self) -> None:
+        """Tell how many messages have gone out on every topic that ends with the run."""
+        counts = self.endpoints.counts
+        for still_growing in (self._counts, self._diagnostics):
+            del counts[still_growing.topic_name]
+        self._counts.publish(
+            PublishedCounts(node=self.get_name(), topics=list(counts), counts=list(counts.values()))
+        )
+
+    def _look_for_peers(self) -> None:
+        """Go on once every endpoint has matched."""
+        if self.prepared() and not self.endpoints.unmatched:
+            self._matching.cancel()
+            self.on_matched()
+
+    def _on_run_state(self, message: RunState) -> None:
+        """Take notice of the end of the run, or of its beginning anew."""
+        ended = message.state in (RunState.FINISHED, RunState.FAILED)
+        if ended and not self.finished:
+            self.on_end()
+        self.finished = ended
+
+    def _publish_diagnostics(self) -> None:
+        """Publish the state of this node once a second."""
+        waiting = self.endpoints.unmatched if not self._matching.is_canceled() else []
+        level = DiagnosticStatus.WARN if waiting else DiagnosticStatus.OK
+        values = [KeyValue(key=key, value=str(value)) for key, value in self.diagnostic_values().items()]
+        status = DiagnosticStatus(
+            level=level,
+            name=self.get_name(),
+            message="waiting for " + ", ".join(waiting) if waiting else "running",
+            values=values,
+        )
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = time_message(self.diagnostic_stamp_ns())
+        self._diagnostics.publish(message)
+
+
+def by_stamp(take: Callable[[int, Any], None]) -> Callable[[Any], None]:
+    """Return a callback that hands on a message with the stamp of its header in ns."""
+
+    def callback(message: Any) -> None:
+        take(stamp_ns_of(message.header.stamp), message)
+
+    return callback

@@ -1,0 +1,73 @@
+"""Runs one node as a process: start, spin, orderly end, and one line of text for every error."""
+
+import signal
+import sys
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+
+import rclpy
+from rclpy.executors import Executor
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from sms_handover.errors import ConfigurationError, SmsHandoverError
+
+EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
+
+_WAIT_S = 0.2  # [s] longest wait for an event, so that a signal is noticed
+
+
+class Stop:
+    """Set by SIGINT, SIGTERM or SIGHUP."""
+
+    def __init__(self) -> None:
+        """Install the handlers."""
+        self.asked = False
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self._on_signal)
+
+    def _on_signal(self, number: int, frame: object) -> None:
+        self.asked = True
+
+
+class RunnableNode(Node, ABC):
+    """A node that can be run as a process."""
+
+    @abstractmethod
+    def run(self, executor: Executor, stop: Stop) -> int:
+        """Work until asked to stop; return the exit code."""
+
+
+def run_node(make: Callable[[], RunnableNode], args: Sequence[str] | None = None) -> int:
+    """Run the node that ``make`` returns until a signal ends it; return the exit code.
+
+    The executor is only ever used with a timeout: without one, EventsExecutor does not return in
+    the wheels of rclpy 7.1.
+    """
+    stop = Stop()
+    rclpy.init(args=list(sys.argv if args is None else args), signal_handler_options=SignalHandlerOptions.NO)
+    name = "node"
+    node = None
+    try:
+        node = make()
+        name = node.get_name()
+        executor = EventsExecutor()
+        executor.add_node(node)
+        return node.run(executor, stop)
+    except ConfigurationError as error:
+        print(f"{name}: error: {error}", file=sys.stderr)
+        return EXIT_USAGE
+    except SmsHandoverError as error:
+        print(f"{name}: error: {error}", file=sys.stderr)
+        return EXIT_FAILED
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def spin(executor: Executor, stop: Stop) -> None:
+    """Handle events until asked to stop."""
+    while not stop.asked:
+        executor.spin_once(timeout_sec=_WAIT_S)

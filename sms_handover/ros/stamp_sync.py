@@ -1,0 +1,44 @@
+"""Brings together inputs of equal stamp, whatever order they arrive in."""
+
+from typing import Generic, TypeVar
+
+V = TypeVar("V")
+
+_LONGEST = 64  # [stamps] waiting at most; more means that an input has stopped
+
+
+class StampSync(Generic[V]):
+    """Keeps inputs until all that belong to one stamp are there.
+
+    Inputs have names. Stamps older than the last one taken are dropped and counted.
+    """
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._waiting: dict[int, dict[str, V]] = {}
+        self._taken_ns = -1
+        self.dropped = 0
+
+    def reset(self) -> None:
+        """Forget everything, as at the start of a run."""
+        self._waiting.clear()
+        self._taken_ns = -1
+
+    def add(self, stamp_ns: int, name: str, value: V) -> None:
+        """Keep an input."""
+        if stamp_ns <= self._taken_ns:
+            self.dropped += 1
+            return
+        self._waiting.setdefault(stamp_ns, {})[name] = value
+        if len(self._waiting) > _LONGEST:
+            self.dropped += len(self._waiting.pop(min(self._waiting)))
+
+    def take(self, stamp_ns: int, names: tuple[str, ...]) -> dict[str, V] | None:
+        """Return the inputs of a stamp if all the named ones are there, else None."""
+        inputs = self._waiting.get(stamp_ns)
+        if inputs is None or any(name not in inputs for name in names):
+            return None
+        self._taken_ns = stamp_ns
+        for old in [stamp for stamp in self._waiting if stamp <= stamp_ns]:
+            del self._waiting[old]
+        return inputs

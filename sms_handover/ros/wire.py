@@ -1,0 +1,171 @@
+"""The three messages of the hot path as CDR bytes, packed and read by a template.
+
+A JointState or Odometry of the loop has the same names every time, so its layout is fixed: the
+bytes of one message serve as a template in which only stamp and numbers are exchanged. A message
+of another layout (other names, other order, another sender's padding) is read the general way, by name.
+"""
+
+import struct
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from nav_msgs.msg import Odometry
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+
+from sms_handover.bag.message_types import MessageTypes
+from sms_handover.bag.stamp import stamp_ns
+from sms_handover.errors import GraphError
+from sms_handover.ros.convert import joints_in_order, pose_of_message
+from sms_handover.types import Array, Pose, RobotState, Twist
+from sms_handover.units import NS_PER_S
+
+_STAMP = struct.Struct("<iI")  # seconds, nanoseconds
+_STAMP_AT = 4  # [byte] behind the encapsulation header
+_BODY_AT = _STAMP_AT + _STAMP.size
+_LENGTH = 4  # [byte] of the length before a sequence
+_LITTLE_ENDIAN = b"\x00\x01"  # encapsulation of plain CDR
+
+
+class JointStateWire:
+    """Packs and reads JointState messages for one list of joints."""
+
+    def __init__(self, names: Sequence[str], blocks: Sequence[str]) -> None:
+        """Fix the joint names and which of position, velocity and effort are filled."""
+        self._names = tuple(names)
+        self._blocks = tuple(blocks)
+        n = len(self._names)
+        marked = {block: np.full(n, float(i + 1)) for i, block in enumerate(self._blocks)}
+        self._template = _joint_state(self._names, marked)
+        self._at = {block: _find(self._template, values) for block, values in marked.items()}
+        self._fixed = self._template[_BODY_AT : min(self._at.values()) - _LENGTH]
+
+    def pack(self, stamp_ns: int, **blocks: Array) -> bytes:
+        """Return the bytes of a message with a stamp and the arrays (n,) of every block."""
+        buffer = bytearray(self._template)
+        _STAMP.pack_into(buffer, _STAMP_AT, stamp_ns // NS_PER_S, stamp_ns % NS_PER_S)
+        for block, at in self._at.items():
+            values = blocks[block]
+            buffer[at : at + values.nbytes] = values.tobytes()
+        return bytes(buffer)
+
+    def read(self, data: bytes) -> dict[str, Array]:
+        """Return the arrays (n,) of every block in the order of the joints; raises GraphError."""
+        if len(data) == len(self._template) and self._same_layout(data):
+            n = len(self._names)
+            return {block: np.frombuffer(data, "<f8", n, at) for block, at in self._at.items()}
+        message: Any = deserialize_message(data, JointState)
+        return {b: joints_in_order(self._names, message.name, getattr(message, b)) for b in self._blocks}
+
+    def _same_layout(self, data: bytes) -> bool:
+        """Tell whether the bytes are little endian and have the names where the template has them."""
+        return data.startswith(_LITTLE_ENDIAN) and data.startswith(self._fixed, _BODY_AT)
+
+
+class OdometryWire:
+    """Packs and reads Odometry messages between two frames; covariances stay zero."""
+
+    def __init__(self, frame: str, child_frame: str) -> None:
+        """Fix the names of the frames."""
+        self._frames = (frame, child_frame)
+        pose, twist = np.arange(1.0, 8.0), np.arange(11.0, 17.0)
+        self._template = _odometry(frame, child_frame, pose, twist)
+        self._pose_at = _find(self._template, pose)
+        self._twist_at = _find(self._template, twist)
+        self._fixed = self._template[_BODY_AT : self._pose_at]
+
+    def pack(self, stamp_ns: int, pose: Pose, twist: Twist) -> bytes:
+        """Return the bytes of a message with a stamp, a pose and a twist."""
+        buffer = bytearray(self._template)
+        _STAMP.pack_into(buffer, _STAMP_AT, stamp_ns // NS_PER_S, stamp_ns % NS_PER_S)
+        struct.pack_into("<7d", buffer, self._pose_at, *pose.position, *pose.quaternion_xyzw)
+        struct.pack_into("<6d", buffer, self._twist_at, *twist.linear, *twist.angular)
+        return bytes(buffer)
+
+    def read(self, data: bytes) -> tuple[Pose, Twist]:
+        """Return pose and twist; raises GraphError if the frames are others."""
+        if data.startswith(_LITTLE_ENDIAN) and data.startswith(self._fixed, _BODY_AT):
+            pose = np.frombuffer(data, "<f8", 7, self._pose_at)
+            twist = np.frombuffer(data, "<f8", 6, self._twist_at)
+            return Pose(pose[:3], pose[3:]), Twist(twist[:3], twist[3:])
+        message: Any = deserialize_message(data, Odometry)
+        frames = (message.header.frame_id, message.child_frame_id)
+        if frames != self._frames:
+            raise GraphError(f"an odometry message is between frames {frames}, expected {self._frames}")
+        linear, angular = message.twist.twist.linear, message.twist.twist.angular
+        return pose_of_message(message.pose.pose), Twist(_array(linear), _array(angular))
+
+
+class StateWire:
+    """Packs and reads the two messages that carry a robot state."""
+
+    def __init__(self, joint_names: Sequence[str], world: str, base: str) -> None:
+        """Fix joint and frame names."""
+        self._joints = JointStateWire(joint_names, ("position", "velocity", "effort"))
+        self._odometry = OdometryWire(world, base)
+
+    def pack(self, state: RobotState) -> tuple[bytes, bytes]:
+        """Return the bytes of the JointState and the Odometry of a state."""
+        joints = self._joints.pack(
+            state.stamp_ns,
+            position=state.joint_position,
+            velocity=state.joint_velocity,
+            effort=state.joint_effort,
+        )
+        odometry = self._odometry.pack(state.stamp_ns, state.base_in_world, state.twist_base_in_base)
+        return joints, odometry
+
+    def read(self, joints: bytes, odometry: bytes) -> RobotState:
+        """Return the state that two messages of equal stamp carry."""
+        blocks = self._joints.read(joints)
+        base_in_world, twist = self._odometry.read(odometry)
+        return RobotState(
+            stamp_ns(joints), base_in_world, twist, blocks["position"], blocks["velocity"], blocks["effort"]
+        )
+
+
+def _array(vector: Any) -> Array:
+    """Return the components (3,) of a Vector3."""
+    return np.array([vector.x, vector.y, vector.z])
+
+
+def _joint_state(names: tuple[str, ...], blocks: dict[str, Array]) -> bytes:
+    """Return the bytes of a JointState with stamp zero; blocks that are not given are empty."""
+    types = MessageTypes()
+    arrays = {block: blocks.get(block, np.zeros(0)) for block in ("position", "velocity", "effort")}
+    message = types.make("sensor_msgs/msg/JointState", header=_header(types, ""), name=list(names), **arrays)
+    return types.serialize(message)
+
+
+def _odometry(frame: str, child_frame: str, pose: Array, twist: Array) -> bytes:
+    """Return the bytes of an Odometry with stamp zero and zero covariances."""
+    types = MessageTypes()
+
+    def geometry(name: str, **values: Any) -> Any:
+        return types.make(f"geometry_msgs/msg/{name}", **values)
+
+    def vector(name: str, values: Array) -> Any:
+        return geometry(name, **dict(zip("xyzw", values.tolist(), strict=False)))
+
+    where = geometry("Pose", position=vector("Point", pose[:3]), orientation=vector("Quaternion", pose[3:]))
+    motion = geometry("Twist", linear=vector("Vector3", twist[:3]), angular=vector("Vector3", twist[3:]))
+    message = types.make(
+        "nav_msgs/msg/Odometry",
+        header=_header(types, frame),
+        child_frame_id=child_frame,
+        pose=geometry("PoseWithCovariance", pose=where, covariance=np.zeros(36)),
+        twist=geometry("TwistWithCovariance", twist=motion, covariance=np.zeros(36)),
+    )
+    return types.serialize(message)
+
+
+def _header(types: MessageTypes, frame: str) -> Any:
+    """Return a header with stamp zero."""
+    time = types.make("builtin_interfaces/msg/Time", sec=0, nanosec=0)
+    return types.make("std_msgs/msg/Header", stamp=time, frame_id=frame)
+
+
+def _find(raw: bytes, values: Array) -> int:
+    """Return where the doubles of an array stand in the bytes of a message."""
+    return raw.index(values.tobytes())
