@@ -161,8 +161,8 @@ def _drift(nmpc: RunMetrics, pid: RunMetrics) -> Claim:
         ratios.append(overall.pid > 0.0 and overall.pid >= DRIFT_RATIO * overall.nmpc)
     return Claim(
         "drift",
-        f"After all tools have settled under both laws, the base drifts at least {DRIFT_RATIO:g} times as fast "
-        "under PID as under NMPC, in position and in attitude (all windows together).",
+        f"After all tools have settled under both laws, the base drifts at least {DRIFT_RATIO:g} times as "
+        "fast under PID as under NMPC, in position and in attitude (all windows together).",
         "In the case of the PID controller, the base spacecraft experiences drift after the "
         "end-effectors reach their goal poses. [...] This issue is not present with the NMPC controller.",
         tuple(findings),
@@ -197,7 +197,9 @@ def _duration(metrics: RunMetrics, name: str) -> float:
 def _peak_torque(nmpc: RunMetrics, pid: RunMetrics) -> Claim:
     """Judge whether the largest torque of any joint is about 2 N m under each law."""
     low, high = PEAK_TORQUE
-    finding = Finding("largest torque of any joint", "N m", largest(nmpc.torque.peak), largest(pid.torque.peak))
+    finding = Finding(
+        "largest torque of any joint", "N m", largest(nmpc.torque.peak), largest(pid.torque.peak)
+    )
     return Claim(
         "peak_torque",
         f"The largest torque of any joint is about 2 N m under each law ({low:g} to {high:g}).",
@@ -210,11 +212,13 @@ def _peak_torque(nmpc: RunMetrics, pid: RunMetrics) -> Claim:
 def _final_error(nmpc: RunMetrics, pid: RunMetrics) -> Claim:
     """Judge whether NMPC brings every tool to its target by the end of every phase."""
     worst = [
-        largest([tool.final_error for phase in run.phases for tool in phase.tools.values()]) for run in (nmpc, pid)
+        largest([tool.final_error for phase in run.phases for tool in phase.tools.values()])
+        for run in (nmpc, pid)
     ]
     return Claim(
         "final_error",
-        f"Under NMPC every tool is within {FINAL_ERROR * MM_PER_M:g} mm of its target at the end of every phase.",
+        f"Under NMPC every tool is within {FINAL_ERROR * MM_PER_M:g} mm of its target at the end of every "
+        "phase.",
         "The manipulators are given extra time for each tasks to ensure they can achieve the desired pose",
         (Finding("largest distance at the end of a phase", "mm", *(value * MM_PER_M for value in worst)),),
         worst[0] < FINAL_ERROR,
@@ -252,5 +256,3 @@ def _all_larger(findings: Iterable[Finding]) -> bool:
     """Tell whether there are findings, and in each of them PID's value is the larger one."""
     compared = [finding.pid > finding.nmpc for finding in findings]
     return bool(compared) and all(compared)
-
-

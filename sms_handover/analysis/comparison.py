@@ -8,6 +8,7 @@ from types import MappingProxyType
 from sms_handover.analysis.base_motion import BaseMotion
 from sms_handover.analysis.claims import Claim, judge
 from sms_handover.analysis.metrics import RunMetrics, common_settling, measure
+from sms_handover.errors import UnknownNameError
 from sms_handover.run_data import RunData
 
 NMPC = "nmpc"
@@ -39,8 +40,11 @@ def compare(runs: Mapping[str, RunData], laws: Mapping[str, str] | None = None) 
     """Return the comparison of runs by name.
 
     ``laws`` has the control law of each run; without it a run whose name holds the word ``nmpc`` or
-    ``pid`` is taken to be under that law.
+    ``pid`` is taken to be under that law. Raises UnknownNameError for a law of a run that is not there.
     """
+    for name in laws or {}:
+        if name not in runs:
+            raise UnknownNameError("run", name, runs, "control laws")
     metrics = {name: measure(run) for name, run in runs.items()}
     names = tuple(dict.fromkeys(item.phase.name for run in metrics.values() for item in run.phases))
     begins = {name: common_settling(metrics.values(), name) for name in names}

@@ -43,7 +43,8 @@ def layout(names: Sequence[str], sections: Sequence[Section]) -> list[str]:
     """Return the lines of the sections, with as many runs side by side as fit."""
     short = [name if len(name) <= _LONGEST_NAME else f"...{name[3 - _LONGEST_NAME :]}" for name in names]
     rows = [item for section in sections for item in section.rows]
-    label = max([len(item.label) for item in rows if item.cells], default=0)
+    labels = [*(section.title for section in sections), *(item.label for item in rows if item.cells)]
+    label = max(map(len, labels), default=0)
     cell = max(map(len, [*short, *(text for item in rows for text in item.cells)]), default=0)
     at_once = max(1, (WIDTH - label) // (cell + len(_GAP)))
     lines = []
@@ -58,4 +59,4 @@ def layout(names: Sequence[str], sections: Sequence[Section]) -> list[str]:
 
 def _line(item: Row, label: int, cell: int) -> str:
     """Return one row with its cells to the right."""
-    return item.label.ljust(label) + "".join(_GAP + text.rjust(cell) for text in item.cells)
+    return (item.label.ljust(label) + "".join(_GAP + text.rjust(cell) for text in item.cells)).rstrip()

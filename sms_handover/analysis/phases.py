@@ -1,6 +1,7 @@
 """The phases of a run as spans of time and of rows."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -49,7 +50,9 @@ def phase_spans(run: RunData) -> tuple[PhaseSpan, ...]:
 def _span(run: RunData, index: int, name: str, time_ns: tuple[int, int], *, is_last: bool) -> PhaseSpan:
     """Return the span of a phase with its rows and ticks looked up."""
     start_ns, end_ns = time_ns
-    row_side = "right" if is_last else "left"  # the row at the end has the targets of the next phase
+    row_side: Literal["left", "right"] = (
+        "right" if is_last else "left"
+    )  # the row at the end has the targets of the next phase
     rows = slice(
         int(np.searchsorted(run.reference_ns, start_ns)),
         int(np.searchsorted(run.reference_ns, end_ns, row_side)),

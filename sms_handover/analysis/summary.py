@@ -25,9 +25,7 @@ _TIME_HISTORIES = {"phase", "stamp_ns", "position_error", "orientation_error"}
 def summary(comparison: Comparison) -> Summary:
     """Return the figures of a comparison, without time histories, ready for ``json.dumps``."""
     return {
-        "runs": {
-            name: _run(metrics, comparison.drift[name]) for name, metrics in comparison.runs.items()
-        },
+        "runs": {name: _run(metrics, comparison.drift[name]) for name, metrics in comparison.runs.items()},
         "claims": [_claim(claim) for claim in comparison.claims],
     }
 

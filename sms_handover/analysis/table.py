@@ -12,7 +12,7 @@ from sms_handover.analysis.metrics import PhaseMetrics, RunMetrics
 from sms_handover.analysis.numbers import largest
 from sms_handover.analysis.tracking import Motion, ToolTracking
 from sms_handover.run_data import RunData
-from sms_handover.types import GraspAction, GraspCommand
+from sms_handover.types import GraspAction, GraspCommand, GraspEvent
 from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
 
 _MICRO = 1e6
@@ -45,10 +45,7 @@ def render(comparison: Comparison, tolerance: Tolerance | None = None) -> str:
     ]
     lines = layout(list(comparison.runs), sections)
     if comparison.claims:
-        held = sum(claim.holds for claim in comparison.claims)
-        lines += ["", f"Claims of the paper: {held} of {len(comparison.claims)} hold"]
-        for claim in comparison.claims:
-            lines += _claim_lines(claim)
+        lines += layout(("NMPC", "PID"), [_claim_section(comparison.claims)])
     return "\n".join(lines[1:]) + "\n"
 
 
@@ -56,30 +53,28 @@ def _grasp_rows(runs: Sequence[RunMetrics], tolerance: Tolerance | None) -> tupl
     """Return what came of every grasp command, with the values reached where it closed."""
     by_run = [{(event.stamp_ns, event.command): event for event in item.run.grasp_events} for item in runs]
     keys = dict.fromkeys(key for events in by_run for key in events)
-    reached = (
-        ("distance", "mm", MM_PER_M, "position"),
-        ("angle", "deg", DEG_PER_RAD, "angle"),
-        ("relative speed", "mm/s", MM_PER_M, "speed"),
-    )
     rows = []
     for key in sorted(keys, key=lambda key: key[0]):
         stamp_ns, command = key
         events = [found.get(key) for found in by_run]
         label = f"{ns_to_seconds(stamp_ns):g} s: {_in_words(command)}"
         rows.append(Row(label, tuple(event.status.value if event else MISSING for event in events)))
-        if command.action is GraspAction.RELEASE:
-            continue
-        for what, unit, scale, name in reached:
-            allowed = f", allowed {getattr(tolerance, name) * scale:g}" if tolerance else ""
-            values = [None if e is None else (e.position_error, e.angle_error, e.relative_speed) for e in events]
-            place = ("position", "angle", "speed").index(name)
-            rows.append(row(f"  {what} [{unit}]{allowed}", values, _item(place, scale)))
+        if command.action is not GraspAction.RELEASE:
+            for what, value, limit in _REACHED:
+                allowed = f", allowed {limit(tolerance):g}" if tolerance else ""
+                rows.append(row(f"  {what}{allowed}", events, value))
     return tuple(rows) or (Row("none"),)
 
 
-def _item(place: int, scale: float) -> Callable[[Sequence[float]], float]:
-    """Return a function that takes one value of several, in another unit."""
-    return lambda values: values[place] * scale
+_REACHED: tuple[tuple[str, Callable[[GraspEvent], float], Callable[[Tolerance], float]], ...] = (
+    ("distance [mm]", lambda event: event.position_error * MM_PER_M, lambda most: most.position * MM_PER_M),
+    ("angle [deg]", lambda event: event.angle_error * DEG_PER_RAD, lambda most: most.angle * DEG_PER_RAD),
+    (
+        "relative speed [mm/s]",
+        lambda event: event.relative_speed * MM_PER_M,
+        lambda most: most.speed * MM_PER_M,
+    ),
+)
 
 
 def _in_words(command: GraspCommand) -> str:
@@ -177,13 +172,17 @@ def _receipt_rows(runs: Sequence[RunMetrics]) -> tuple[Row, ...]:
     )
 
 
-def _claim_lines(claim: Claim) -> list[str]:
-    """Return the verdict, the paper's words and the figures of a claim."""
-    missing = _NEVER if claim.name == "settling" else MISSING
-    quote = wrap(f'Paper: "{claim.paper}"', WIDTH, initial_indent="  ", subsequent_indent="  ")
-    rows = [
-        Row(f"  {item.label} [{item.unit}]", (number(item.nmpc, missing), number(item.pid, missing)))
-        for item in claim.findings
-    ]
-    heading = wrap(f"{_VERDICTS[claim.holds]}: {claim.text}", WIDTH, subsequent_indent="  ")
-    return ["", *heading, *quote, *layout(("NMPC", "PID"), [Section("", tuple(rows))])[1:]]
+def _claim_section(claims: Sequence[Claim]) -> Section:
+    """Return every claim: its verdict, the paper's words, and the figures under both laws."""
+    held = sum(claim.holds for claim in claims)
+    rows: list[Row] = []
+    for claim in claims:
+        text = wrap(f"{_VERDICTS[claim.holds]}: {claim.text}", WIDTH, subsequent_indent="  ")
+        quote = wrap(f'Paper: "{claim.paper}"', WIDTH, initial_indent="  ", subsequent_indent="  ")
+        missing = _NEVER if claim.name == "settling" else MISSING
+        rows += [Row(line) for line in (*([""] if rows else []), *text, *quote)]
+        rows += [
+            Row(f"  {item.label} [{item.unit}]", (number(item.nmpc, missing), number(item.pid, missing)))
+            for item in claim.findings
+        ]
+    return Section(f"Claims of the paper: {held} of {len(claims)} hold", tuple(rows))

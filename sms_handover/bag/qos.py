@@ -23,6 +23,7 @@ class History(Enum):
 
     KEEP_LAST = "keep_last"
     KEEP_ALL = "keep_all"
+    UNKNOWN = "unknown"  # what discovery tells of another node's publisher
 
 
 @dataclass(frozen=True)

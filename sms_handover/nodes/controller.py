@@ -46,7 +46,7 @@ class ControllerNode(GraphNode[ControllerParameters]):
         self._reference_wire = JointStateWire(self.robot.joint_names, ("position", "velocity"))
         self._command_wire = JointStateWire(self.robot.joint_names, ("effort",))
         self._inputs: StampSync[Any] = StampSync()
-        self._answered_ns = -1
+        self._answered_ns = 0
         self._command = self.endpoints.publisher(JOINT_COMMAND)
         for topic in (*_STATE, JOINT_REFERENCE):
             self.endpoints.subscribe(topic, self._taker(topic), raw=True)
@@ -58,7 +58,7 @@ class ControllerNode(GraphNode[ControllerParameters]):
 
     def diagnostic_stamp_ns(self) -> int:
         """Return the stamp of the last state answered."""
-        return max(self._answered_ns, 0)
+        return self._answered_ns
 
     def _taker(self, topic: str) -> Any:
         """Return the callback of a topic of raw messages."""
@@ -70,10 +70,9 @@ class ControllerNode(GraphNode[ControllerParameters]):
 
     def _take(self, topic: str, stamp: int, value: Any) -> None:
         """Take one input; a state of time zero behind an answered one begins the run anew."""
-        if stamp == 0 and self._answered_ns >= 0:
+        if self._inputs.begins_anew(stamp):
             self._inputs.reset()
             self._controller.reset()
-            self._answered_ns = -1
         if not self._lockstep and topic in (JOINT_REFERENCE, TASK_PHASE):
             self._use(topic, value)
             return

@@ -168,7 +168,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
         stamp = stamp_ns(data)
         if stamp % self.common.reference_ns:
             return
-        if stamp == 0:
+        if self._tf.begins_anew(stamp):
             self._tf.reset()
         self._tf.add(stamp, topic, data)
         inputs = self._tf.take(stamp, _TF_INPUTS)

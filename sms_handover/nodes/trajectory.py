@@ -54,7 +54,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
         self._reference_wire = JointStateWire(self.robot.joint_names, ("position", "velocity"))
         self._inputs: StampSync[Any] = StampSync()
-        self._stamp_ns = -1
+        self._stamp_ns = 0
         self._failures = 0
         self._solver = self.create_client(SolveIK, SOLVE_IK)
         self._phase = self.endpoints.publisher(TASK_PHASE)
@@ -75,7 +75,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
 
     def diagnostic_stamp_ns(self) -> int:
         """Return the stamp of the last reference."""
-        return max(self._stamp_ns, 0)
+        return self._stamp_ns
 
     def _taker(self, topic: str) -> Any:
         """Return the callback of a raw topic, which skips what is not on a reference period."""
@@ -94,10 +94,9 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
 
     def _take(self, topic: str, stamp: int, value: Any) -> None:
         """Take one input; time zero behind a later time begins the run anew."""
-        if stamp == 0 and self._stamp_ns >= 0:
+        if self._inputs.begins_anew(stamp):
             self._inputs.reset()
             self._generator.reset()
-            self._stamp_ns = -1
         self._inputs.add(stamp, topic, value)
         inputs = self._inputs.take(stamp, _INPUTS)
         if inputs is None:

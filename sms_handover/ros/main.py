@@ -1,5 +1,6 @@
 """Runs one node as a process: start, spin, orderly end, and one line of text for every error."""
 
+import os
 import signal
 import sys
 from abc import ABC, abstractmethod
@@ -15,20 +16,28 @@ from sms_handover.errors import ConfigurationError, SmsHandoverError
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
 
+LAUNCHER_PID = "SMS_HANDOVER_LAUNCHER_PID"  # environment variable, set for the nodes that a launcher starts
+
 _WAIT_S = 0.2  # [s] longest wait for an event, so that a signal is noticed
 
 
 class Stop:
-    """Set by SIGINT, SIGTERM or SIGHUP."""
+    """Asked for by SIGINT, SIGTERM or SIGHUP, and when the launcher that started this process is gone."""
 
     def __init__(self) -> None:
         """Install the handlers."""
-        self.asked = False
+        self._signalled = False
+        self._launcher = int(os.environ.get(LAUNCHER_PID, "0"))
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._on_signal)
 
+    @property
+    def asked(self) -> bool:
+        """Tell whether this process is to end."""
+        return self._signalled or (self._launcher != 0 and os.getppid() != self._launcher)
+
     def _on_signal(self, number: int, frame: object) -> None:
-        self.asked = True
+        self._signalled = True
 
 
 class RunnableNode(Node, ABC):

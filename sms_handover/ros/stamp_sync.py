@@ -19,6 +19,10 @@ class StampSync(Generic[V]):
         self._taken_ns = -1
         self.dropped = 0
 
+    def begins_anew(self, stamp_ns: int) -> bool:
+        """Tell whether a stamp is the start of a run after one whose inputs have been taken."""
+        return stamp_ns == 0 and self._taken_ns >= 0
+
     def reset(self) -> None:
         """Forget everything, as at the start of a run."""
         self._waiting.clear()

@@ -1,0 +1,1 @@
+"""The command ``sms-handover``: run, simulate, and look at what came out."""

@@ -1,0 +1,81 @@
+"""Options that several commands share, and the scenario that they describe."""
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+import yaml
+
+from sms_handover.control.parameters import LAWS
+from sms_handover.errors import ConfigurationError
+from sms_handover.simulation.parameters import MODES
+from sms_handover.simulation.scenario import COMMON, Scenario, load_scenario
+from sms_handover.topics import CONTROLLER, TRAJECTORY
+from sms_handover.trajectory.time_law import TIME_LAWS
+
+Overrides = dict[str, dict[str, object]]
+
+
+def add_scenario_options(parser: ArgumentParser) -> None:
+    """Add the options that choose robot, schedule, controller and parameters."""
+    group = parser.add_argument_group("scenario")
+    group.add_argument("--controller", choices=LAWS, help="control law (default: that of controller.yaml, nmpc)")
+    group.add_argument("--schedule", type=Path, metavar="FILE", help="task schedule (default: handover.yaml)")
+    group.add_argument("--robot", type=Path, metavar="FILE", help="robot description (default: robot.yaml)")
+    group.add_argument(
+        "--duration", type=float, metavar="S", help="simulated time in s (default: to the end of the schedule)"
+    )
+    group.add_argument("--time-law", choices=tuple(TIME_LAWS), help="how targets are approached (default: step)")
+    group.add_argument(
+        "--params-file",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="parameters in ROS 2 form on top of the shipped ones; may be given again",
+    )
+    group.add_argument(
+        "-p",
+        "--param",
+        action="append",
+        default=[],
+        metavar="NODE.NAME:=VALUE",
+        help="one parameter, e.g. plant.integrator:=midpoint; the node 'common' is for all of them",
+    )
+
+
+def overrides_of(options: Namespace) -> Overrides:
+    """Return the parameters that the options set, by node; raises ConfigurationError."""
+    overrides: Overrides = {}
+    for text in options.param:
+        node, name, value = _parse(text)
+        overrides.setdefault(node, {})[name] = value
+    shortcuts = (
+        (CONTROLLER, "law", options.controller),
+        (TRAJECTORY, "time_law", options.time_law),
+        (COMMON, "schedule", options.schedule and str(options.schedule.resolve())),
+        (COMMON, "robot", options.robot and str(options.robot.resolve())),
+        (COMMON, "duration", options.duration),
+    )
+    for node, name, value in shortcuts:
+        if value is not None:
+            overrides.setdefault(node, {})[name] = value
+    return overrides
+
+
+def scenario_of(options: Namespace, mode: str = MODES[0]) -> Scenario:
+    """Return the scenario that the options describe, read and checked; raises ConfigurationError."""
+    overrides = overrides_of(options)
+    overrides.setdefault(COMMON, {}).setdefault("mode", mode)
+    return load_scenario(overrides, [path.resolve() for path in options.params_file])
+
+
+def _parse(text: str) -> tuple[str, str, object]:
+    """Return node, name and value of ``node.name:=value``."""
+    target, assigned, value = text.partition(":=")
+    node, dot, name = target.partition(".")
+    if not (assigned and dot and node and name):
+        raise ConfigurationError(f"parameter {text!r} is not of the form NODE.NAME:=VALUE")
+    try:
+        return node, name, yaml.safe_load(value)
+    except yaml.YAMLError as error:
+        raise ConfigurationError(f"the value of parameter {text!r} is not YAML") from error
