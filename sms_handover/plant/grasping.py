@@ -54,7 +54,7 @@ def _miss(errors: GraspErrors, tolerance: GraspTolerance) -> str:
         ("speed", errors.speed, tolerance.speed, MM_PER_M, "mm/s"),
     )
     return "; ".join(
-        f"{name} {value * scale:.3g} {unit}, allowed {limit * scale:.3g} {unit}"
+        f"{name} {value * scale:.4g} {unit}, allowed {limit * scale:.4g} {unit}"
         for name, value, limit, scale, unit in table
         if not value <= limit
     )
