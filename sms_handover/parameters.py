@@ -5,9 +5,10 @@ same YAML files; both go through :func:`build`, so both refuse the same values w
 The numbers live in ``config/``, never here.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
@@ -19,6 +20,15 @@ T = TypeVar("T")
 
 _SPEC = "sms_handover.spec"
 EVERY_NODE = "/**"  # section of ROS parameter files that holds for every node
+
+
+class YamlLoader(yaml.SafeLoader):
+    """YAML as ROS reads it: 1e-3 is a number, also without a decimal point."""
+
+
+YamlLoader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"^[-+]?[0-9]+[eE][-+]?[0-9]+$"), list("-+0123456789")
+)
 
 
 @dataclass(frozen=True)
@@ -92,7 +102,7 @@ def read_parameter_files(paths: Sequence[Path], section: str) -> dict[str, objec
 def read_yaml(path: Path) -> dict[str, Any]:
     """Return the mapping in a YAML file, loaded safely; raises ConfigurationError naming the line."""
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+        document = yaml.load(path.read_text(encoding="utf-8"), YamlLoader)
     except OSError as error:
         raise ConfigurationError(f"cannot read {path}: {error.strerror}") from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
@@ -120,13 +130,21 @@ def _check(value: object, hint: Any, spec: ParameterSpec, where: str) -> object:
         raise ConfigurationError(f"{where} is {value!r}, expected a number" + _unit(spec))
     if hint is int and not isinstance(value, int):
         raise ConfigurationError(f"{where} is {value!r}, expected a whole number" + _unit(spec))
-    if not isfinite(value):
-        raise ConfigurationError(f"{where} is {value}, expected a finite number" + _unit(spec))
+    if not isfinite(_as_float(value)):
+        raise ConfigurationError(f"{where} is {_as_float(value)}, expected a finite number" + _unit(spec))
     if spec.minimum is not None and value < spec.minimum:
         raise ConfigurationError(f"{where} is {value}{_unit(spec)}, allowed is at least {spec.minimum}")
     if spec.maximum is not None and value > spec.maximum:
         raise ConfigurationError(f"{where} is {value}{_unit(spec)}, allowed is at most {spec.maximum}")
     return float(value) if hint is float else value
+
+
+def _as_float(value: float) -> float:
+    """Return a number as a float; a whole number beyond every float is infinite."""
+    try:
+        return float(value)
+    except OverflowError:
+        return inf
 
 
 def _unit(spec: ParameterSpec) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 import yaml
 
 from sms_handover.errors import ScheduleError, UnknownNameError
+from sms_handover.parameters import YamlLoader
 
 
 class Section:
@@ -114,7 +115,7 @@ def read_section(path: Path) -> tuple[Section, str]:
     """Return the top-level mapping of a YAML file and the file's text; raises ScheduleError."""
     try:
         text = path.read_text(encoding="utf-8")
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        node = yaml.compose(text, Loader=YamlLoader)
     except OSError as error:
         raise ScheduleError(f"cannot read the schedule {path}: {error.strerror}") from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:

@@ -1,0 +1,234 @@
+"""Parameters are refused whole and in plain words: name, type, range, choice, file."""
+
+from dataclasses import dataclass, fields, is_dataclass
+from math import inf, nan
+from pathlib import Path
+
+import pytest
+
+from sms_handover.control.nmpc import NmpcGains
+from sms_handover.control.parameters import ControllerParameters, gains_of
+from sms_handover.control.pid import PidGains
+from sms_handover.errors import ConfigurationError, SmsHandoverError, UnknownNameError
+from sms_handover.parameters import (
+    EVERY_NODE,
+    ParameterSpec,
+    build,
+    parameter,
+    read_parameter_files,
+    read_yaml,
+    spec_of,
+)
+from sms_handover.simulation.scenario import load_parameters
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One parameter of every kind."""
+
+    length: float = parameter("a length", unit="m", minimum=0.5, maximum=2.0)
+    count: int = parameter("a count", minimum=1)
+    name: str = parameter("a name", choices=("red", "green"))
+    active: bool = parameter("a switch")
+    offsets: tuple[float, ...] = parameter("offsets", unit="rad", minimum=-1.0)
+    labels: tuple[str, ...] = parameter("labels", choices=("a", "b"))
+
+
+GOOD: dict[str, object] = {
+    "length": 1.5,
+    "count": 3,
+    "name": "red",
+    "active": True,
+    "offsets": [0.0, 1],
+    "labels": ["a"],
+}
+
+
+def test_good_values_are_taken_as_their_type() -> None:
+    """A list becomes a tuple, a whole number a float where a float is asked for; bounds are inclusive."""
+    assert build(Sample, GOOD, "here") == Sample(1.5, 3, "red", True, (0.0, 1.0), ("a",))
+    built = build(Sample, {**GOOD, "length": 2, "count": 1, "offsets": [-1]}, "here")
+    assert (built.length, built.count, built.offsets) == (2.0, 1, (-1.0,))
+    assert isinstance(built.length, float) and isinstance(built.offsets[0], float)
+
+
+REFUSED: dict[str, tuple[str, object, str]] = {
+    "below": ("length", 0.4, "'length' is 0.4 m, allowed is at least 0.5"),
+    "above": ("length", 2.1, "'length' is 2.1 m, allowed is at most 2.0"),
+    "not a number": ("length", nan, "'length' is nan, expected a finite number m"),
+    "infinite": ("length", inf, "'length' is inf, expected a finite number m"),
+    "too large for a float": ("length", 10**400, "expected a finite number m"),
+    "text for a number": ("length", "1.5", "'length' is '1.5', expected a number m"),
+    "switch for a number": ("length", True, "'length' is True, expected a number m"),
+    "nothing for a number": ("length", None, "'length' is None, expected a number m"),
+    "list for a number": ("length", [1.0], "'length' is [1.0], expected a number m"),
+    "fraction for a count": ("count", 1.5, "'count' is 1.5, expected a whole number"),
+    "whole float for a count": ("count", 2.0, "'count' is 2.0, expected a whole number"),
+    "switch for a count": ("count", True, "'count' is True, expected a number"),
+    "too small a count": ("count", 0, "'count' is 0, allowed is at least 1"),
+    "unknown choice": (
+        "name",
+        "gren",
+        "unknown value 'gren' (did you mean 'green'?): known are 'red', 'green'",
+    ),
+    "number for text": ("name", 1, "'name' is 1, expected str"),
+    "number for a switch": ("active", 1, "'active' is 1, expected bool"),
+    "scalar for a list": ("offsets", 0.5, "'offsets' is 0.5, expected a list"),
+    "text for a list": ("labels", "a", "'labels' is 'a', expected a list"),
+    "bad item": ("offsets", [0.0, "x"], "'offsets' is 'x', expected a number rad"),
+    "item below": ("offsets", [0.0, -1.5], "'offsets' is -1.5 rad, allowed is at least -1.0"),
+    "unknown item": ("labels", ["a", "c"], "unknown value 'c': known are 'a', 'b'"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_bad_values_are_refused(case: str) -> None:
+    """The message names where, which parameter, what it is and what is allowed, on one line."""
+    name, value, expected = REFUSED[case]
+    with pytest.raises(ConfigurationError) as caught:
+        build(Sample, {**GOOD, name: value}, "plant")
+    text = str(caught.value)
+    assert text.startswith(f"plant: parameter {name!r}")
+    assert expected in text
+    assert "\n" not in text
+
+
+def test_an_unknown_name_is_answered_with_the_nearest() -> None:
+    """A misspelt parameter is not ignored."""
+    with pytest.raises(
+        UnknownNameError, match=r"plant: unknown parameter 'lenght' \(did you mean 'length'\?\)"
+    ):
+        build(Sample, {**GOOD, "lenght": 1.0}, "plant")
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_a_missing_value_is_named(name: str) -> None:
+    """There are no defaults in code: every number stands in a file."""
+    with pytest.raises(ConfigurationError, match=f"plant: parameter '{name}' is missing"):
+        build(Sample, {key: value for key, value in GOOD.items() if key != name}, "plant")
+
+
+def test_errors_have_one_root_and_remain_value_errors() -> None:
+    """A caller can catch everything of this package, or what Python calls a bad value."""
+    with pytest.raises(SmsHandoverError):
+        build(Sample, {}, "plant")
+    with pytest.raises(ValueError, match="missing"):
+        build(Sample, {}, "plant")
+
+
+def test_every_parameter_says_what_it_means() -> None:
+    """Each field of each group has a description, and the shipped files fill each group."""
+    shipped = load_parameters()
+    for group in (shipped.common, shipped.plant, shipped.trajectory, shipped.ik, shipped.controller):
+        assert is_dataclass(group)
+        for item in fields(group):
+            spec = spec_of(item)
+            assert isinstance(spec, ParameterSpec)
+            assert spec.description
+
+
+def _write(path: Path, text: str) -> Path:
+    """Write a file and return its path."""
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_later_files_win_and_other_sections_do_not_matter(tmp_path: Path) -> None:
+    """Files in ROS form are laid over each other, parameter by parameter."""
+    first = _write(
+        tmp_path / "1.yaml", "plant:\n  ros__parameters: {a: 1, b: 2}\nik:\n  ros__parameters: {a: 9}\n"
+    )
+    second = _write(
+        tmp_path / "2.yaml", "plant:\n  ros__parameters: {b: 3}\n/**:\n  ros__parameters: {c: 4}\n"
+    )
+    assert read_parameter_files([first, second], "plant") == {"a": 1, "b": 3}
+    assert read_parameter_files([second, first], "plant") == {"a": 1, "b": 2}
+    assert read_parameter_files([first, second], EVERY_NODE) == {"c": 4}
+    assert read_parameter_files([first, second], "recorder") == {}
+
+
+@pytest.mark.parametrize("text", ["plant: 5\n", "plant: {a: 1}\n", "plant: {ros__parameters: [1]}\n"])
+def test_a_section_without_parameters_is_refused(tmp_path: Path, text: str) -> None:
+    """A file that is not in ROS form is said to be so instead of being ignored."""
+    path = _write(tmp_path / "p.yaml", text)
+    with pytest.raises(
+        ConfigurationError, match=r"p\.yaml: section 'plant' needs a mapping 'ros__parameters'"
+    ):
+        read_parameter_files([path], "plant")
+
+
+def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+    """Missing, a folder, not YAML, not text, not a mapping: one line each, with the path."""
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    binary = tmp_path / "binary.yaml"
+    binary.write_bytes(b"\xff\xfe\x00a")
+    cases = {
+        tmp_path / "none.yaml": "No such file or directory",
+        folder: "Is a directory",
+        _write(tmp_path / "broken.yaml", "a: [1,\nb: 2\n"): "not valid YAML.*line 1, column 4",
+        _write(tmp_path / "tag.yaml", "a: !!python/object/apply:os.getcwd []\n"): "not valid YAML",
+        binary: "not valid YAML",
+        _write(tmp_path / "list.yaml", "- 1\n"): "expected a mapping at the top level",
+        _write(tmp_path / "empty.yaml", ""): "expected a mapping at the top level",
+    }
+    for path, reason in cases.items():
+        with pytest.raises(ConfigurationError, match=reason) as caught:
+            read_yaml(path)
+        assert str(path) in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("written", "read"), [("1e-3", 1e-3), ("-2E+1", -20.0), ("1.0e-3", 1e-3), ("7", 7)])
+def test_numbers_are_read_as_ros_reads_them(tmp_path: Path, written: str, read: float) -> None:
+    """An exponent makes a number, with or without a decimal point; YAML 1.1 alone would give text."""
+    assert read_yaml(_write(tmp_path / "p.yaml", f"a: {written}\nb: 1e\n")) == {"a": read, "b": "1e"}
+
+
+# --- groups with rules of their own --------------------------------------------------------------
+
+
+def test_reference_period_is_a_whole_number_of_ticks() -> None:
+    """A period between two ticks would fall where there is no state."""
+    with pytest.raises(
+        ConfigurationError, match=r"reference_period is 0\.02 s.*multiple of the tick of 0\.003 s"
+    ):
+        load_parameters({"common": {"tick": 0.003, "reference_period": 0.02}})
+    common = load_parameters({"common": {"tick": 0.005, "reference_period": 0.02}}).common
+    assert (common.tick_ns, common.reference_ns, common.ticks_per_reference) == (5_000_000, 20_000_000, 4)
+
+
+def test_overrides_of_unknown_nodes_are_refused() -> None:
+    """An override for a node that does not exist would change nothing."""
+    with pytest.raises(UnknownNameError, match=r"unknown node 'plnt' \(did you mean 'plant'\?\)"):
+        load_parameters({"plnt": {"integrator": "rk4"}})
+    with pytest.raises(UnknownNameError, match=r"plant: unknown parameter 'tick'"):
+        load_parameters({"plant": {"tick": 0.001}})
+
+
+def test_overrides_lie_over_files(tmp_path: Path) -> None:
+    """Shipped file, then the user's file, then the option."""
+    path = _write(tmp_path / "mine.yaml", "controller:\n  ros__parameters: {control_order: 2, law: pid}\n")
+    parameters = load_parameters({"controller": {"law": "nmpc"}}, [path])
+    assert (parameters.controller.control_order, parameters.controller.law) == (2, "nmpc")
+
+
+def test_gains_of_a_phase_lie_over_those_of_the_controller() -> None:
+    """A phase changes what it names and nothing else, and only gains of the law in use."""
+    nmpc = ControllerParameters("nmpc", 1.0, 1, 2.0, 3.0, 4.0)
+    assert gains_of(nmpc, {}, "here") == NmpcGains(1.0, 1)
+    assert gains_of(nmpc, {"rolling_period": 2}, "here") == NmpcGains(2.0, 1)
+    pid = ControllerParameters("pid", 1.0, 1, 2.0, 3.0, 4.0)
+    assert gains_of(pid, {"integral": 0.5}, "here") == PidGains(2.0, 0.5, 4.0)
+    with pytest.raises(UnknownNameError, match=r"here: unknown gain of pid 'rolling_period'"):
+        gains_of(pid, {"rolling_period": 2.0}, "here")
+    with pytest.raises(
+        UnknownNameError, match=r"unknown gain of nmpc 'roling_period' \(did you mean 'rolling"
+    ):
+        gains_of(nmpc, {"roling_period": 2.0}, "here")
+    with pytest.raises(
+        ConfigurationError, match=r"here: parameter 'rolling_period' is 0 s, allowed is at least"
+    ):
+        gains_of(nmpc, {"rolling_period": 0}, "here")
+    with pytest.raises(ConfigurationError, match=r"'control_order' is 4, allowed is at most 3"):
+        gains_of(nmpc, {"control_order": 4}, "here")
