@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from sms_handover.run_data import RunData
+from sms_handover.types import TaskPhase
 from sms_handover.units import ns_to_seconds
 
 
@@ -40,19 +41,18 @@ def phase_spans(run: RunData) -> tuple[PhaseSpan, ...]:
         if before is None or before.index != phase.index
     ]
     last_ns = max([int(stamps[-1]) for stamps in (run.tick_ns, run.reference_ns) if len(stamps)], default=0)
-    ends = [*(phase.stamp_ns for phase in entered[1:]), last_ns]
+    starts = [phase.stamp_ns for phase in entered]
     return tuple(
-        _span(run, phase.index, phase.name, (phase.stamp_ns, end_ns), is_last=place == len(entered) - 1)
-        for place, (phase, end_ns) in enumerate(zip(entered, ends, strict=True))
+        _span(run, phase, end_ns, is_last=phase is entered[-1])
+        for phase, end_ns in zip(entered, [*starts[1:], last_ns], strict=False)
     )
 
 
-def _span(run: RunData, index: int, name: str, time_ns: tuple[int, int], *, is_last: bool) -> PhaseSpan:
+def _span(run: RunData, phase: TaskPhase, end_ns: int, *, is_last: bool) -> PhaseSpan:
     """Return the span of a phase with its rows and ticks looked up."""
-    start_ns, end_ns = time_ns
-    row_side: Literal["left", "right"] = (
-        "right" if is_last else "left"
-    )  # the row at the end has the targets of the next phase
+    start_ns = phase.stamp_ns
+    # the row at the end already has the targets of the next phase, if there is one
+    row_side: Literal["left", "right"] = "right" if is_last else "left"
     rows = slice(
         int(np.searchsorted(run.reference_ns, start_ns)),
         int(np.searchsorted(run.reference_ns, end_ns, row_side)),
@@ -60,4 +60,4 @@ def _span(run: RunData, index: int, name: str, time_ns: tuple[int, int], *, is_l
     last = int(np.searchsorted(run.tick_ns, end_ns, "right"))
     states = slice(int(np.searchsorted(run.tick_ns, start_ns)), last)
     efforts = slice(int(np.searchsorted(run.tick_ns, start_ns, "right")), last)
-    return PhaseSpan(index, name, start_ns, end_ns, rows, states, efforts)
+    return PhaseSpan(phase.index, phase.name, start_ns, end_ns, rows, states, efforts)

@@ -146,7 +146,7 @@ def _torque_rows(runs: Sequence[RunMetrics]) -> tuple[Row, ...]:
     return (
         *(Row(name, tuple(_peak_and_rms(item, name) for item in runs)) for name in joints),
         row("control effort [(N m)^2 s]", torques, lambda torque: float(torque.effort.sum())),
-        row("saturated ticks, worst joint", torques, lambda torque: largest(torque.saturated_ticks)),
+        row("ticks asking for more, worst joint", torques, lambda torque: largest(torque.saturated_ticks)),
         row("ticks at the peak, worst joint", torques, lambda torque: largest(torque.ticks_at_peak)),
     )
 
@@ -177,8 +177,10 @@ def _claim_section(claims: Sequence[Claim]) -> Section:
     held = sum(claim.holds for claim in claims)
     rows: list[Row] = []
     for claim in claims:
-        text = wrap(f"{_VERDICTS[claim.holds]}: {claim.text}", WIDTH, subsequent_indent="  ")
-        quote = wrap(f'Paper: "{claim.paper}"', WIDTH, initial_indent="  ", subsequent_indent="  ")
+        text = wrap(
+            f"{_VERDICTS[claim.holds]}: {claim.text}", WIDTH, subsequent_indent="  ", break_on_hyphens=False
+        )
+        quote = wrap(f'  Paper: "{claim.paper}"', WIDTH, subsequent_indent="  ", break_on_hyphens=False)
         missing = _NEVER if claim.name == "settling" else MISSING
         rows += [Row(line) for line in (*([""] if rows else []), *text, *quote)]
         rows += [

@@ -18,13 +18,16 @@ Overrides = dict[str, dict[str, object]]
 def add_scenario_options(parser: ArgumentParser) -> None:
     """Add the options that choose robot, schedule, controller and parameters."""
     group = parser.add_argument_group("scenario")
-    group.add_argument("--controller", choices=LAWS, help="control law (default: that of controller.yaml, nmpc)")
+    group.add_argument("--controller", choices=LAWS, help="control law (default: nmpc)")
     group.add_argument("--schedule", type=Path, metavar="FILE", help="task schedule (default: handover.yaml)")
     group.add_argument("--robot", type=Path, metavar="FILE", help="robot description (default: robot.yaml)")
     group.add_argument(
-        "--duration", type=float, metavar="S", help="simulated time in s (default: to the end of the schedule)"
+        "--duration",
+        type=float,
+        metavar="S",
+        help="simulated time in s (default: the schedule's)",
     )
-    group.add_argument("--time-law", choices=tuple(TIME_LAWS), help="how targets are approached (default: step)")
+    group.add_argument("--time-law", choices=tuple(TIME_LAWS), help="approach of targets (default: step)")
     group.add_argument(
         "--params-file",
         type=Path,

@@ -1,7 +1,6 @@
 """The plant node."""
 
 from collections.abc import Sequence
-from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -74,7 +73,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
         self._command_wire = JointStateWire(self.robot.joint_names, ("effort",))
         self._inputs: StampSync[Any] = StampSync()
-        self._loop_clock = LoopClock(self.common.tick_ns)
+        self._loop_clock = LoopClock(self.common.tick_ns, paced=not self._lockstep)
         self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
         self._run_state = RunState.WAITING
         self._steps_left = 0
@@ -290,9 +289,9 @@ class PlantNode(GraphNode[PlantParameters]):
         self._publish[RUN_STATE].publish(message)
 
     def _publish_timing(self) -> None:
-        """Publish how the loop has kept time over the last second, and say what it waits for."""
+        """Publish how the loop has kept time over the last second."""
         if self._run_state == RunState.RUNNING and not self.finished:
-            message = self._loop_clock.report(monotonic())
+            message = self._loop_clock.report()
             message.header = header(self._plant.stamp_ns)
             self._publish[LOOP_TIMING].publish(message)
 

@@ -19,7 +19,9 @@ class CommonParameters:
     reference_period: float = parameter(
         "simulated time between two joint references", unit="s", minimum=1e-6, maximum=10.0
     )
-    duration: float = parameter("simulated time of the run; 0: to the end of the schedule", unit="s", minimum=0.0)
+    duration: float = parameter(
+        "simulated time of the run; 0: to the end of the schedule", unit="s", minimum=0.0
+    )
     robot: str = parameter("path of the robot description; empty: the package's robot.yaml")
     schedule: str = parameter("path of the task schedule; empty: the package's handover.yaml")
 

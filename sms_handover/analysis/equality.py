@@ -1,0 +1,56 @@
+"""Whether two runs are the same, bit for bit."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from sms_handover.run_data import RunData
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One field in which two runs differ: how many rows, the first of them, and by how much at most."""
+
+    field: str
+    detail: str
+
+    def __str__(self) -> str:
+        """Return the difference in words."""
+        return f"{self.field}: {self.detail}"
+
+
+def compare_runs(a: RunData, b: RunData) -> tuple[Difference, ...]:
+    """Return the fields in which two runs differ; none means that every bit is the same (NaN equals NaN)."""
+    return tuple(_differences(a, b))
+
+
+def _differences(a: RunData, b: RunData) -> Iterator[Difference]:
+    """Yield the differences field by field."""
+    for item in fields(RunData):
+        left, right = getattr(a, item.name), getattr(b, item.name)
+        if isinstance(left, np.ndarray):
+            yield from _compare(item.name, left, right)
+        elif item.name in ("target_pose", "tool_pose"):
+            for arm in sorted({*left, *right}):
+                if arm in left and arm in right:
+                    yield from _compare(f"{item.name}[{arm}]", left[arm], right[arm])
+                else:
+                    yield Difference(f"{item.name}[{arm}]", "only one of the runs has it")
+        elif repr(left) != repr(right):
+            yield Difference(item.name, f"{left!r} and {right!r}")
+
+
+def _compare(name: str, left: np.ndarray, right: np.ndarray) -> Iterator[Difference]:
+    """Yield the difference of two arrays, if there is one."""
+    if left.shape != right.shape:
+        yield Difference(name, f"shapes {left.shape} and {right.shape}")
+        return
+    kind = np.int64 if left.dtype == np.int64 else np.float64
+    same = (left == right) | (np.isnan(left.astype(kind)) & np.isnan(right.astype(kind)))
+    if not np.all(same):
+        rows = np.unique(np.nonzero(~same)[0])
+        largest = float(np.nanmax(np.abs(left - right)))
+        yield Difference(
+            name, f"{rows.size} of {left.shape[0]} rows, first row {rows[0]}, by {largest:.3g} at most"
+        )

@@ -1,0 +1,66 @@
+"""How far a run is, on a terminal in one line that is written over, else a line now and then."""
+
+import sys
+from collections.abc import Mapping
+from time import monotonic
+
+from sms_handover.types import GraspEvent
+from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
+
+_TERMINAL_PERIOD_S = 0.2  # [s] of wall time between two updates
+_LOG_PERIOD_S = 5.0  # [s] of wall time between two lines where there is no terminal
+
+
+class Display:
+    """Shows the progress of a run of known length on standard error."""
+
+    def __init__(self, end_ns: int) -> None:
+        """Begin to count wall time."""
+        self._end_s = ns_to_seconds(end_ns)
+        self._begin = monotonic()
+        self._shown = 0.0
+        self._terminal = sys.stderr.isatty()
+        self._width = 0
+
+    def start(self) -> None:
+        """Count wall time from now on, as the run has begun."""
+        self._begin = monotonic()
+
+    def show(self, stamp_ns: int, phase: str, tool_error: Mapping[str, float], *, last: bool = False) -> None:
+        """Show simulated time, phase, real-time factor and the tools' distance to their targets in mm."""
+        now = monotonic()
+        period = _TERMINAL_PERIOD_S if self._terminal else _LOG_PERIOD_S
+        if not last and now - self._shown < period:
+            return
+        self._shown = now
+        time_s = ns_to_seconds(stamp_ns)
+        factor = time_s / max(now - self._begin, 1e-9)
+        errors = "  ".join(f"{arm} {error * MM_PER_M:7.2f} mm" for arm, error in sorted(tool_error.items()))
+        self._write(
+            f"{time_s:6.2f} of {self._end_s:g} s  {phase:<12}  {factor:4.2f} x real time  {errors}", last
+        )
+
+    def event(self, event: GraspEvent) -> None:
+        """Show a grasp event in a line of its own."""
+        self._write(grasp_line(event), True)
+
+    def _write(self, text: str, stays: bool) -> None:
+        """Write a line; on a terminal it is written over unless it stays."""
+        if not self._terminal:
+            print(text, file=sys.stderr, flush=True)
+            return
+        print("\r" + text.ljust(self._width), end="\n" if stays else "", file=sys.stderr, flush=True)
+        self._width = 0 if stays else len(text)
+
+
+def grasp_line(event: GraspEvent) -> str:
+    """Return a grasp event in words, with the errors that the tool had against the grasp frame."""
+    command = event.command
+    time_s = ns_to_seconds(event.stamp_ns)
+    text = f"{time_s:6.2f} s  {command.action.value} by {command.arm}: {event.status.value}"
+    if event.position_error == event.position_error:  # NaN where it does not apply
+        text += (
+            f", {event.position_error * MM_PER_M:.3f} mm, {event.angle_error * DEG_PER_RAD:.3f} deg, "
+            f"{event.relative_speed * MM_PER_M:.3f} mm/s off"
+        )
+    return f"{text} ({event.detail})" if event.detail else text

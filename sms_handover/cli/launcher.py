@@ -1,0 +1,198 @@
+"""Starts the graph, watches it to the end of the run, and ends it whatever happens."""
+
+import signal
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic
+
+import rclpy
+from rclpy.executors import Executor
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from sms_handover_interfaces.msg import RunState
+
+from sms_handover.cli.display import Display
+from sms_handover.cli.processes import Death, NodeProcesses
+from sms_handover.errors import GraphError
+from sms_handover.ros.main import EXIT_OK
+from sms_handover.ros.monitor import RunMonitor
+from sms_handover.ros.parameters import as_arguments
+from sms_handover.simulation.scenario import COMMON, Scenario
+from sms_handover.topics import LOOP_NODES, RECORDER
+from sms_handover.types import GraspEvent
+from sms_handover.units import ns_to_seconds
+
+_POLL_S = 0.1  # [s] longest wait for a message before the processes are looked at again
+_START_PATIENCE_S = 60.0  # [s] of wall time until the run must have begun
+_STALL_PATIENCE_S = 30.0  # [s] of wall time without progress of simulated time
+_DRAIN_PATIENCE_S = 60.0  # [s] of wall time for the recorder to finish
+
+
+@dataclass(frozen=True)
+class LaunchPlan:
+    """What to start and where its logs, and if wanted its bag, go."""
+
+    scenario: Scenario
+    parameter_files: tuple[Path, ...]
+    domain: int
+    log_folder: Path
+    bag: Path | None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended: what the plant said, the grasp events, whether the bag has every message."""
+
+    detail: str
+    stamp_ns: int
+    events: tuple[GraspEvent, ...]
+    recorder_code: int
+    interrupted: bool
+
+
+def launch(plan: LaunchPlan) -> Outcome:
+    """Run the graph of a plan to its end; raises GraphError if it could not go on."""
+    environment = graph_environment(plan)
+    rclpy.init(domain_id=plan.domain, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = Node("launcher", start_parameter_services=False, enable_rosout=False)
+        executor = EventsExecutor()
+        executor.add_node(node)
+        monitor = RunMonitor(node, plan.scenario.robot.arms)
+        with NodeProcesses(plan.log_folder, environment) as processes:
+            for name, arguments in node_arguments(plan).items():
+                processes.start(name, arguments)
+            outcome = _Watch(plan, monitor, executor, processes).to_the_end()
+        node.destroy_node()
+        return outcome
+    finally:
+        rclpy.try_shutdown()
+
+
+def graph_environment(plan: LaunchPlan) -> dict[str, str]:
+    """Return the environment variables that keep the graph to itself."""
+    return {
+        "ROS_DOMAIN_ID": str(plan.domain),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_STATIC_PEERS": "",
+        "ROS_LOG_DIR": str(plan.log_folder / "ros"),
+        "OPENBLAS_NUM_THREADS": "1",  # matrices of 14 columns gain nothing from threads
+        "PYTHONUNBUFFERED": "1",
+    }
+
+
+def node_arguments(plan: LaunchPlan) -> Mapping[str, list[str]]:
+    """Return the ROS arguments of every node to start."""
+    nodes = (*LOOP_NODES, RECORDER) if plan.bag else LOOP_NODES
+    overrides = plan.scenario.overrides
+    common = {**overrides.get(COMMON, {}), "peers": nodes}
+    files = [part for path in plan.parameter_files for part in ("--params-file", str(path))]
+    arguments = {}
+    for name in nodes:
+        own = dict(overrides.get(name, {}))
+        if name == RECORDER:
+            own["folder"] = str(plan.bag)
+        arguments[name] = files + as_arguments({**common, **own})
+    return arguments
+
+
+class _Watch:
+    """Looks after one run from start to end."""
+
+    def __init__(
+        self, plan: LaunchPlan, monitor: RunMonitor, executor: Executor, processes: NodeProcesses
+    ) -> None:
+        """Begin to watch."""
+        common = plan.scenario.parameters.common
+        end_ns = common.last_tick(plan.scenario.schedule.end_ns) * common.tick_ns
+        self._plan, self._monitor, self._executor, self._processes = plan, monitor, executor, processes
+        self._display = Display(end_ns)
+        self._events_shown = 0
+        self._interrupts = 0
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self._on_signal)
+
+    def to_the_end(self) -> Outcome:
+        """Return how the run ended; raises GraphError if a node died or nothing went on."""
+        self._wait_for_start()
+        self._wait_for_end()
+        code = self._wait_for_recorder() if self._plan.bag else EXIT_OK
+        progress = self._monitor.progress
+        self._show(last=True)
+        return Outcome(progress.detail, progress.stamp_ns, tuple(progress.events), code, self._interrupts > 0)
+
+    def _wait_for_start(self) -> None:
+        """Wait until every endpoint has matched and the plant has begun."""
+        deadline = monotonic() + _START_PATIENCE_S
+        while self._monitor.progress.state == RunState.WAITING:
+            self._look()
+            if self._interrupts:
+                raise GraphError("interrupted before the run had begun")
+            if monotonic() > deadline:
+                raise GraphError(
+                    f"the run has not begun after {_START_PATIENCE_S:g} s: {self._monitor.waiting_for()}"
+                )
+        self._display.start()
+
+    def _wait_for_end(self) -> None:
+        """Wait until the plant says that the run is over."""
+        seen_ns, since = -1, monotonic()
+        asked = 0
+        while not self._monitor.finished:
+            self._look()
+            self._show()
+            if self._interrupts > asked:
+                asked = self._interrupts
+                if asked > 1:
+                    raise GraphError("interrupted twice: the bag may lack its end")
+                self._monitor.ask_to_finish()
+            now_ns = self._monitor.progress.stamp_ns
+            if now_ns != seen_ns:
+                seen_ns, since = now_ns, monotonic()
+            elif monotonic() - since > _STALL_PATIENCE_S:
+                raise GraphError(
+                    f"no progress for {_STALL_PATIENCE_S:g} s at {ns_to_seconds(now_ns):g} s of simulated "
+                    f"time: {self._monitor.waiting_for()}"
+                )
+
+    def _wait_for_recorder(self) -> int:
+        """Wait until the recorder has everything and has closed the bag; return its exit code."""
+        deadline = monotonic() + _DRAIN_PATIENCE_S
+        while True:
+            code = self._processes.exit_code(RECORDER)
+            if code is not None:
+                return code
+            self._look()
+            if monotonic() > deadline or self._interrupts > 1:
+                raise GraphError("the recorder has not closed the bag; what was written can be recovered")
+
+    def _look(self) -> None:
+        """Handle what has come, and raise GraphError if a node has died."""
+        self._executor.spin_once(timeout_sec=_POLL_S)
+        for death in self._processes.dead():
+            if death.name == RECORDER and self._monitor.finished:
+                continue
+            raise GraphError(_obituary(death))
+
+    def _show(self, *, last: bool = False) -> None:
+        """Show progress, and every grasp event once."""
+        progress = self._monitor.progress
+        for event in progress.events[self._events_shown :]:
+            self._display.event(event)
+        self._events_shown = len(progress.events)
+        self._display.show(progress.stamp_ns, progress.phase, progress.tool_error, last=last)
+
+    def _on_signal(self, number: int, frame: object) -> None:
+        """Count interrupts; the first one asks for an orderly end."""
+        self._interrupts += 1
+        print("\nending the run; once more to end it at once", file=sys.stderr)
+
+
+def _obituary(death: Death) -> str:
+    """Return who died, how, and the last it said."""
+    how = f"was killed by signal {-death.code}" if death.code < 0 else f"ended with exit code {death.code}"
+    last = f":\n{death.last_lines}" if death.last_lines else ""
+    return f"node {death.name!r} {how}{last}"

@@ -1,0 +1,59 @@
+"""The command line ``sms-handover``."""
+
+import sys
+from argparse import REMAINDER, ArgumentParser, RawDescriptionHelpFormatter
+from collections.abc import Sequence
+from importlib import import_module
+
+from sms_handover import __version__
+from sms_handover.errors import ConfigurationError, SmsHandoverError
+
+_COMMANDS = {
+    "run": "run the handover as a graph of ROS 2 nodes and record it",
+    "simulate": "run it in one process, without ROS",
+    "compare": "print recorded runs side by side, with the paper's claims",
+    "reproduce": "run a bag's scenario again in one process and compare bit by bit",
+}
+_EXIT_FAILED, _EXIT_USAGE, _EXIT_INTERRUPTED = 1, 2, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Carry out one command; return the exit code. Errors of ours are one line on standard error.
+
+    Only the module of that command is imported, so that those without ROS need no ROS.
+    """
+    listed = "\n".join(f"  {name:<10} {text}" for name, text in _COMMANDS.items())
+    parser = ArgumentParser(
+        prog="sms-handover",
+        description="A free-floating spacecraft with two arms hands a CubeSat from one arm to the other.",
+        epilog=f"commands:\n{listed}\n\n'sms-handover COMMAND --help' tells more of each.",
+        formatter_class=RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"sms-handover {__version__}")
+    parser.add_argument("command", choices=tuple(_COMMANDS), metavar="COMMAND", help="see below")
+    parser.add_argument("arguments", nargs=REMAINDER, metavar="...", help="options of the command")
+    chosen = parser.parse_args(arguments)
+    module = import_module(f"sms_handover.cli.{chosen.command}")
+    command_parser = ArgumentParser(prog=f"sms-handover {chosen.command}")
+    module.add_parser(command_parser)
+    options = command_parser.parse_args(chosen.arguments)
+    try:
+        return int(module.command(options))
+    except ConfigurationError as error:
+        print(f"sms-handover {chosen.command}: error: {error}", file=sys.stderr)
+        return _EXIT_USAGE
+    except SmsHandoverError as error:
+        print(f"sms-handover {chosen.command}: error: {error}", file=sys.stderr)
+        return _EXIT_FAILED
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return _EXIT_INTERRUPTED
+
+
+def run_main() -> int:
+    """Carry out ``sms-handover run``, for ``ros2 run sms_handover handover``."""
+    return main(["run", *sys.argv[1:]])
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,65 @@
+"""``sms-handover reproduce``: run a bag's scenario again in one process and compare bit by bit."""
+
+import tempfile
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from sms_handover.analysis.equality import compare_runs
+from sms_handover.bag.info import BagInfo, read_info
+from sms_handover.bag.reader import read_run
+from sms_handover.cli.folders import bag_of
+from sms_handover.errors import BagError
+from sms_handover.simulation.parameters import CommonParameters
+from sms_handover.simulation.scenario import COMMON, Scenario, load_scenario
+from sms_handover.simulation.simulate import simulate
+from sms_handover.topics import CONTROLLER, IK, PLANT, TRAJECTORY
+
+_NODES = (PLANT, TRAJECTORY, IK, CONTROLLER)
+_COMMON_NAMES = tuple(CommonParameters.__dataclass_fields__)
+_ROS_OWN = ("use_sim_time", "start_type_description_service")
+
+
+def add_parser(parser: ArgumentParser) -> None:
+    """Describe the command."""
+    parser.description = (
+        "Take parameters and schedule out of a bag, run them again in one process, and compare every state, "
+        "command and reference with the recording, bit by bit. The robot description must be that of then."
+    )
+    parser.epilog = "exit codes: 0 every bit is the same; 1 they differ; 2 the bag cannot be used"
+    parser.add_argument("run", type=Path, metavar="RUN", help="output folder of a lock-step run, or a bag")
+
+
+def command(options: Namespace) -> int:
+    """Carry out the command; return the exit code."""
+    bag = bag_of(options.run)
+    info = read_info(bag)
+    recorded = read_run(bag)
+    with tempfile.TemporaryDirectory() as folder:
+        again = simulate(scenario_in(info, Path(folder)))
+    differences = compare_runs(recorded, again)
+    for difference in differences:
+        print(difference)
+    if not differences:
+        print(
+            f"the same bit for bit: {recorded.tick_ns.size} states, {recorded.reference_ns.size} references"
+        )
+    return 1 if differences else 0
+
+
+def scenario_in(info: BagInfo, folder: Path) -> Scenario:
+    """Return the scenario that a bag was made with; its schedule is unpacked into ``folder``."""
+    if info.parameters is None or info.schedule_text is None or info.urdf_text is None:
+        raise BagError(f"{info.path} does not say what it was made with")
+    schedule = folder / "schedule.yaml"
+    schedule.write_text(info.schedule_text, encoding="utf-8")
+    overrides: dict[str, dict[str, object]] = {}
+    for node in _NODES:
+        values = info.parameters[node]
+        own = {n: v for n, v in values.items() if n not in _COMMON_NAMES and n not in _ROS_OWN}
+        overrides[node] = own
+        overrides[COMMON] = {n: v for n, v in values.items() if n in _COMMON_NAMES}
+    overrides[COMMON]["schedule"] = str(schedule)
+    scenario = load_scenario(overrides)
+    if scenario.robot.urdf != info.urdf_text:
+        raise BagError(f"{info.path} was made with another robot description than the one in use now")
+    return scenario

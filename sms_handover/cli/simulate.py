@@ -1,0 +1,43 @@
+"""``sms-handover simulate``: the same run in one process, without ROS."""
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from sms_handover.analysis.table import comparison_table
+from sms_handover.cli.check import check
+from sms_handover.cli.display import Display
+from sms_handover.cli.options import add_scenario_options, scenario_of
+from sms_handover.simulation.save import save_run
+from sms_handover.simulation.simulate import simulate
+from sms_handover.types import TaskPhase
+
+
+def add_parser(parser: ArgumentParser) -> None:
+    """Describe the command."""
+    parser.description = (
+        "Run the handover in one process by plain calls, without DDS and without a bag. The numbers are the "
+        "same, bit for bit, as those of a run over DDS in lock step."
+    )
+    add_scenario_options(parser)
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE.npz", help="write the arrays of the run to a NumPy archive"
+    )
+
+
+def command(options: Namespace) -> int:
+    """Carry out the command; return the exit code."""
+    scenario = scenario_of(options)
+    check(scenario)
+    common = scenario.parameters.common
+    display = Display(common.last_tick(scenario.schedule.end_ns) * common.tick_ns)
+
+    def show(stamp_ns: int, phase: TaskPhase) -> None:
+        display.show(stamp_ns, phase.name, {})
+
+    run = simulate(scenario, progress=show)
+    display.show(int(run.tick_ns[-1]), run.phases[-1].name, {}, last=True)
+    print(comparison_table({scenario.parameters.controller.law: run}))
+    if options.output:
+        save_run(run, options.output)
+        print(f"arrays written to {options.output}")
+    return 0

@@ -1,0 +1,107 @@
+"""The launcher's ear on a running graph: how far it is, what was grasped, what it waits for."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import PoseStamped
+from rclpy.node import Node
+from rclpy.qos import QoSHistoryPolicy, QoSProfile, QoSReliabilityPolicy
+from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
+from sms_handover_interfaces.msg import RunState, TaskPhase
+from std_srvs.srv import Trigger
+
+from sms_handover.bag.decode import grasp_event, header_ns
+from sms_handover.ros.qos import LATCHED
+from sms_handover.topics import (
+    DIAGNOSTICS,
+    GRASP_EVENT,
+    PLANT,
+    RUN_STATE,
+    TASK_PHASE,
+    target_pose,
+    tool_pose,
+)
+from sms_handover.types import GraspEvent
+
+_NEWEST = QoSProfile(
+    history=QoSHistoryPolicy.KEEP_LAST, depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT
+)  # a display must never hold the loop back
+
+
+@dataclass
+class Progress:
+    """What is known of the run; ``tool_error`` is the distance in m of each tool to its target."""
+
+    state: int = RunState.WAITING
+    detail: str = ""
+    stamp_ns: int = 0
+    phase: str = ""
+    tool_error: dict[str, float] = field(default_factory=dict)
+    events: list[GraspEvent] = field(default_factory=list)
+    waiting: dict[str, str] = field(default_factory=dict)
+
+
+class RunMonitor:
+    """Listens to a graph without taking part in it."""
+
+    def __init__(self, node: Node, arms: tuple[str, ...]) -> None:
+        """Subscribe to what tells the progress of the run."""
+        self.progress = Progress()
+        self._targets: dict[str, PoseStamped] = {}
+        self._finish = node.create_client(Trigger, f"{PLANT}/finish")
+        node.create_subscription(RunState, RUN_STATE, self._on_state, LATCHED)
+        node.create_subscription(GraspEventMessage, GRASP_EVENT, self._on_event, LATCHED)
+        node.create_subscription(TaskPhase, TASK_PHASE, self._on_phase, _NEWEST)
+        node.create_subscription(DiagnosticArray, DIAGNOSTICS, self._on_diagnostics, _NEWEST)
+        for arm in arms:
+            target, tool = partial(self._on_target, arm), partial(self._on_tool, arm)
+            node.create_subscription(PoseStamped, target_pose(arm), target, _NEWEST)
+            node.create_subscription(PoseStamped, tool_pose(arm), tool, _NEWEST)
+
+    @property
+    def finished(self) -> bool:
+        """Tell whether the plant has said that the run is over."""
+        return self.progress.state in (RunState.FINISHED, RunState.FAILED)
+
+    def ask_to_finish(self) -> None:
+        """Ask the plant to end the run at the present tick, if it is there."""
+        if self._finish.service_is_ready():
+            self._finish.call_async(Trigger.Request())
+
+    def waiting_for(self) -> str:
+        """Return in words what the nodes say they wait for."""
+        waiting: Mapping[str, str] = self.progress.waiting
+        return "; ".join(f"{name} is {text}" for name, text in waiting.items()) or "no node says why"
+
+    def _on_state(self, message: Any) -> None:
+        self.progress.state = message.state
+        self.progress.detail = message.detail
+        self.progress.stamp_ns = header_ns(message)
+
+    def _on_event(self, message: Any) -> None:
+        self.progress.events.append(grasp_event(message))
+
+    def _on_phase(self, message: Any) -> None:
+        self.progress.phase = message.name
+        self.progress.stamp_ns = max(self.progress.stamp_ns, header_ns(message))
+
+    def _on_target(self, arm: str, message: Any) -> None:
+        self._targets[arm] = message.pose.position
+
+    def _on_tool(self, arm: str, message: Any) -> None:
+        target = self._targets.get(arm)
+        if target is not None:
+            tool = message.pose.position
+            away = np.array([tool.x - target.x, tool.y - target.y, tool.z - target.z])
+            self.progress.tool_error[arm] = float(np.linalg.norm(away))
+
+    def _on_diagnostics(self, message: Any) -> None:
+        for status in message.status:
+            if status.level == DiagnosticStatus.OK:
+                self.progress.waiting.pop(status.name, None)
+            else:
+                self.progress.waiting[status.name] = status.message
