@@ -1,6 +1,7 @@
 """A comparison of runs as plain text: metrics, receipts, and the verdicts on the paper's claims."""
 
 from collections.abc import Callable, Mapping, Sequence
+from math import isnan
 from textwrap import wrap
 
 from sms_handover.analysis.base_motion import BaseMotion
@@ -97,7 +98,8 @@ def _phase_section(comparison: Comparison, name: str) -> Section:
     rows.append(row("  attitude change [deg]", phases, lambda item: item.base.attitude_change * DEG_PER_RAD))
     drifts = [drift[name] for drift in comparison.drift.values()]
     begin = largest([drift.begin for drift in drifts])
-    rows.append(Row(f"base, from {number(begin, _NEVER)} s on, when all runs have settled"))
+    since = "no run settles" if isnan(begin) else f"from {number(begin)} s on, when all runs that settle have"
+    rows.append(Row(f"base, drift: {since}"))
     rows += [row(label, drifts, value) for label, value in _DRIFT]
     begin_s, end_s = (ns_to_seconds(time_ns) for time_ns in (spans[0].start_ns, spans[0].end_ns))
     return Section(f"Phase {name}, {begin_s:g} to {end_s:g} s", tuple(rows))
