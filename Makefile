@@ -17,9 +17,8 @@ help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 
 handover: install  ## hand the deputy over under NMPC, then PID, over DDS in lock step; record both; compare
-	rm -rf $(RUNS)/nmpc $(RUNS)/pid
-	$(BIN)/sms-handover run --controller nmpc --output $(RUNS)/nmpc
-	$(BIN)/sms-handover run --controller pid --output $(RUNS)/pid
+	$(BIN)/sms-handover run --controller nmpc --output $(RUNS)/nmpc --overwrite
+	$(BIN)/sms-handover run --controller pid --output $(RUNS)/pid --overwrite
 	$(BIN)/sms-handover compare $(RUNS)/nmpc $(RUNS)/pid
 
 simulate: install  ## the same handover in one process, without DDS or a recording
