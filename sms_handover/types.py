@@ -17,10 +17,20 @@ Array = npt.NDArray[np.float64]
 
 
 def read_only(values: npt.ArrayLike) -> Array:
-    """Return a float64 copy of ``values`` that cannot be written to."""
+    """Return ``values`` as a float64 array that cannot be written to, copied unless it is one already."""
+    if type(values) is np.ndarray and values.dtype == np.float64 and _is_frozen(values):
+        return values
     array = np.array(values, dtype=np.float64)
     array.setflags(write=False)
     return array
+
+
+def _is_frozen(array: Array) -> bool:
+    """Tell whether nobody can write to the memory of an array: neither through it nor through its base."""
+    base = array.base
+    if isinstance(base, np.ndarray) and base.flags.writeable:
+        return False
+    return not array.flags.writeable and (base is None or isinstance(base, np.ndarray | bytes))
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sms_handover.control.base import ControlLaw, DesiredMotion, LinearFeedback
-from sms_handover.model.reduced import reduced_dynamics
+from sms_handover.model.reduced import reduced_inverse_dynamics
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.parameters import parameter
 from sms_handover.types import Array, RobotState
@@ -57,12 +57,11 @@ class NmpcLaw(ControlLaw[NmpcGains]):
     def step(self, state: RobotState, desired: DesiredMotion, dt: float) -> Array:
         """Return the joint efforts (n,) N m, limited to what the joints can give; ``dt`` plays no part."""
         robot, gains = self._robot, self._gains
-        dynamics = reduced_dynamics(robot, robot.q_of(state), robot.v_of(state))
         error = state.joint_position - desired.position
         error_rate = state.joint_velocity - desired.velocity
         acceleration = desired.acceleration - gains.position_gain * error - gains.velocity_gain * error_rate
-        effort = dynamics.inertia @ acceleration + dynamics.bias
-        return np.clip(effort, -robot.effort_limit, robot.effort_limit)
+        effort = reduced_inverse_dynamics(robot, robot.q_of(state), robot.v_of(state), acceleration)
+        return np.minimum(np.maximum(effort, -robot.effort_limit), robot.effort_limit)
 
     def linearised(self, inertia: Array) -> LinearFeedback:
         """Return K_e = A_1 H*, K_v = A_2 H*, K_z = 0."""

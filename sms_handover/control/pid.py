@@ -50,7 +50,7 @@ class PidLaw(ControlLaw[PidGains]):
         wanted = -(
             gains.proportional * error + gains.integral * self._integral + gains.derivative * error_rate
         )
-        effort: Array = np.clip(wanted, -limit, limit)
+        effort: Array = np.minimum(np.maximum(wanted, -limit), limit)
         winds_up = (wanted != effort) & (np.sign(wanted) == -np.sign(error))
         self._integral += np.where(winds_up, 0.0, error * dt)
         return effort

@@ -37,6 +37,20 @@ def reduced_dynamics(robot: RobotModel, q: Array, v: Array) -> ReducedDynamics:
     )
 
 
+def reduced_inverse_dynamics(robot: RobotModel, q: Array, v: Array, joint_acceleration: Array) -> Array:
+    """Return the joint efforts u (n,) N m that bring about joint accelerations (n,) rad/s^2 on a free base.
+
+    The same as H* q_m'' + c*, but without forming H*: the base accelerates by
+    a_b = -H_b^-1 (H_bm q_m'' + c_b), and u = H_bm^T a_b + H_m q_m'' + c_m.
+    """
+    inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.WORLD)
+    bias = pin.nonLinearEffects(robot.pin, robot.data, q, v)
+    pull = inertia[:, BASE_NV:] @ joint_acceleration + bias
+    base_acceleration = np.linalg.solve(inertia[:BASE_NV, :BASE_NV], -pull[:BASE_NV])
+    efforts: Array = pull[BASE_NV:] + inertia[BASE_NV:, :BASE_NV] @ base_acceleration
+    return efforts
+
+
 def base_twist_per_joint_rate(robot: RobotModel, q: Array) -> Array:
     """Return -H_b^-1 H_bm (6, n): the base twist in ``base_link`` axes per joint rate at zero momentum."""
     inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.WORLD)

@@ -47,15 +47,14 @@ class MasslessDeputy:
     def __init__(self, deputy_in_world: Pose, grasp_frames: Mapping[str, Pose]) -> None:
         """Start at rest at a pose, with the grasp frames as poses in the deputy."""
         self._grasp_frames = {name: se3_of(pose) for name, pose in grasp_frames.items()}
-        self._pose = se3_of(deputy_in_world)
-        self._twist = Twist(np.zeros(3), np.zeros(3))
+        self._place(se3_of(deputy_in_world), Twist(np.zeros(3), np.zeros(3)))
         self._holder = ""
         self._deputy_in_tool = pin.SE3.Identity()
 
     @property
     def state(self) -> DeputyState:
         """Return pose and twist in ``world`` axes, and who holds it."""
-        return DeputyState(pose_of(self._pose), self._twist, self._holder)
+        return DeputyState(pose_of(self._pose()), self._twist, self._holder)
 
     @property
     def holder(self) -> str:
@@ -64,9 +63,10 @@ class MasslessDeputy:
 
     def errors_of(self, grasp_frame: str, tool_in_world: Pose, tool_twist_in_world: Twist) -> GraspErrors:
         """Return how far a tool is from a grasp frame; the speed is that of the two origins."""
-        frame = self._pose * self._grasp_frames[grasp_frame]
+        deputy = self._pose()
+        frame = deputy * self._grasp_frames[grasp_frame]
         position, angle = pose_distance(pose_of(frame), tool_in_world)
-        lever = frame.translation - self._pose.translation
+        lever = frame.translation - deputy.translation
         frame_velocity = self._twist.linear + np.cross(self._twist.angular, lever)
         speed = float(np.linalg.norm(tool_twist_in_world.linear - frame_velocity))
         return GraspErrors(position, angle, speed)
@@ -74,7 +74,7 @@ class MasslessDeputy:
     def attach(self, arm: str, tool_in_world: Pose) -> None:
         """Fix the deputy to a tool at their present relative pose."""
         self._holder = arm
-        self._deputy_in_tool = se3_of(tool_in_world).actInv(self._pose)
+        self._deputy_in_tool = se3_of(tool_in_world).actInv(self._pose())
 
     def detach(self) -> None:
         """Let the deputy float with the twist it has."""
@@ -83,12 +83,21 @@ class MasslessDeputy:
     def follow(self, tool_in_world: Pose, tool_twist_in_world: Twist) -> None:
         """Move with the tool that holds it."""
         tool = se3_of(tool_in_world)
-        self._pose = tool * self._deputy_in_tool
-        lever = self._pose.translation - tool.translation
+        pose = tool * self._deputy_in_tool
+        lever = pose.translation - tool.translation
         linear = tool_twist_in_world.linear + np.cross(tool_twist_in_world.angular, lever)
-        self._twist = Twist(linear, tool_twist_in_world.angular)
+        self._place(pose, Twist(linear, tool_twist_in_world.angular))
 
     def drift(self, duration: float) -> None:
         """Move freely over ``duration`` s."""
-        rotation = pin.exp3(self._twist.angular * duration) @ self._pose.rotation
-        self._pose = pin.SE3(rotation, self._pose.translation + self._twist.linear * duration)
+        self._drifted_s += duration
+
+    def _place(self, pose: pin.SE3, twist: Twist) -> None:
+        """Begin to drift from a pose with a twist."""
+        self._start, self._twist, self._drifted_s = pose, twist, 0.0
+
+    def _pose(self) -> pin.SE3:
+        """Return the present pose: p0 + v t, exp(omega t) R0 since it was last placed."""
+        turn = pin.exp3(self._twist.angular * self._drifted_s)
+        way = self._twist.linear * self._drifted_s
+        return pin.SE3(turn @ self._start.rotation, self._start.translation + way)

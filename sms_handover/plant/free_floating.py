@@ -132,13 +132,14 @@ class FreeFloatingPlant:
         The work is u . (q_m(t + h) - q_m(t)), exact because u is constant over the tick.
         """
         limit = self._robot.effort_limit
-        effort = np.clip(command.effort, -limit, limit)
+        effort = np.minimum(np.maximum(command.effort, -limit), limit)
         self._saturated_ticks += effort != command.effort
         generalized = np.concatenate([np.zeros(BASE_NV), effort])
         model, data = self._robot.pin, self._robot.data
 
         def acceleration(q: Array, v: Array) -> Array:
-            return np.array(pin.aba(model, data, q, v, generalized))
+            joint_and_base: Array = pin.aba(model, data, q, v, generalized)
+            return joint_and_base
 
         before = self._q
         self._q, self._v = rkmk_step(model, self._tableau, acceleration, before, self._v, self._tick_s)

@@ -39,34 +39,45 @@ def rkmk_step(
     u' = dexpinv_{-u}(v); each stage evaluates v' = ``acceleration(q, v)`` at q0 (+) u_i.
     Shapes: ``q`` (7 + n,), ``v`` (6 + n,). The order is the tableau's, up to 4.
     """
-    tangents: list[Array] = []
-    slopes: list[Array] = []
-    for row in tableau.a:
+    tangents = np.empty((len(tableau.a), v.size))  # rows u'_i
+    slopes = np.empty_like(tangents)  # rows v'_i
+    for stage, row in enumerate(tableau.a):
         if row:
-            u = h * _combine(row, tangents)
-            v_stage = v + h * _combine(row, slopes)
+            weights = h * np.array(row)
+            u = weights @ tangents[:stage]
+            v_stage = v + weights @ slopes[:stage]
             q_stage = pin.integrate(model, q, u)
-            tangents.append(_inverse_differential(u, v_stage))
+            tangents[stage] = v_stage
+            tangents[stage, :BASE_NV] = _inverse_differential(u[:BASE_NV].tolist(), v_stage[:BASE_NV].tolist())
         else:
-            v_stage, q_stage = v, q
-            tangents.append(v)
-        slopes.append(acceleration(q_stage, v_stage))
-    q_next: Array = pin.integrate(model, q, h * _combine(tableau.b, tangents))
-    return q_next, v + h * _combine(tableau.b, slopes)
+            q_stage, v_stage = q, v
+            tangents[stage] = v
+        slopes[stage] = acceleration(q_stage, v_stage)
+    weights = h * np.array(tableau.b)
+    q_next: Array = pin.integrate(model, q, weights @ tangents)
+    return q_next, v + weights @ slopes
 
 
-def _combine(weights: tuple[float, ...], vectors: list[Array]) -> Array:
-    """Return the weighted sum of vectors, leaving out the zero weights."""
-    return sum(w * x for w, x in zip(weights, vectors, strict=True) if w)  # type: ignore[return-value]
+def _inverse_differential(u: list[float], v: list[float]) -> list[float]:
+    """Return dexpinv_{-u}(v) = v + [u, v]/2 + [u, [u, v]]/12 for two twists, linear part first.
 
-
-def _inverse_differential(u: Array, v: Array) -> Array:
-    """Return dexpinv_{-u}(v) = v + [u, v]/2 + [u, [u, v]]/12 on the base part; joints are flat.
-
-    The next term is of fourth order in u, so a step keeps order 4.
+    The next term is of fourth order in u, so a step keeps order 4. Plain floats: for six numbers
+    they are several times faster than arrays.
     """
-    base_u = pin.Motion(u[:BASE_NV])
-    bracket = base_u ^ pin.Motion(v[:BASE_NV])
-    result: Array = np.array(v)
-    result[:BASE_NV] += 0.5 * bracket.vector + (base_u ^ bracket).vector / 12.0
-    return result
+    first = _bracket(u, v)
+    second = _bracket(u, first)
+    return [x + 0.5 * y + z / 12.0 for x, y, z in zip(v, first, second, strict=True)]
+
+
+def _bracket(a: list[float], b: list[float]) -> list[float]:
+    """Return the Lie bracket of two twists: (w_a x v_b - w_b x v_a, w_a x w_b)."""
+    ax, ay, az, ap, aq, ar = a
+    bx, by, bz, bp, bq, br = b
+    return [
+        aq * bz - ar * by - bq * az + br * ay,
+        ar * bx - ap * bz - br * ax + bp * az,
+        ap * by - aq * bx - bp * ay + bq * ax,
+        aq * br - ar * bq,
+        ar * bp - ap * br,
+        ap * bq - aq * bp,
+    ]
