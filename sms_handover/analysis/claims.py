@@ -99,7 +99,6 @@ def _outcome(metrics: RunMetrics) -> _Outcome:
     complete = (
         grasped <= GRASP_BY
         and abs(passed - HANDOVER_AT) <= HANDOVER_WITHIN
-        and grasped < passed
         and changes[-1].holder == taker
         and not isnan(tool.settling_time)
         and tool.final_orientation_error <= FINAL_ANGLE

@@ -65,11 +65,15 @@ def test_a_window_without_two_states_has_no_motion(begin: float) -> None:
     assert all(isnan(value) for value in (found.duration, found.position_rate, found.mean_turn_rate))
 
 
-def test_states_that_were_not_recorded_are_left_out() -> None:
+@pytest.mark.parametrize("lost", [slice(2000, 2500), slice(2500, 3500), slice(3500, 4001)])
+@pytest.mark.parametrize("field", ["base_pose", "base_twist"])
+def test_states_that_were_not_recorded_are_left_out(field: str, lost: slice) -> None:
     run = drifting()
-    pose = np.array(run.base_pose)
-    pose[2500:3500] = nan
-    assert motion_of(changed(run, base_pose=pose)).mean_speed == pytest.approx(5e-5)
+    rows = np.array(getattr(run, field))
+    rows[lost] = nan
+    found = motion_of(changed(run, **{field: rows}))
+    assert (found.position_rate, found.mean_speed) == pytest.approx((5e-5, 5e-5))
+    assert found.duration == pytest.approx(20.0 if lost.start == 2500 else 15.0, abs=0.02)
 
 
 def settling_at(a: float, b: float) -> RunData:

@@ -185,6 +185,14 @@ def test_drift_is_compared_over_the_window_of_the_slower_law() -> None:
     assert found["attitude, last 25% of the phases"] == pytest.approx((1.0, 300.0))
 
 
+def test_a_drift_that_fades_away_is_gone_in_the_last_quarter() -> None:
+    pid = run_of(BAD)
+    fading = 1e-3 * np.exp(-(pid.tick_ns / NS) / 0.5)  # all of it early in the first phase
+    pid = changed(pid, base_pose=poses(line(lambda t: fading)(fading)))
+    found = figures({claim.name: claim for claim in judge(measure(run_of(GOOD)), measure(pid))}["drift"])
+    assert found["position, last 25% of the phases"][1] < 1e-3 * found["position, approach, since then"][1]
+
+
 @pytest.mark.parametrize(
     ("drift", "turn_rate", "holds"),
     [(1.01e-6, 1.01e-5, True), (0.99e-6, 1.01e-5, False), (1.01e-6, 0.99e-5, False)],
