@@ -70,7 +70,7 @@ setup(
         "numpy>=2.0,<3",
         "pin>=4.0,<5",
         "pyyaml>=6,<7",
-        "rosbags>=0.11,<0.12",
+        "rosbags>=0.11.6,<0.12",
     ],
     extras_require={
         "test": [
