@@ -130,8 +130,8 @@ def _check(value: object, hint: Any, spec: ParameterSpec, where: str) -> object:
         raise ConfigurationError(f"{where} is {value!r}, expected a number" + _unit(spec))
     if hint is int and not isinstance(value, int):
         raise ConfigurationError(f"{where} is {value!r}, expected a whole number" + _unit(spec))
-    if not isfinite(_as_float(value)):
-        raise ConfigurationError(f"{where} is {_as_float(value)}, expected a finite number" + _unit(spec))
+    if not isfinite(as_float(value)):
+        raise ConfigurationError(f"{where} is {as_float(value)}, expected a finite number" + _unit(spec))
     if spec.minimum is not None and value < spec.minimum:
         raise ConfigurationError(f"{where} is {value}{_unit(spec)}, allowed is at least {spec.minimum}")
     if spec.maximum is not None and value > spec.maximum:
@@ -139,7 +139,7 @@ def _check(value: object, hint: Any, spec: ParameterSpec, where: str) -> object:
     return float(value) if hint is float else value
 
 
-def _as_float(value: float) -> float:
+def as_float(value: float) -> float:
     """Return a number as a float; a whole number beyond every float is infinite."""
     try:
         return float(value)

@@ -95,8 +95,9 @@ class Schedule:
     text: str
 
     def __post_init__(self) -> None:
-        """Make the mapping immutable."""
-        object.__setattr__(self, "initial_joints", MappingProxyType(dict(self.initial_joints)))
+        """Copy the arrays and make them and the mapping immutable."""
+        joints = {arm: read_only(values) for arm, values in self.initial_joints.items()}
+        object.__setattr__(self, "initial_joints", MappingProxyType(joints))
 
     @property
     def end_ns(self) -> int:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sms_handover.errors import ScheduleError
-from sms_handover.trajectory.schedule import Phase
+from sms_handover.trajectory.schedule import GraspFrameTarget, Phase
 from sms_handover.types import GraspAction, GraspCommand
 from sms_handover.units import ns_to_seconds
 
@@ -14,6 +14,7 @@ def check_phases(path: Path, phases: Sequence[Phase], lines: Sequence[int], peri
 
     Phases begin and end on a reference period, names are unique, and at every instant at
     most one arm holds the deputy: no grasp while it is held, no release by an arm that does not hold it.
+    The arm that holds it is not sent to a grasp frame, which would run away from it.
     """
     holder = ""
     names: set[str] = set()
@@ -29,6 +30,12 @@ def check_phases(path: Path, phases: Sequence[Phase], lines: Sequence[int], peri
             )
         for command in phase.commands:
             holder = _holder_after(command, holder, where)
+        target = phase.targets.get(holder)
+        if isinstance(target, GraspFrameTarget):
+            raise ScheduleError(
+                f"{where}: {holder} holds the deputy, so its target at grasp frame {target.grasp_frame!r} "
+                "would move with the arm itself; use hold, joints or tool_in_world"
+            )
 
 
 def _holder_after(command: GraspCommand, holder: str, where: str) -> str:

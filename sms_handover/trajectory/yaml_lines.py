@@ -1,13 +1,14 @@
 """YAML mappings and lists that remember the line they start at, for errors that point at it."""
 
 from collections.abc import Sequence
+from math import inf, isfinite, nan
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from sms_handover.errors import ScheduleError, UnknownNameError
-from sms_handover.parameters import YamlLoader
+from sms_handover.parameters import YamlLoader, as_float
 
 
 class Section:
@@ -18,11 +19,13 @@ class Section:
         self._path = path
         self.line = node.start_mark.line + 1
         self._nodes: dict[str, yaml.Node] = {}
+        self._lines: dict[str, int] = {}
         for key_node, value_node in node.value:
             key = str(key_node.value)
             if key in self._nodes:
                 raise self.error(f"key {key!r} is given twice", key_node.start_mark.line + 1)
             self._nodes[key] = value_node
+            self._lines[key] = key_node.start_mark.line + 1
 
     def error(self, text: str, line: int | None = None) -> ScheduleError:
         """Return an error that names the file and a line, by default that of this section."""
@@ -34,8 +37,8 @@ class Section:
         return tuple(self._nodes)
 
     def line_of(self, key: str) -> int:
-        """Return the line of a key's value."""
-        return self._nodes[key].start_mark.line + 1
+        """Return the line of a key."""
+        return self._lines[key]
 
     def refuse_unknown(self, known: Sequence[str]) -> None:
         """Raise ScheduleError on a key that is not among the known ones."""
@@ -76,7 +79,8 @@ class Section:
         try:
             return loader.construct_object(self._get(key), deep=True)
         except yaml.YAMLError as error:
-            raise self.error(f"{key!r}: {error}", self.line_of(key)) from error
+            reason = " ".join(str(error).split())
+            raise self.error(f"{key!r}: {reason}", self.line_of(key)) from error
 
     def text(self, key: str) -> str:
         """Return the text under a key."""
@@ -85,7 +89,7 @@ class Section:
             raise self.error(f"{key!r} is {value!r}, expected text", self.line_of(key))
         return value
 
-    def number(self, key: str, unit: str, minimum: float = float("-inf")) -> float:
+    def number(self, key: str, unit: str, minimum: float = -inf) -> float:
         """Return the finite number under a key."""
         return self._number(self.value(key), key, unit, minimum)
 
@@ -94,15 +98,15 @@ class Section:
         values = self.value(key)
         if not isinstance(values, list) or len(values) != size:
             raise self.error(f"{key!r} is {values!r}, expected {size} numbers in {unit}", self.line_of(key))
-        return [self._number(value, key, unit, float("-inf")) for value in values]
+        return [self._number(value, key, unit, -inf) for value in values]
 
     def _number(self, value: object, key: str, unit: str, minimum: float) -> float:
         """Return ``value`` as a float if it is a finite number not below ``minimum``."""
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not minimum <= float(value) < float("inf"):  # type: ignore[arg-type]
-            allowed = f"a number of at least {minimum:g}" if minimum > float("-inf") else "a finite number"
+        number = as_float(value) if isinstance(value, int | float) and not isinstance(value, bool) else nan
+        if not isfinite(number) or number < minimum:
+            allowed = f"a number of at least {minimum:g}" if minimum > -inf else "a finite number"
             raise self.error(f"{key!r} is {value!r}, expected {allowed} in {unit}", self.line_of(key))
-        return float(value)  # type: ignore[arg-type]
+        return number
 
     def _get(self, key: str) -> yaml.Node:
         """Return the node under a key, which must be given."""

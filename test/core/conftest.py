@@ -160,9 +160,7 @@ phases:
       - transfer: {from: arm_a, to: arm_b, grasp_frame: right}
     arms:
       arm_a: hold
-      arm_b:
-        grasp_frame: right
-        tool_in_grasp_frame: {xyz: [0.0, 0.0, -0.05], rpy: [0.0, 0.0, 0.0]}
+      arm_b: {tool_in_world: {xyz: [1.1, -0.1, 0.8], rpy: [0.0, -1.2, 0.0]}}
 
   - name: let go
     duration: 0.2
@@ -170,7 +168,9 @@ phases:
       - release: {arm: arm_b}
     arms:
       arm_a: hold
-      arm_b: hold
+      arm_b:
+        grasp_frame: right
+        tool_in_grasp_frame: {xyz: [0.0, 0.0, -0.05], rpy: [0.0, 0.0, 0.0]}
 """
 
 MakeScenario = Callable[..., Scenario]

@@ -1,0 +1,501 @@
+"""A schedule is read whole, and everything wrong with it is said with the line where it stands."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sms_handover.errors import ConfigurationError, ScheduleError
+from sms_handover.model.poses import pose_distance, pose_from_xyz_rpy
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.share import config_file
+from sms_handover.simulation.scenario import Scenario
+from sms_handover.simulation.wiring import gains_by_phase
+from sms_handover.trajectory.load import load_schedule
+from sms_handover.trajectory.schedule import GraspFrameTarget, Hold, JointTarget, Schedule, ToolTarget
+from sms_handover.types import GraspAction, GraspCommand
+
+from .conftest import SCHEDULE, MakeScenario
+
+_PERIOD_NS = 20_000_000
+_NS = 1_000_000_000
+
+
+class Files:
+    """Schedules written to a folder and loaded for a robot."""
+
+    def __init__(self, folder: Path, robot: RobotModel) -> None:
+        """Keep the folder."""
+        self.path = folder / "schedule.yaml"
+        self.robot = robot
+
+    def load(self, text: str = SCHEDULE) -> Schedule:
+        """Write and load a schedule."""
+        self.path.write_text(text, encoding="utf-8")
+        return load_schedule(self.path, self.robot, _PERIOD_NS)
+
+    def refusal(self, text: str) -> str:
+        """Return the words with which a schedule is refused."""
+        with pytest.raises(ScheduleError) as caught:
+            self.load(text)
+        assert "\n" not in str(caught.value)
+        assert isinstance(caught.value, ConfigurationError)
+        return str(caught.value)
+
+
+@pytest.fixture
+def files(tmp_path: Path, robot: RobotModel) -> Files:
+    """A folder for one test."""
+    return Files(tmp_path, robot)
+
+
+# --- what is read --------------------------------------------------------------------------------
+
+
+def test_a_schedule_is_read_as_written(files: Files) -> None:
+    """Every number and name of the file stands in the schedule, and the file's text with it."""
+    schedule = files.load()
+    assert schedule.text == SCHEDULE
+    np.testing.assert_array_equal(
+        schedule.initial_joints["arm_b"], [-0.5, -0.6, -0.2, -1.6, -0.1, -0.7, -0.3]
+    )
+    base = pose_from_xyz_rpy(np.array([0.1, -0.2, 0.3]), np.array([0.1, 0.2, -0.3]))
+    assert pose_distance(schedule.base_in_world, base) == (0.0, 0.0)
+    assert (schedule.deputy.mass, schedule.deputy.size.tolist()) == (0.0, [0.1, 0.34, 0.1])
+    assert list(schedule.deputy.grasp_frames) == ["left", "right"]
+    assert [phase.name for phase in schedule.phases] == ["approach", "carry", "withdraw", "let go"]
+
+
+def test_times_follow_each_other(files: Files) -> None:
+    """A phase starts where the one before ends; a motion lasts as long as its phase unless it says so."""
+    phases = files.load().phases
+    spans = [(phase.start_ns / _NS, phase.end_ns / _NS, phase.motion_ns / _NS) for phase in phases]
+    assert spans == [(0.0, 0.4, 0.3), (0.4, 1.0, 0.6), (1.0, 1.2, 0.2), (1.2, 1.4, 0.2)]
+
+
+def test_every_kind_of_target(files: Files) -> None:
+    """Hold, joints, a tool pose in the world, and a pose relative to a grasp frame."""
+    approach, carry, _, let_go = files.load().phases
+    assert isinstance(approach.targets["arm_b"], Hold)
+    frame = approach.targets["arm_a"]
+    assert isinstance(frame, GraspFrameTarget)
+    assert frame.grasp_frame == "left"
+    np.testing.assert_array_equal(frame.tool_in_grasp_frame.position, np.zeros(3))
+    np.testing.assert_array_equal(frame.tool_in_grasp_frame.quaternion_xyzw, [0.0, 0.0, 0.0, 1.0])
+    tool, joints = carry.targets["arm_a"], carry.targets["arm_b"]
+    assert isinstance(tool, ToolTarget) and isinstance(joints, JointTarget)
+    expected = pose_from_xyz_rpy(np.array([1.1, 0.2, 0.8]), np.array([0.0, -1.2, 0.0]))
+    assert pose_distance(tool.tool_in_world, expected) == (0.0, 0.0)
+    np.testing.assert_array_equal(joints.position, [-0.4, -0.5, -0.1, -1.5, 0.0, -0.6, -0.2])
+    offset = let_go.targets["arm_b"]
+    assert isinstance(offset, GraspFrameTarget)
+    np.testing.assert_array_equal(offset.tool_in_grasp_frame.position, [0.0, 0.0, -0.05])
+
+
+def test_every_kind_of_event_and_gains(files: Files) -> None:
+    """Grasp, transfer and release, each at the first instant of its phase; gains per law."""
+    phases = files.load().phases
+    assert [phase.commands for phase in phases] == [
+        (),
+        (GraspCommand(GraspAction.GRASP, "arm_a", "left"),),
+        (GraspCommand(GraspAction.TRANSFER, "arm_b", "right", from_arm="arm_a"),),
+        (GraspCommand(GraspAction.RELEASE, "arm_b"),),
+    ]
+    assert phases[0].gains == {}
+    assert phases[1].gains == {"nmpc": {"rolling_period": 2.0}}
+
+
+def test_phase_in_force(files: Files) -> None:
+    """A phase holds from its start until just before the next; the last one holds on after the end."""
+    schedule = files.load()
+    tenths = [round(0.1 * k * _NS) for k in (0, 3, 4, 9, 10, 11, 12, 13, 14, 99)]
+    assert [schedule.phase_index(t) for t in tenths] == [0, 0, 1, 1, 2, 2, 3, 3, 3, 3]
+    assert schedule.phase_index(400_000_000 - 1) == 0
+    assert schedule.end_ns == 1_400_000_000
+
+
+def test_a_schedule_cannot_be_changed(files: Files) -> None:
+    """What was checked stays as it was checked."""
+    schedule = files.load()
+    with pytest.raises(ValueError, match="read-only"):
+        schedule.initial_joints["arm_a"][0] = 1.0
+    with pytest.raises(TypeError):
+        schedule.phases[0].targets["arm_a"] = Hold()  # type: ignore[index]
+
+
+def test_the_shipped_schedule_is_a_handover(scenario: Scenario) -> None:
+    """60 s; B holds during the first third; A grasps, then hands over to B; T_r is 2 s once it is held."""
+    schedule = scenario.schedule
+    assert schedule.text == config_file("handover.yaml").read_text(encoding="utf-8")
+    assert schedule.end_ns == 60 * _NS
+    holding = [phase for phase in schedule.phases if phase.start_ns < 20 * _NS]
+    assert all(isinstance(phase.targets["arm_b"], Hold) for phase in holding)
+    events = [(phase.start_ns // _NS, c.action, c.arm) for phase in schedule.phases for c in phase.commands]
+    assert events == [(20, GraspAction.GRASP, "arm_a"), (40, GraspAction.TRANSFER, "arm_b")]
+    for phase in schedule.phases:
+        rolling_period = phase.gains.get("nmpc", {}).get("rolling_period")
+        assert rolling_period == (None if phase.start_ns < 20 * _NS else 2.0)
+
+
+# --- what is refused -----------------------------------------------------------------------------
+
+# For each case: what is replaced in the good schedule, by what, the words expected, and the text on
+# whose line the error is, the last one that has it.
+_CARRY = "  - name: carry\n"
+REFUSED: dict[str, tuple[str, str, str, str]] = {
+    "unknown key at the top": (
+        "phases:\n",
+        "phase:\n",
+        "unknown key 'phase' (did you mean 'phases'?)",
+        "phase:",
+    ),
+    "unknown key in initial": (
+        "  joints:\n",
+        "  joint:\n",
+        "unknown key 'joint' (did you mean 'joints'?)",
+        "joint:",
+    ),
+    "unknown key in deputy": ("  size:", "  sise:", "unknown key 'sise' (did you mean 'size'?)", "sise"),
+    "unknown key in a phase": ("duration: 0.6", "duratoin: 0.6", "(did you mean 'duration'?)", "duratoin"),
+    "unknown key in a target": (
+        "tool_in_world:",
+        "tool_in_wold:",
+        "(did you mean 'tool_in_world'?)",
+        "tool_in_wold",
+    ),
+    "unknown key in a pose": (
+        "{xyz: [1.2, 0.3, 0.9], rpy",
+        "{xzy: [1.2, 0.3, 0.9], rpy",
+        "'xzy'",
+        "in_world: {xzy",
+    ),
+    "unknown arm at the start": ("    arm_a: [0.5", "    arm_c: [0.5", "unknown key 'arm_c'", "arm_c: [0.5"),
+    "unknown arm in a phase": ("arm_b: hold\n\n", "arm_c: hold\n\n", "unknown key 'arm_c'", "arm_c: hold"),
+    "unknown arm in an event": ("{arm: arm_b}", "{arm: arm_d}", "unknown arm 'arm_d'", "{arm: arm_d}"),
+    "unknown event": ("- grasp:", "- grab:", "unknown key 'grab' (did you mean 'grasp'?)", "grab"),
+    "unknown key in an event": (
+        "to: arm_b,",
+        "too: arm_b,",
+        "unknown key 'too' (did you mean 'to'?)",
+        "too:",
+    ),
+    "unknown grasp frame": ("{grasp_frame: left}", "{grasp_frame: lft}", "(did you mean 'left'?)", "lft"),
+    "two events in one": (
+        "- release: {arm: arm_b}",
+        "- {release: {arm: arm_b}, grasp: {arm: arm_b, grasp_frame: left}}",
+        "an event is exactly one of grasp, release, transfer",
+        "- {release",
+    ),
+    "missing joints of an arm": (
+        "    arm_b: [-0.5, -0.6, -0.2, -1.6, -0.1, -0.7, -0.3]\n",
+        "",
+        "key 'arm_b' is missing",
+        "    arm_a: [0.5",
+    ),
+    "missing target of an arm": (
+        "      arm_b: hold\n\n",
+        "\n",
+        "target of 'arm_b' is missing: give one of hold, joints, tool_in_world, grasp_frame",
+        "arm_a: {grasp_frame: left}",
+    ),
+    "missing rpy": (
+        "{xyz: [1.1, 0.2, 0.8], rpy: [0.0, -1.2, 0.0]}",
+        "{xyz: [1.1, 0.2, 0.8]}",
+        "'rpy' is missing",
+        "[1.1, 0.2",
+    ),
+    "missing name": (_CARRY, "  - start: 0.4\n", "key 'name' is missing", "- start: 0.4"),
+    "missing duration": ("    duration: 0.6\n", "", "key 'duration' is missing", "name: carry"),
+    "empty name": (_CARRY, '  - name: ""\n', "'name' is '', expected text", '- name: ""'),
+    "number for a name": (_CARRY, "  - name: 5\n", "'name' is 5, expected text", "- name: 5"),
+    "target that is a word": (
+        "arm_b: hold\n\n",
+        "arm_b: wait\n\n",
+        "is 'wait', expected 'hold' or a mapping",
+        "wait",
+    ),
+    "target of two kinds": (
+        "arm_a: {grasp_frame: left}",
+        "arm_a: {grasp_frame: left, joints: [0, 0, 0, 0, 0, 0, 0]}",
+        "needs exactly one of joints, tool_in_world, grasp_frame",
+        "joints: [0, 0",
+    ),
+    "target of no kind": (
+        "arm_a: {grasp_frame: left}",
+        "arm_a: {}",
+        "needs exactly one of joints",
+        "arm_a: {}",
+    ),
+    "offset without a grasp frame": (
+        "arm_a: {grasp_frame: left}",
+        "arm_a: {tool_in_grasp_frame: {xyz: [0, 0, 0], rpy: [0, 0, 0]}}",
+        "needs exactly one of joints",
+        "arm_a: {tool_in_grasp_frame",
+    ),
+    "text for a time": (
+        "duration: 0.6",
+        "duration: long",
+        "'duration' is 'long', expected a number of at",
+        "long",
+    ),
+    "no number": (
+        "duration: 0.6",
+        "duration: .nan",
+        "'duration' is nan, expected a number of at least 1e-09",
+        ".nan",
+    ),
+    "infinite time": (
+        "duration: 0.6",
+        "duration: .inf",
+        "'duration' is inf, expected a number of at",
+        ".inf",
+    ),
+    "time beyond every float": (
+        "duration: 0.6",
+        "duration: 1" + 400 * "0",
+        "expected a number of at",
+        "duration: 10",
+    ),
+    "no time at all": (
+        "duration: 0.6",
+        "duration: 0",
+        "'duration' is 0, expected a number of at least",
+        "duration: 0\n",
+    ),
+    "negative time": (
+        "duration: 0.6",
+        "duration: -0.6",
+        "'duration' is -0.6, expected a number of at least",
+        "-0.6\n",
+    ),
+    "yes for a time": ("duration: 0.6", "duration: yes", "'duration' is True, expected a number", "yes"),
+    "motion longer than the phase": (
+        "motion: 0.3",
+        "motion: 0.5",
+        "'motion' is longer than the phase",
+        "motion: 0.5",
+    ),
+    "no motion": (
+        "motion: 0.3",
+        "motion: 0.0",
+        "'motion' is 0.0, expected a number of at least",
+        "motion: 0.0",
+    ),
+    "too few joints": (
+        "[-0.4, -0.5, -0.1, -1.5, 0.0, -0.6, -0.2]",
+        "[-0.4]",
+        "expected 7 numbers in rad",
+        "[-0.4]",
+    ),
+    "too many coordinates": ("[1.2, 0.3, 0.9]", "[1.2, 0.3, 0.9, 0]", "expected 3 numbers in m", "0.9, 0]"),
+    "text among coordinates": (
+        "[1.2, 0.3, 0.9]",
+        "[1.2, x, 0.9]",
+        "'xyz' is 'x', expected a finite number in m",
+        "x, 0.9",
+    ),
+    "scalar for coordinates": ("[1.2, 0.3, 0.9]", "1.2", "'xyz' is 1.2, expected 3 numbers in m", "xyz: 1.2"),
+    "infinite coordinate": (
+        "[1.2, 0.3, 0.9]",
+        "[1.2, -.inf, 0.9]",
+        "'xyz' is -inf, expected a finite",
+        "-.inf",
+    ),
+    "start outside a limit": (
+        "-0.6, 0.2, -1.6",
+        "-0.6, 0.2, -2.6",
+        "arm_a_joint_4 is -2.6 rad, allowed is -2.57",
+        "-2.6",
+    ),
+    "target outside a limit": (
+        "-0.4, -0.5, -0.1",
+        "-0.4, 2.5, -0.1",
+        "arm_b_joint_2 is 2.5 rad, allowed is -2.24",
+        "2.5,",
+    ),
+    "deputy with mass": ("mass: 0.0", "mass: 4.0", "'mass' is 4 kg, but only a massless deputy", "mass"),
+    "deputy with negative mass": (
+        "mass: 0.0",
+        "mass: -1.0",
+        "'mass' is -1.0, expected a number of at least 0",
+        "-1.0\n",
+    ),
+    "deputy without extent": (
+        "size: [0.1, 0.34, 0.1]",
+        "size: [0.1, 0, 0.1]",
+        "three positive lengths",
+        "size: [0.1, 0,",
+    ),
+    "word for a mapping": (
+        "base_in_world: {xyz: [0.1, -0.2, 0.3], rpy: [0.1, 0.2, -0.3]}",
+        "base_in_world: here",
+        "'base_in_world' must be a mapping",
+        "here",
+    ),
+    "word for a list of events": (
+        "    events:\n      - release: {arm: arm_b}\n",
+        "    events: release\n",
+        "'events' must be a list",
+        "events: release",
+    ),
+    "word for an event": (
+        "- release: {arm: arm_b}",
+        "- release",
+        "every item of 'events' must be a mapping",
+        "- release",
+    ),
+    "word for gains": ("nmpc: {rolling_period: 2.0}", "nmpc: 2.0", "'nmpc' must be a mapping", "nmpc: 2.0"),
+    "key given twice": (
+        "duration: 0.6\n",
+        "duration: 0.6\n    duration: 0.7\n",
+        "'duration' is given twice",
+        "0.7",
+    ),
+    "gap between phases": (
+        "    start: 1.0\n",
+        "    start: 1.1\n",
+        "phase 'withdraw' starts at 1.1 s, but the one before it ends at 1 s",
+        "start: 1.1",
+    ),
+    "overlap of phases": (
+        "    start: 1.0\n",
+        "    start: 0.9\n",
+        "'withdraw' starts at 0.9 s, but",
+        "start: 0.9",
+    ),
+    "late first phase": (
+        "    start: 0.0\n",
+        "    start: 0.2\n",
+        "'approach' starts at 0.2 s, but",
+        "start: 0.2",
+    ),
+    "negative start": (
+        "    start: 0.0\n",
+        "    start: -1\n",
+        "'start' is -1, expected a number of at least 0",
+        "-1\n",
+    ),
+    "name given twice": (
+        _CARRY,
+        "  - name: approach\n",
+        "'approach' has the name of an earlier phase",
+        "- name: approach",
+    ),
+    "end between two references": (
+        "duration: 0.2\n    events:\n      - release",
+        "duration: 0.21\n    events:\n      - release",
+        "phase 'let go' ends at 1.41 s, which is not a multiple of the reference period of 0.02 s",
+        "name: let go",
+    ),
+    "release before a grasp": (
+        "- grasp: {arm: arm_a, grasp_frame: left}",
+        "- release: {arm: arm_a}",
+        "phase 'carry': arm_a releases the deputy, but no arm holds it",
+        "name: carry",
+    ),
+    "release by the other arm": (
+        "- release: {arm: arm_b}",
+        "- release: {arm: arm_a}",
+        "phase 'let go': arm_a releases the deputy, but arm_b holds it",
+        "name: let go",
+    ),
+    "both arms holding": (
+        "- transfer: {from: arm_a, to: arm_b, grasp_frame: right}",
+        "- grasp: {arm: arm_b, grasp_frame: right}",
+        "phase 'withdraw': arm_b grasps the deputy while arm_a holds it",
+        "name: withdraw",
+    ),
+    "transfer from an arm that holds nothing": (
+        "- grasp: {arm: arm_a, grasp_frame: left}",
+        "- grasp: {arm: arm_b, grasp_frame: left}",
+        "phase 'withdraw': a transfer from arm_a, but arm_b holds the deputy",
+        "name: withdraw",
+    ),
+    "transfer before a grasp": (
+        "- grasp: {arm: arm_a, grasp_frame: left}",
+        "- transfer: {from: arm_a, to: arm_b, grasp_frame: left}",
+        "phase 'carry': a transfer from arm_a, but no arm holds the deputy",
+        "name: carry",
+    ),
+    "holder sent to the deputy it holds": (
+        "tool_in_world: {xyz: [1.1, -0.1, 0.8], rpy: [0.0, -1.2, 0.0]}",
+        "grasp_frame: right",
+        "arm_b holds the deputy, so its target at grasp frame 'right' would move with the arm",
+        "name: withdraw",
+    ),
+    "transfer to itself": (
+        "to: arm_b, grasp",
+        "to: arm_a, grasp",
+        "a transfer from arm_a to itself",
+        "name: withdraw",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_wrong_is_said_with_its_line(files: Files, case: str) -> None:
+    """One change makes the schedule wrong; the error has the file, the line and the reason, in one line."""
+    old, new, words, marker = REFUSED[case]
+    assert SCHEDULE.count(old) >= 1
+    text = SCHEDULE.replace(old, new, 1)
+    message = files.refusal(text)
+    assert words in message
+    last = max(number for number, line in enumerate(text.splitlines(keepends=True), 1) if marker in line)
+    assert message.startswith(f"{files.path}:{last}: ")
+
+
+def test_missing_sections_are_named(files: Files) -> None:
+    """Without initial state, deputy or phases there is no task; the line is that of the section around."""
+    for name, after in (("initial", "deputy:"), ("deputy", "phases:")):
+        start = SCHEDULE.index(f"{name}:\n")
+        text = SCHEDULE[:start] + SCHEDULE[SCHEDULE.index(after) :]
+        assert files.refusal(text) == f"{files.path}:1: key {name!r} is missing"
+    text = SCHEDULE[: SCHEDULE.index("phases:")]
+    assert files.refusal(text) == f"{files.path}:1: key 'phases' is missing"
+    assert "'phases' is empty: a schedule needs at least one phase" in files.refusal(text + "phases: []\n")
+    assert "'phases' must be a list" in files.refusal(text + "phases: {a: 1}\n")
+    assert "every item of 'phases' must be a mapping" in files.refusal(text + "phases: [1]\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "expected a mapping at the top level"),
+        ("- 1\n", "expected a mapping at the top level"),
+        ("just words\n", "expected a mapping at the top level"),
+        ("initial: [1,\n", "is not valid YAML"),
+        ("a: b: c\n", "is not valid YAML: mapping values are not allowed here"),
+        ("\tinitial: 1\n", "is not valid YAML"),
+        ("initial: *nowhere\n", "is not valid YAML: found undefined alias"),
+    ],
+)
+def test_what_is_not_a_schedule_at_all(files: Files, text: str, words: str) -> None:
+    """Neither YAML nor a mapping: said with the path, in one line."""
+    message = files.refusal(text)
+    assert words in message
+    assert str(files.path) in message
+
+
+def test_files_that_cannot_be_read(files: Files, robot: RobotModel) -> None:
+    """A missing file, a folder and bytes that are no text are named."""
+    with pytest.raises(ScheduleError, match=r"cannot read the schedule .*schedule\.yaml: No such file"):
+        load_schedule(files.path, robot, _PERIOD_NS)
+    with pytest.raises(ScheduleError, match=r"cannot read the schedule .*: Is a directory"):
+        load_schedule(files.path.parent, robot, _PERIOD_NS)
+    files.path.write_bytes(b"\xff\xfe")
+    with pytest.raises(ScheduleError, match=r"schedule\.yaml is not valid YAML"):
+        load_schedule(files.path, robot, _PERIOD_NS)
+
+
+def test_a_tag_runs_no_code(files: Files) -> None:
+    """YAML can name Python functions; a schedule that does is refused, and nothing is called."""
+    text = SCHEDULE.replace("duration: 0.6", 'duration: !!python/object/apply:os.system ["exit 1"]')
+    assert "'duration'" in files.refusal(text)
+
+
+def test_gains_of_an_unknown_law_are_refused_when_the_controller_is_made(make_scenario: MakeScenario) -> None:
+    """The loader keeps gains as they are; the controller says which law or gain of which phase is unknown."""
+    for old, words in (("nmpc: {", "nmcp: {"), ("rolling_period: 2.0", "rolling_perod: 2.0")):
+        scenario = make_scenario(SCHEDULE.replace(old, words))
+        with pytest.raises(ConfigurationError, match=r"gains of phase 'carry': unknown .* \(did you mean"):
+            gains_by_phase(scenario.schedule, scenario.parameters.controller)
