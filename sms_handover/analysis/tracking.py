@@ -71,10 +71,8 @@ def tool_tracking(run: RunData, phase: PhaseSpan, arm: str) -> ToolTracking:
     motion, step = _motion(run, phase, arm, tool[:, :3], target[:, :3])
     step_length = float(np.linalg.norm(step))
     band = largest([SETTLING_BAND * step_length, SETTLING_FLOOR])
-    overshoot = nan
-    if motion is not Motion.HOLD:
-        beyond = way if motion is Motion.STEP else tool[:, :3] - target[-1, :3]
-        overshoot = max(0.0, largest(beyond @ (step / step_length)))
+    beyond = tool[:, :3] - target[-1, :3] if motion is Motion.SMOOTH else way
+    overshoot = nan if motion is Motion.HOLD else max(0.0, largest(beyond @ (step / step_length)))
     steady = stamp_ns >= phase.end_ns - round(STEADY_PART * (phase.end_ns - phase.start_ns))
     return ToolTracking(
         arm=arm,
@@ -86,8 +84,8 @@ def tool_tracking(run: RunData, phase: PhaseSpan, arm: str) -> ToolTracking:
         step_length=step_length,
         band=band,
         overshoot=overshoot,
-        overshoot_ratio=overshoot / step_length if motion is not Motion.HOLD else nan,
-        settling_time=settling_time(stamp_ns, error, band, phase.start_ns),
+        overshoot_ratio=nan if motion is Motion.HOLD else overshoot / step_length,
+        settling_time=settling_time(stamp_ns, lengths(beyond), band, phase.start_ns),
         largest_error=largest(error),
         steady_state_error=mean(error[steady]),
         final_error=float(error[-1]) if error.size else nan,

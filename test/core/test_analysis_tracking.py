@@ -173,6 +173,16 @@ def test_a_tool_that_leads_a_smooth_target_does_not_overshoot() -> None:
     assert found.overshoot == 0.0
 
 
+def test_a_smooth_motion_settles_where_it_ends_not_on_its_way() -> None:
+    found = track(line(smooth), line(smooth), reference_moves=True)  # never off its target
+    low, high = 0.0, 10.0
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if smooth(np.array([middle]))[0] < 0.98 * 0.4 else (low, middle)
+    assert found.largest_error == 0.0
+    assert low <= found.settling_time <= low + PERIOD
+
+
 def test_a_held_arm_has_no_step_to_overshoot() -> None:
     # the base carries the target of held joints away, and the tool swings about it
     swing = second_order(0.01, 0.3, 2.0)
