@@ -21,7 +21,8 @@ from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.main import run_node
 from sms_handover.ros.stamp_sync import StampSync
 from sms_handover.ros.wire import JointStateWire, StateWire
-from sms_handover.simulation.scenario import load_task
+from sms_handover.simulation.feasibility import check_feasibility
+from sms_handover.simulation.scenario import Scenario, load_parameters, load_task
 from sms_handover.topics import (
     BASE_ODOMETRY,
     DEPUTY_POSE,
@@ -47,9 +48,10 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
     """
 
     def __init__(self) -> None:
-        """Read the schedule; raises ScheduleError."""
+        """Read the schedule and check that it can be carried out; raises ScheduleError."""
         super().__init__(TRAJECTORY, TrajectoryParameters)
         schedule = load_task(self.common, self.robot)
+        check_feasibility(Scenario(load_parameters(), self.robot, schedule))
         self._generator = TrajectoryGenerator(self.robot, schedule, self.parameters)
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
         self._reference_wire = JointStateWire(self.robot.joint_names, ("position", "velocity"))
