@@ -6,12 +6,12 @@ from argparse import ArgumentParser, Namespace
 from datetime import datetime
 from pathlib import Path
 
-from sms_handover.cli.check import check
 from sms_handover.cli.domain import reserved_domain
 from sms_handover.cli.folders import BAG, LOGS
 from sms_handover.cli.launcher import LaunchPlan, launch
 from sms_handover.cli.options import add_scenario_options, scenario_of
 from sms_handover.errors import ConfigurationError
+from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.parameters import LOCKSTEP, REALTIME
 from sms_handover.simulation.scenario import Scenario
 from sms_handover.types import GraspStatus
@@ -52,7 +52,7 @@ def add_parser(parser: ArgumentParser) -> None:
 def command(options: Namespace) -> int:
     """Carry out the command; return the exit code."""
     scenario = scenario_of(options, REALTIME if options.real_time else LOCKSTEP)
-    check(scenario)
+    check_scenario(scenario)
     output = _output_folder(options, scenario)
     with reserved_domain(options.domain_id) as domain:
         plan = LaunchPlan(

@@ -4,9 +4,9 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from sms_handover.analysis.table import comparison_table
-from sms_handover.cli.check import check
 from sms_handover.cli.display import Display
 from sms_handover.cli.options import add_scenario_options, scenario_of
+from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.save import save_run
 from sms_handover.simulation.simulate import simulate
 from sms_handover.types import TaskPhase
@@ -27,7 +27,7 @@ def add_parser(parser: ArgumentParser) -> None:
 def command(options: Namespace) -> int:
     """Carry out the command; return the exit code."""
     scenario = scenario_of(options)
-    check(scenario)
+    check_scenario(scenario)
     common = scenario.parameters.common
     display = Display(common.last_tick(scenario.schedule.end_ns) * common.tick_ns)
 
@@ -36,7 +36,8 @@ def command(options: Namespace) -> int:
 
     run = simulate(scenario, progress=show)
     display.show(int(run.tick_ns[-1]), run.phases[-1].name, {}, last=True)
-    print(comparison_table({scenario.parameters.controller.law: run}))
+    name, tolerance = scenario.parameters.controller.law, scenario.parameters.plant.grasp_tolerance
+    print(comparison_table({name: run}, tolerance=tolerance))
     if options.output:
         save_run(run, options.output)
         print(f"arrays written to {options.output}")

@@ -69,11 +69,15 @@ def make_law(robot: RobotModel, gains: Gains) -> ControlLaw[Any]:
 
 
 def check_stability(
-    robot: RobotModel, gains_by_phase: Sequence[Gains], dt: float, q: Array
+    robot: RobotModel,
+    gains_by_phase: Sequence[Gains],
+    dt: float,
+    q: Array,
+    where: str = "at the start configuration",
 ) -> tuple[LoopStability, ...]:
     """Return the stability of the sampled loop of each gain set at rest in q (7 + n,).
 
-    Raises UnstableLoopError where one diverges.
+    Raises UnstableLoopError if one diverges; ``where`` says in its text what q is.
     """
     inertia = reduced_dynamics(robot, q, np.zeros(robot.pin.nv)).inertia
     found = []
@@ -82,7 +86,7 @@ def check_stability(
         stability = loop_stability(inertia, feedback, dt, robot.joint_names)
         if not stability.stable:
             raise UnstableLoopError(
-                f"the loop of {gains} at a tick of {dt:g} s is unstable at the start configuration: "
+                f"the loop of {gains} at a tick of {dt:g} s is unstable {where}: "
                 f"spectral radius {stability.spectral_radius:.6f}, allowed is below 1, "
                 f"first at {stability.joint}; use a shorter tick or smaller gains"
             )

@@ -48,7 +48,9 @@ def rkmk_step(
             v_stage = v + weights @ slopes[:stage]
             q_stage = pin.integrate(model, q, u)
             tangents[stage] = v_stage
-            tangents[stage, :BASE_NV] = _inverse_differential(u[:BASE_NV].tolist(), v_stage[:BASE_NV].tolist())
+            tangents[stage, :BASE_NV] = _inverse_differential(
+                u[:BASE_NV].tolist(), v_stage[:BASE_NV].tolist()
+            )
         else:
             q_stage, v_stage = q, v
             tangents[stage] = v

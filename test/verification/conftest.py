@@ -32,7 +32,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 @pytest.fixture
 def record(request: pytest.FixtureRequest) -> Iterator[Record]:
-    """Give ``record(claim, value, bound, unit=..., against=...)``: keeps the number, fails beyond the bound."""
+    """Give ``record(claim, value, bound, unit=..., against=...)``: keeps a number, fails beyond its bound."""
     broken: list[Evidence] = []
 
     def keep(claim: str, value: float, bound: float, *, unit: str = "-", against: str) -> None:

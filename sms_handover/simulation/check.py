@@ -1,0 +1,26 @@
+"""Everything that can be wrong with a scenario, found before anything moves."""
+
+from sms_handover.control.controller import check_stability
+from sms_handover.simulation.feasibility import PhasePrediction, check_feasibility
+from sms_handover.simulation.scenario import Scenario
+from sms_handover.simulation.wiring import gains_by_phase, make_controller, make_plant
+from sms_handover.units import ns_to_seconds
+
+
+def check_scenario(scenario: Scenario) -> tuple[PhasePrediction, ...]:
+    """Return where each phase will end; raises ConfigurationError where the scenario cannot be run.
+
+    Beyond what making the parts of the loop checks, every target must be in reach, every grasp must
+    meet its frame, and the sampled loop must be stable where each phase ends, not only at the start: the
+    reduced inertia falls where wrist axes come into line.
+    """
+    parameters, robot, schedule = scenario.parameters, scenario.robot, scenario.schedule
+    make_plant(robot, schedule, parameters.common, parameters.plant)
+    make_controller(robot, schedule, parameters.common, parameters.controller)
+    predictions = check_feasibility(scenario)
+    gains = gains_by_phase(schedule, parameters.controller)
+    for one, end in zip(gains, predictions, strict=True):
+        q = robot.configuration(end.base_in_world, end.joint_position)
+        where = f"where phase {end.phase!r} ends"
+        check_stability(robot, (one,), ns_to_seconds(parameters.common.tick_ns), q, where)
+    return predictions
