@@ -6,7 +6,7 @@ of another layout (other names, other order, another sender's padding) is read t
 """
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from sms_handover.units import NS_PER_S
 _STAMP = struct.Struct("<iI")  # seconds, nanoseconds
 _STAMP_AT = 4  # [byte] behind the encapsulation header
 _BODY_AT = _STAMP_AT + _STAMP.size
-_LENGTH = 4  # [byte] of the length before a sequence
+_DOUBLE = 8  # [byte]
 _LITTLE_ENDIAN = b"\x00\x01"  # encapsulation of plain CDR
 
 
@@ -39,7 +39,7 @@ class JointStateWire:
         marked = {block: np.full(n, float(i + 1)) for i, block in enumerate(self._blocks)}
         self._template = _joint_state(self._names, marked)
         self._at = {block: _find(self._template, values) for block, values in marked.items()}
-        self._fixed = self._template[_BODY_AT : min(self._at.values()) - _LENGTH]
+        self._fixed = _around(self._template, self._at.values(), n * _DOUBLE)
 
     def pack(self, stamp_ns: int, **blocks: Array) -> bytes:
         """Return the bytes of a message with a stamp and the arrays (n,) of every block."""
@@ -59,8 +59,8 @@ class JointStateWire:
         return {b: joints_in_order(self._names, message.name, getattr(message, b)) for b in self._blocks}
 
     def _same_layout(self, data: bytes) -> bool:
-        """Tell whether the bytes are little endian and have the names where the template has them."""
-        return data.startswith(_LITTLE_ENDIAN) and data.startswith(self._fixed, _BODY_AT)
+        """Tell whether the bytes are little endian and have names and lengths where the template has them."""
+        return data.startswith(_LITTLE_ENDIAN) and all(data.startswith(part, at) for at, part in self._fixed)
 
 
 class OdometryWire:
@@ -164,6 +164,16 @@ def _header(types: MessageTypes, frame: str) -> Any:
     """Return a header with stamp zero."""
     time = types.make("builtin_interfaces/msg/Time", sec=0, nanosec=0)
     return types.make("std_msgs/msg/Header", stamp=time, frame_id=frame)
+
+
+def _around(template: bytes, starts: Collection[int], size: int) -> tuple[tuple[int, bytes], ...]:
+    """Return the bytes behind the stamp that every message of a layout has, each part with its place.
+
+    They are what is left when ``size`` bytes of numbers are taken out at each of ``starts``.
+    """
+    begins = [_BODY_AT, *(start + size for start in starts)]
+    ends = [*starts, len(template)]
+    return tuple((begin, template[begin:end]) for begin, end in zip(begins, ends, strict=True))
 
 
 def _find(raw: bytes, values: Array) -> int:
