@@ -7,8 +7,12 @@ from sms_handover.types import Array, Pose, Twist
 
 
 def se3_of(pose: Pose) -> pin.SE3:
-    """Return the homogeneous transformation of a pose."""
-    return pin.SE3(pin.Quaternion(pose.quaternion_xyzw), pose.position)
+    """Return the homogeneous transformation of a pose.
+
+    The quaternion is normalised first: an error of its length in the last digit would grow by about
+    half each time a pose goes from quaternion to matrix and back.
+    """
+    return pin.SE3(pin.Quaternion(pose.quaternion_xyzw).normalized(), pose.position)
 
 
 def pose_of(transformation: pin.SE3) -> Pose:

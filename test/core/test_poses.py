@@ -53,6 +53,15 @@ def test_pose_and_transformation_are_one(draw: Draw) -> None:
         assert abs(abs(again.quaternion_xyzw @ pose.quaternion_xyzw) - 1.0) <= _ROUNDING
 
 
+def test_going_to_a_matrix_and_back_does_not_add_up(draw: Draw) -> None:
+    """A thousand conversions leave an orientation where it was: no error grows from one to the next."""
+    for _ in range(20):
+        pose = again = draw.pose()
+        for _ in range(1000):
+            again = pose_of(se3_of(again))
+        assert row_distance(pose_row(pose), pose_row(again))[1] <= 1000 * _ROUNDING
+
+
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-6, 0.3, 2.0, pi - 1e-9, pi])
 def test_distance_is_the_angle_of_the_turn(draw: Draw, angle: float) -> None:
     """The angle between two orientations is that of the turn between them, precise even when tiny."""
