@@ -189,7 +189,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
             self._topics.add(name)
             offers = [publisher.qos_profile for publisher in publishers]
             try:
-                self._recording.add_topic(name, type_names[0], [stored(offer) for offer in offers])
+                self._recording.add_topic(name, type_names[0], list(dict.fromkeys(map(stored, offers))))
                 kind = message_class(type_names[0])
             except SmsHandoverError as error:
                 self.get_logger().warning(f"{name} is not recorded: {error}")
