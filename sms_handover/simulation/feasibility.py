@@ -22,7 +22,9 @@ from sms_handover.units import DEG_PER_RAD, MM_PER_M
 _PATH_STEPS = 64  # [-] midpoint steps along a joint path; their error is far below a grasp tolerance
 _MAX_SETTLE = 40  # [-] each round shrinks the error by about the arms' share of the mass
 _SETTLED = 1e-9  # [m, rad] change of the base pose in a round
+_SETTLED_OUT_OF_REACH = 1e-4  # [m, rad] the same where only the size of a miss is wanted
 _RESTARTS = 10  # [-] random configurations tried where the present one does not lead to the target
+_WORTH_FOLLOWING = 0.9  # [-] share of the best error energy below which a restart is followed up
 _SEED = 20250101  # [-] so that a schedule always gets the same verdict
 _AT_REST = Twist(np.zeros(3), np.zeros(3))
 
@@ -138,7 +140,7 @@ class _Walk:
                 low, high = np.maximum(robot.lower[part], -np.pi), np.minimum(robot.upper[part], np.pi)
                 seed[part] = random.uniform(low, high)
             trial = self._solve(best.base_in_world, seed, best.targets)
-            if trial.energy < best.energy:
+            if trial.energy < _WORTH_FOLLOWING * best.energy:
                 settled = self._settle(phase, trial.base_in_world, trial.joint_position)
                 best = min(best, settled, key=lambda rest: rest.energy)
         for arm, (position, angle) in best.missed.items():
@@ -161,7 +163,7 @@ class _Walk:
             rest = self._solve(base, joints, self._targets(phase, base, joints))
             joints = rest.joint_position
             settled = base_after(self._robot, self._base, self._joints, joints)
-            if max(pose_distance(base, settled)) <= _SETTLED:
+            if max(pose_distance(base, settled)) <= (_SETTLED_OUT_OF_REACH if rest.missed else _SETTLED):
                 break
             base = settled
         return rest

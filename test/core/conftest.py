@@ -117,21 +117,22 @@ def scenario() -> Scenario:
     return load_scenario()
 
 
-# One handover in small: as many phases as the shipped one, every kind of target and event, own poses.
+# One handover in small: every kind of target and event, with poses of its own. All targets are in reach
+# and fit the deputy, but the phases are far too short for a robot to arrive.
 SCHEDULE = """\
 initial:
-  base_in_world: {xyz: [0.1, -0.2, 0.3], rpy: [0.1, 0.2, -0.3]}
+  base_in_world: {xyz: [0.1, -0.2, 0.3], rpy: [0.0, 0.0, 0.05]}
   joints:
-    arm_a: [0.5, -0.6, 0.2, -1.6, 0.1, -0.7, 0.3]
-    arm_b: [-0.5, -0.6, -0.2, -1.6, -0.1, -0.7, -0.3]
+    arm_a: [0.7, -1.7, 1.4, 1.9, 1.6, -1.4, 1.2]
+    arm_b: [-0.7, -1.7, -1.4, 1.9, -1.6, -1.4, -1.2]
 
 deputy:
   mass: 0.0
   size: [0.1, 0.34, 0.1]
-  in_world: {xyz: [1.2, 0.3, 0.9], rpy: [0.3, -0.2, 0.1]}
+  in_world: {xyz: [1.25, 0.0, 0.75], rpy: [0.0, 0.1, 0.0]}
   grasp_frames:
-    left: {xyz: [0.0, 0.12, 0.0], rpy: [0.0, 0.0, 0.0]}
-    right: {xyz: [0.0, -0.12, 0.0], rpy: [0.0, 0.0, 3.14]}
+    left: {xyz: [-0.05, 0.12, 0.0], rpy: [3.14, -1.5, 0.0]}
+    right: {xyz: [-0.05, -0.12, 0.0], rpy: [3.14, -1.5, 0.0]}
 
 phases:
   - name: approach
@@ -148,8 +149,8 @@ phases:
       - grasp: {arm: arm_a, grasp_frame: left}
     arms:
       arm_a:
-        tool_in_world: {xyz: [1.1, 0.2, 0.8], rpy: [0.0, -1.2, 0.0]}
-      arm_b: {joints: [-0.4, -0.5, -0.1, -1.5, 0.0, -0.6, -0.2]}
+        tool_in_world: {xyz: [1.15, 0.02, 0.75], rpy: [3.14, -1.5, 0.0]}
+      arm_b: {tool_in_world: {xyz: [1.15, -0.22, 0.75], rpy: [3.14, -1.5, 0.0]}}
     gains:
       nmpc: {rolling_period: 2.0}
 
@@ -159,8 +160,8 @@ phases:
     events:
       - transfer: {from: arm_a, to: arm_b, grasp_frame: right}
     arms:
-      arm_a: hold
-      arm_b: {tool_in_world: {xyz: [1.1, -0.1, 0.8], rpy: [0.0, -1.2, 0.0]}}
+      arm_a: {joints: [0.6, -1.6, 1.3, 1.8, 1.5, -1.3, 1.1]}
+      arm_b: {tool_in_world: {xyz: [1.2, -0.42, 0.75], rpy: [3.14, -1.5, 0.0]}}
 
   - name: let go
     duration: 0.2

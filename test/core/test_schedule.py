@@ -56,10 +56,8 @@ def test_a_schedule_is_read_as_written(files: Files) -> None:
     """Every number and name of the file stands in the schedule, and the file's text with it."""
     schedule = files.load()
     assert schedule.text == SCHEDULE
-    np.testing.assert_array_equal(
-        schedule.initial_joints["arm_b"], [-0.5, -0.6, -0.2, -1.6, -0.1, -0.7, -0.3]
-    )
-    base = pose_from_xyz_rpy(np.array([0.1, -0.2, 0.3]), np.array([0.1, 0.2, -0.3]))
+    np.testing.assert_array_equal(schedule.initial_joints["arm_b"], [-0.7, -1.7, -1.4, 1.9, -1.6, -1.4, -1.2])
+    base = pose_from_xyz_rpy(np.array([0.1, -0.2, 0.3]), np.array([0.0, 0.0, 0.05]))
     assert pose_distance(schedule.base_in_world, base) == (0.0, 0.0)
     assert (schedule.deputy.mass, schedule.deputy.size.tolist()) == (0.0, [0.1, 0.34, 0.1])
     assert list(schedule.deputy.grasp_frames) == ["left", "right"]
@@ -75,18 +73,18 @@ def test_times_follow_each_other(files: Files) -> None:
 
 def test_every_kind_of_target(files: Files) -> None:
     """Hold, joints, a tool pose in the world, and a pose relative to a grasp frame."""
-    approach, carry, _, let_go = files.load().phases
+    approach, carry, withdraw, let_go = files.load().phases
     assert isinstance(approach.targets["arm_b"], Hold)
     frame = approach.targets["arm_a"]
     assert isinstance(frame, GraspFrameTarget)
     assert frame.grasp_frame == "left"
     np.testing.assert_array_equal(frame.tool_in_grasp_frame.position, np.zeros(3))
     np.testing.assert_array_equal(frame.tool_in_grasp_frame.quaternion_xyzw, [0.0, 0.0, 0.0, 1.0])
-    tool, joints = carry.targets["arm_a"], carry.targets["arm_b"]
+    tool, joints = carry.targets["arm_a"], withdraw.targets["arm_a"]
     assert isinstance(tool, ToolTarget) and isinstance(joints, JointTarget)
-    expected = pose_from_xyz_rpy(np.array([1.1, 0.2, 0.8]), np.array([0.0, -1.2, 0.0]))
+    expected = pose_from_xyz_rpy(np.array([1.15, 0.02, 0.75]), np.array([3.14, -1.5, 0.0]))
     assert pose_distance(tool.tool_in_world, expected) == (0.0, 0.0)
-    np.testing.assert_array_equal(joints.position, [-0.4, -0.5, -0.1, -1.5, 0.0, -0.6, -0.2])
+    np.testing.assert_array_equal(joints.position, [0.6, -1.6, 1.3, 1.8, 1.5, -1.3, 1.1])
     offset = let_go.targets["arm_b"]
     assert isinstance(offset, GraspFrameTarget)
     np.testing.assert_array_equal(offset.tool_in_grasp_frame.position, [0.0, 0.0, -0.05])
@@ -164,12 +162,12 @@ REFUSED: dict[str, tuple[str, str, str, str]] = {
         "tool_in_wold",
     ),
     "unknown key in a pose": (
-        "{xyz: [1.2, 0.3, 0.9], rpy",
-        "{xzy: [1.2, 0.3, 0.9], rpy",
+        "{xyz: [1.25, 0.0, 0.75], rpy",
+        "{xzy: [1.25, 0.0, 0.75], rpy",
         "'xzy'",
         "in_world: {xzy",
     ),
-    "unknown arm at the start": ("    arm_a: [0.5", "    arm_c: [0.5", "unknown key 'arm_c'", "arm_c: [0.5"),
+    "unknown arm at the start": ("    arm_a: [0.7", "    arm_c: [0.7", "unknown key 'arm_c'", "arm_c: [0.7"),
     "unknown arm in a phase": ("arm_b: hold\n\n", "arm_c: hold\n\n", "unknown key 'arm_c'", "arm_c: hold"),
     "unknown arm in an event": ("{arm: arm_b}", "{arm: arm_d}", "unknown arm 'arm_d'", "{arm: arm_d}"),
     "unknown event": ("- grasp:", "- grab:", "unknown key 'grab' (did you mean 'grasp'?)", "grab"),
@@ -187,10 +185,10 @@ REFUSED: dict[str, tuple[str, str, str, str]] = {
         "- {release",
     ),
     "missing joints of an arm": (
-        "    arm_b: [-0.5, -0.6, -0.2, -1.6, -0.1, -0.7, -0.3]\n",
+        "    arm_b: [-0.7, -1.7, -1.4, 1.9, -1.6, -1.4, -1.2]\n",
         "",
         "key 'arm_b' is missing",
-        "    arm_a: [0.5",
+        "    arm_a: [0.7",
     ),
     "missing target of an arm": (
         "      arm_b: hold\n\n",
@@ -199,10 +197,10 @@ REFUSED: dict[str, tuple[str, str, str, str]] = {
         "arm_a: {grasp_frame: left}",
     ),
     "missing rpy": (
-        "{xyz: [1.1, 0.2, 0.8], rpy: [0.0, -1.2, 0.0]}",
-        "{xyz: [1.1, 0.2, 0.8]}",
+        "{xyz: [1.15, 0.02, 0.75], rpy: [3.14, -1.5, 0.0]}",
+        "{xyz: [1.15, 0.02, 0.75]}",
         "'rpy' is missing",
-        "[1.1, 0.2",
+        "[1.15, 0.02",
     ),
     "missing name": (_CARRY, "  - start: 0.4\n", "key 'name' is missing", "- start: 0.4"),
     "missing duration": ("    duration: 0.6\n", "", "key 'duration' is missing", "name: carry"),
@@ -282,35 +280,45 @@ REFUSED: dict[str, tuple[str, str, str, str]] = {
         "motion: 0.0",
     ),
     "too few joints": (
-        "[-0.4, -0.5, -0.1, -1.5, 0.0, -0.6, -0.2]",
-        "[-0.4]",
+        "[0.6, -1.6, 1.3, 1.8, 1.5, -1.3, 1.1]",
+        "[0.6]",
         "expected 7 numbers in rad",
-        "[-0.4]",
+        "[0.6]",
     ),
-    "too many coordinates": ("[1.2, 0.3, 0.9]", "[1.2, 0.3, 0.9, 0]", "expected 3 numbers in m", "0.9, 0]"),
+    "too many coordinates": (
+        "[1.25, 0.0, 0.75]",
+        "[1.25, 0.0, 0.75, 0]",
+        "expected 3 numbers in m",
+        "0.75, 0]",
+    ),
     "text among coordinates": (
-        "[1.2, 0.3, 0.9]",
-        "[1.2, x, 0.9]",
+        "[1.25, 0.0, 0.75]",
+        "[1.25, x, 0.75]",
         "'xyz' is 'x', expected a finite number in m",
-        "x, 0.9",
+        "x, 0.75",
     ),
-    "scalar for coordinates": ("[1.2, 0.3, 0.9]", "1.2", "'xyz' is 1.2, expected 3 numbers in m", "xyz: 1.2"),
+    "scalar for coordinates": (
+        "[1.25, 0.0, 0.75]",
+        "1.25",
+        "'xyz' is 1.25, expected 3 numbers in m",
+        "xyz: 1.25",
+    ),
     "infinite coordinate": (
-        "[1.2, 0.3, 0.9]",
-        "[1.2, -.inf, 0.9]",
+        "[1.25, 0.0, 0.75]",
+        "[1.25, -.inf, 0.75]",
         "'xyz' is -inf, expected a finite",
         "-.inf",
     ),
     "start outside a limit": (
-        "-0.6, 0.2, -1.6",
-        "-0.6, 0.2, -2.6",
-        "arm_a_joint_4 is -2.6 rad, allowed is -2.57",
-        "-2.6",
+        "1.4, 1.9, 1.6",
+        "1.4, 2.6, 1.6",
+        "arm_a_joint_4 is 2.6 rad, allowed is -2.57",
+        "2.6, 1.6",
     ),
     "target outside a limit": (
-        "-0.4, -0.5, -0.1",
-        "-0.4, 2.5, -0.1",
-        "arm_b_joint_2 is 2.5 rad, allowed is -2.24",
+        "0.6, -1.6, 1.3",
+        "0.6, 2.5, 1.3",
+        "arm_a_joint_2 is 2.5 rad, allowed is -2.24",
         "2.5,",
     ),
     "deputy with mass": ("mass: 0.0", "mass: 4.0", "'mass' is 4 kg, but only a massless deputy", "mass"),
@@ -327,7 +335,7 @@ REFUSED: dict[str, tuple[str, str, str, str]] = {
         "size: [0.1, 0,",
     ),
     "word for a mapping": (
-        "base_in_world: {xyz: [0.1, -0.2, 0.3], rpy: [0.1, 0.2, -0.3]}",
+        "base_in_world: {xyz: [0.1, -0.2, 0.3], rpy: [0.0, 0.0, 0.05]}",
         "base_in_world: here",
         "'base_in_world' must be a mapping",
         "here",
@@ -347,9 +355,9 @@ REFUSED: dict[str, tuple[str, str, str, str]] = {
     "word for gains": ("nmpc: {rolling_period: 2.0}", "nmpc: 2.0", "'nmpc' must be a mapping", "nmpc: 2.0"),
     "key given twice": (
         "duration: 0.6\n",
-        "duration: 0.6\n    duration: 0.7\n",
+        "duration: 0.6\n    duration: 0.8\n",
         "'duration' is given twice",
-        "0.7",
+        "0.8",
     ),
     "gap between phases": (
         "    start: 1.0\n",
@@ -418,7 +426,7 @@ REFUSED: dict[str, tuple[str, str, str, str]] = {
         "name: carry",
     ),
     "holder sent to the deputy it holds": (
-        "tool_in_world: {xyz: [1.1, -0.1, 0.8], rpy: [0.0, -1.2, 0.0]}",
+        "tool_in_world: {xyz: [1.2, -0.42, 0.75], rpy: [3.14, -1.5, 0.0]}",
         "grasp_frame: right",
         "arm_b holds the deputy, so its target at grasp frame 'right' would move with the arm",
         "name: withdraw",
