@@ -26,12 +26,12 @@ class PhysicsReceipt:
 def physics_receipt(robot: RobotModel, q: Array, v: Array) -> PhysicsReceipt:
     """Return the conserved quantities by the centroidal momentum A_G(q) v [Orin2013].
 
-    Kinetic energy is v^T H v / 2; Pinocchio's sum over the bodies leaves out the spin of the rotors,
-    which is added here. Shapes: ``q`` (7 + n,), ``v`` (6 + n,).
+    Kinetic energy is v^T H v / 2, with the rotors in H: Pinocchio 4.1's own sum leaves them out at
+    joints whose axis is not x, y or z of their frame. Shapes: ``q`` (7 + n,), ``v`` (6 + n,).
     """
     momentum = pin.computeCentroidalMomentum(robot.pin, robot.data, q, v)
     linear, angular = np.array(momentum.linear), np.array(momentum.angular)
     centre = np.array(pin.centerOfMass(robot.pin, robot.data, q))
-    bodies = float(pin.computeKineticEnergy(robot.pin, robot.data, q, v))
-    energy = bodies + 0.5 * float(robot.pin.armature @ (v * v))
+    inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.WORLD)
+    energy = 0.5 * float(v @ inertia @ v)
     return PhysicsReceipt(read_only(linear), read_only(angular), read_only(centre), energy)
