@@ -58,6 +58,8 @@ def tool_pose(arm: str) -> str:
 
 JOINT_STATES = "joint_states"
 BASE_ODOMETRY = "base_odometry"
+SAMPLED_JOINT_STATES = "sampled_joint_states"  # the same messages, those of reference periods only,
+SAMPLED_BASE_ODOMETRY = "sampled_base_odometry"  # so that slow readers do not slow the loop
 JOINT_COMMAND = "joint_command"
 JOINT_REFERENCE = "joint_reference"
 TASK_PHASE = "task/phase"
@@ -83,13 +85,15 @@ _OURS = "sms_handover_interfaces/msg"
 
 def graph_topics(arms: Iterable[str]) -> tuple[Topic, ...]:
     """Return every topic of the graph for a robot with these arms."""
-    state_readers = (TRAJECTORY, CONTROLLER)
     everyone_else = (TRAJECTORY, IK, CONTROLLER)
     pose, vector = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/Vector3Stamped"
+    odometry = "nav_msgs/msg/Odometry"
     joints, text = "sensor_msgs/msg/JointState", "std_msgs/msg/String"
     table = [
-        Topic(JOINT_STATES, joints, (PLANT,), state_readers, Rate.TICK),
-        Topic(BASE_ODOMETRY, "nav_msgs/msg/Odometry", (PLANT,), state_readers, Rate.TICK),
+        Topic(JOINT_STATES, joints, (PLANT,), (CONTROLLER,), Rate.TICK),
+        Topic(BASE_ODOMETRY, odometry, (PLANT,), (CONTROLLER,), Rate.TICK),
+        Topic(SAMPLED_JOINT_STATES, joints, (PLANT,), (TRAJECTORY,), Rate.REFERENCE),
+        Topic(SAMPLED_BASE_ODOMETRY, odometry, (PLANT,), (TRAJECTORY,), Rate.REFERENCE),
         Topic(JOINT_COMMAND, joints, (CONTROLLER,), (PLANT,), Rate.TICK),
         Topic(JOINT_REFERENCE, joints, (TRAJECTORY,), (CONTROLLER,), Rate.REFERENCE),
         Topic(TASK_PHASE, f"{_OURS}/TaskPhase", (TRAJECTORY,), (PLANT, CONTROLLER), Rate.REFERENCE),

@@ -38,7 +38,15 @@ def _differences(a: RunData, b: RunData) -> Iterator[Difference]:
                 else:
                     yield Difference(f"{item.name}[{arm}]", "only one of the runs has it")
         elif repr(left) != repr(right):
-            yield Difference(item.name, f"{left!r} and {right!r}")
+            yield Difference(item.name, _first_difference(left, right))
+
+
+def _first_difference(left: tuple[object, ...], right: tuple[object, ...]) -> str:
+    """Return in words where two tuples differ first; they are compared by what they print, as NaN is."""
+    for index, (one, other) in enumerate(zip(left, right, strict=False)):
+        if repr(one) != repr(other):
+            return f"item {index} is {one!r} and {other!r}"
+    return f"{len(left)} items and {len(right)} items"
 
 
 def _compare(name: str, left: np.ndarray, right: np.ndarray) -> Iterator[Difference]:

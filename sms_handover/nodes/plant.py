@@ -48,6 +48,8 @@ from sms_handover.topics import (
     ROBOT_DESCRIPTION,
     RUN_READY,
     RUN_STATE,
+    SAMPLED_BASE_ODOMETRY,
+    SAMPLED_JOINT_STATES,
     TASK_PHASE,
     tool_pose,
 )
@@ -108,6 +110,7 @@ class PlantNode(GraphNode[PlantParameters]):
         """Make publishers, subscriptions and services."""
         names = [JOINT_STATES, BASE_ODOMETRY, DEPUTY_POSE, GRASP_EVENT, LINEAR_MOMENTUM, ANGULAR_MOMENTUM]
         names += [ENERGY, ROBOT_DESCRIPTION, RUN_STATE, LOOP_TIMING, CLOCK]
+        names += [SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY]
         names += [tool_pose(arm) for arm in self.robot.arms]
         self._publish = {name: self.endpoints.publisher(name) for name in names}
         self.endpoints.subscribe(JOINT_COMMAND, self._on_command, raw=True)
@@ -140,9 +143,11 @@ class PlantNode(GraphNode[PlantParameters]):
         now_ns = plant.stamp_ns
         if now_ns % CLOCK_PERIOD_NS == 0:
             self._publish[CLOCK].publish(Clock(clock=time_message(now_ns)))
-        if plant.tick % self.common.ticks_per_reference == 0:
-            self._publish_period(now_ns)
         joints, odometry = self._state_wire.pack(plant.state)
+        if plant.tick % self.common.ticks_per_reference == 0:
+            self._publish[SAMPLED_JOINT_STATES].publish(joints)
+            self._publish[SAMPLED_BASE_ODOMETRY].publish(odometry)
+            self._publish_period(now_ns)
         self._publish[JOINT_STATES].publish(joints)
         self._publish[BASE_ODOMETRY].publish(odometry)
 

@@ -32,13 +32,13 @@ from sms_handover.ros.wire import StateWire
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import load_task
 from sms_handover.topics import (
-    BASE_ODOMETRY,
     CLOCK_PERIOD_NS,
     DEPUTY_POSE,
-    JOINT_STATES,
     PLANT,
     RECORDER,
     RUN_PUBLISHED,
+    SAMPLED_BASE_ODOMETRY,
+    SAMPLED_JOINT_STATES,
     TF,
     Rate,
     Topic,
@@ -49,7 +49,7 @@ EXIT_LOSS = 3  # the bag is whole, but messages are missing in it
 
 _POLL_S = 0.05  # [s] of wall time between two looks at what else is to be done
 _DISCOVERY_PERIOD_S = 1.0  # [s] of wall time between two looks for topics beyond the graph
-_TF_INPUTS = (JOINT_STATES, BASE_ODOMETRY, DEPUTY_POSE)
+_TF_INPUTS = (SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
 
 
 class RecorderNode(GraphNode[RecorderParameters]):
@@ -166,15 +166,13 @@ class RecorderNode(GraphNode[RecorderParameters]):
         """Record one message and, each reference period, the transforms that follow from it."""
         self._receive(name, data)
         stamp = stamp_ns(data)
-        if stamp % self.common.reference_ns:
-            return
         if self._tf.begins_anew(stamp):
             self._tf.reset()
         self._tf.add(stamp, topic, data)
         inputs = self._tf.take(stamp, _TF_INPUTS)
         if inputs is None:
             return
-        state = self._state_wire.read(inputs[JOINT_STATES], inputs[BASE_ODOMETRY])
+        state = self._state_wire.read(inputs[SAMPLED_JOINT_STATES], inputs[SAMPLED_BASE_ODOMETRY])
         transforms = link_transforms(self.robot, state.base_in_world, state.joint_position)
         transforms.append((WORLD, DEPUTY, _pose(inputs[DEPUTY_POSE])))
         data = transforms_cdr(self._recording.writer.types, transforms, stamp)

@@ -24,11 +24,11 @@ from sms_handover.ros.wire import JointStateWire, StateWire
 from sms_handover.simulation.feasibility import check_feasibility
 from sms_handover.simulation.scenario import Scenario, load_parameters, load_task
 from sms_handover.topics import (
-    BASE_ODOMETRY,
     DEPUTY_POSE,
     IK_STATUS,
     JOINT_REFERENCE,
-    JOINT_STATES,
+    SAMPLED_BASE_ODOMETRY,
+    SAMPLED_JOINT_STATES,
     SOLVE_IK,
     TASK_PHASE,
     TRAJECTORY,
@@ -38,7 +38,7 @@ from sms_handover.trajectory.generator import Targets, TrajectoryGenerator
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.types import Array, RobotState, TaskPhase
 
-_INPUTS = (JOINT_STATES, BASE_ODOMETRY, DEPUTY_POSE)
+_INPUTS = (SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
 
 
 class TrajectoryNode(GraphNode[TrajectoryParameters]):
@@ -63,7 +63,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._ik_status = self.endpoints.publisher(IK_STATUS)
         self._reference = self.endpoints.publisher(JOINT_REFERENCE)
         self._targets = {arm: self.endpoints.publisher(target_pose(arm)) for arm in self.robot.arms}
-        for topic in (JOINT_STATES, BASE_ODOMETRY):
+        for topic in (SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY):
             self.endpoints.subscribe(topic, self._taker(topic), raw=True)
         self.endpoints.subscribe(DEPUTY_POSE, self._on_deputy)
 
@@ -80,15 +80,8 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         return self._stamp_ns
 
     def _taker(self, topic: str) -> Any:
-        """Return the callback of a raw topic, which skips what is not on a reference period."""
-        period_ns = self.common.reference_ns
-
-        def callback(data: bytes) -> None:
-            stamp = stamp_ns(data)
-            if stamp % period_ns == 0:
-                self._take(topic, stamp, data)
-
-        return callback
+        """Return the callback of a topic of raw messages."""
+        return lambda data: self._take(topic, stamp_ns(data), data)
 
     def _on_deputy(self, message: Any) -> None:
         """Take the pose of the deputy."""
@@ -104,7 +97,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         if inputs is None:
             return
         self._stamp_ns = stamp
-        state = self._state_wire.read(inputs[JOINT_STATES], inputs[BASE_ODOMETRY])
+        state = self._state_wire.read(inputs[SAMPLED_JOINT_STATES], inputs[SAMPLED_BASE_ODOMETRY])
         phase, targets = self._generator.targets(state, pose_of_message(inputs[DEPUTY_POSE].pose))
         if targets.tool_in_world:
             self._ask(state, phase, targets)
