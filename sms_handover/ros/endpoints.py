@@ -7,7 +7,9 @@ from typing import Any
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
 from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from sms_handover.errors import GraphError
 from sms_handover.ros.message_types import message_class
@@ -48,19 +50,24 @@ class Endpoints:
     @property
     def unmatched(self) -> list[str]:
         """Return in words what has not been found yet of the endpoints of the peers."""
-        me = self._node.get_name()
+        me, node = self._node.get_name(), self._node
         missing = []
         for name, publisher in self._publishers.items():
-            readers = (self._peers & set(self._topics[name].subscribers)) - {me}
-            expected = len(readers) + (RECORDER in self._peers)
-            found = publisher.subscription_count
-            if found < expected:
-                missing.append(f"{found} of {expected} subscriptions of {name}")
+            readers = self._peers & {*self._topics[name].subscribers, RECORDER}
+            there = node.get_subscriptions_info_by_topic(publisher.topic_name)
+            profile = profile_of(self._topics[name])
+            served = [reader for reader in there if _serves(profile, reader.qos_profile)]
+            found = _found(publisher.subscription_count, served, readers)
+            if found < len(readers):
+                missing.append(f"{found} of {len(readers)} subscriptions of {name}")
         for name, subscription in self._subscriptions.items():
-            expected = len((self._peers & set(self._topics[name].publishers)) - {me})
-            found = subscription.get_publisher_count()
-            if found < expected:
-                missing.append(f"{found} of {expected} publishers of {name}")
+            writers = (self._peers & set(self._topics[name].publishers)) - {me}
+            there = node.get_publishers_info_by_topic(subscription.topic_name)
+            profile = profile_of(self._topics[name])
+            serving = [writer for writer in there if _serves(writer.qos_profile, profile)]
+            found = _found(subscription.get_publisher_count(), serving, writers)
+            if found < len(writers):
+                missing.append(f"{found} of {len(writers)} publishers of {name}")
         return missing
 
     @property
@@ -72,6 +79,22 @@ class Endpoints:
     def topics(self) -> tuple[Topic, ...]:
         """Return every topic of the graph."""
         return tuple(self._topics.values())
+
+
+def _serves(offered: QoSProfile, asked: QoSProfile) -> bool:
+    """Tell whether a publisher's profile and a subscription's can match."""
+    return bool(qos_check_compatible(offered, asked)[0] != QoSCompatibility.ERROR)
+
+
+def _found(matched: int, there: Collection[TopicEndpointInfo], wanted: Collection[str]) -> int:
+    """Return how many of the wanted nodes' endpoints have surely matched.
+
+    Which ones have matched is not told, only how many; so others that are there too, such as those of
+    a display, are taken to have matched before the wanted ones.
+    """
+    names = [endpoint.node_name for endpoint in there]
+    others = sum(name not in wanted for name in names)
+    return max(0, min(len(set(names).intersection(wanted)), matched - others))
 
 
 class CountedPublisher:

@@ -1,20 +1,37 @@
 """Quality of service of the graph: nothing may be lost, and what is latched reaches late comers."""
 
-from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSProfile, QoSReliabilityPolicy
+from typing import Any
+
+from rclpy.duration import Infinite
+from rclpy.qos import (
+    QoSDurabilityPolicy,
+    QoSHistoryPolicy,
+    QoSLivelinessPolicy,
+    QoSProfile,
+    QoSReliabilityPolicy,
+)
 
 from sms_handover.bag.qos import Durability, History, Qos, Reliability
 from sms_handover.topics import Topic
 
+# said in full, so that a profile can be held against one that discovery tells of
+_UNTIMED: dict[str, Any] = {
+    "deadline": Infinite,
+    "liveliness": QoSLivelinessPolicy.AUTOMATIC,
+    "liveliness_lease_duration": Infinite,
+}
 LOSSLESS = QoSProfile(
     history=QoSHistoryPolicy.KEEP_ALL,
     reliability=QoSReliabilityPolicy.RELIABLE,
     durability=QoSDurabilityPolicy.VOLATILE,
+    **_UNTIMED,
 )  # a slow reader holds the writer back instead of losing messages
 LATCHED = QoSProfile(
     history=QoSHistoryPolicy.KEEP_LAST,
     depth=100,  # [messages] kept for subscribers that come late
     reliability=QoSReliabilityPolicy.RELIABLE,
     durability=QoSDurabilityPolicy.TRANSIENT_LOCAL,
+    **_UNTIMED,
 )
 
 

@@ -1,0 +1,79 @@
+"""A bench for nodes: parameters in, any nodes in one process, one executor, waiting on conditions."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from time import monotonic
+from typing import Any, TypeVar
+
+import rclpy
+from rclpy.executors import Executor
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from sms_handover.ros.parameters import as_arguments
+
+N = TypeVar("N", bound=Node)
+
+DEADLINE_S = 60.0  # s of wall time after which a test that waits has failed; nothing is measured by it
+
+Parameters = Mapping[str, Mapping[str, object]]
+
+
+class Bench:
+    """One ROS context of an own domain; leaving it destroys every node that was made in it."""
+
+    def __init__(self, domain: int, folder: Path) -> None:
+        """Prepare; ROS is not started before :meth:`start`."""
+        self.folder = folder
+        self._domain = domain
+        self._nodes: list[Node] = []
+        self._executor: Executor | None = None
+
+    def start(self, parameters: Parameters | None = None) -> None:
+        """Start ROS with parameters by node name, where ``common`` is for all nodes."""
+        arguments = ["--ros-args"]
+        for node, values in (parameters or {}).items():
+            prefix = "" if node == "common" else f"{node}:"
+            for name, value in values.items():
+                flag, assignment = as_arguments({name: value})
+                arguments += [flag, prefix + assignment]
+        rclpy.init(args=arguments, domain_id=self._domain, signal_handler_options=SignalHandlerOptions.NO)
+
+    def add(self, make: Callable[[], N]) -> N:
+        """Return the node that ``make`` returns, spun with the others from now on."""
+        node = make()
+        self._nodes.append(node)
+        self.executor.add_node(node)
+        return node
+
+    def plain(self, name: str) -> Node:
+        """Return a node with nothing in it."""
+        return self.add(lambda: Node(name, start_parameter_services=False))
+
+    @property
+    def executor(self) -> Executor:
+        """Return the executor of all nodes."""
+        if self._executor is None:
+            self._executor = EventsExecutor()
+        return self._executor
+
+    def until(self, condition: Callable[[], object], what: str) -> None:
+        """Handle events until a condition holds; fail, saying ``what`` was waited for, if it never does."""
+        deadline = monotonic() + DEADLINE_S
+        while not condition():
+            assert monotonic() < deadline, f"waited in vain for {what}"
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def result(self, future: Any, what: str = "an answer") -> Any:
+        """Return what a future gives."""
+        self.until(future.done, what)
+        return future.result()
+
+    def close(self) -> None:
+        """Destroy the nodes and end ROS."""
+        for node in self._nodes:
+            node.destroy_node()
+        self._nodes.clear()
+        self._executor = None
+        rclpy.try_shutdown()

@@ -1,0 +1,28 @@
+"""What the tests of the edge share: a ROS domain that nobody else is in, and a bench in it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from sms_handover.cli.domain import reserved_domain
+
+from .bench import Bench
+
+
+@pytest.fixture(scope="session")
+def domain() -> Iterator[int]:
+    """A ROS domain of this test process alone."""
+    with reserved_domain(None) as number:
+        yield number
+
+
+@pytest.fixture
+def bench(domain: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
+    """A bench for nodes, empty and not started."""
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    monkeypatch.setenv("ROS_STATIC_PEERS", "")
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "ros_log"))
+    bench = Bench(domain, tmp_path)
+    yield bench
+    bench.close()
