@@ -1,0 +1,101 @@
+"""Inputs come together by their stamps, whatever order they arrive in."""
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from sms_handover.ros.stamp_sync import StampSync
+
+NAMES = ("a", "b", "c")
+
+
+@pytest.mark.parametrize("order", list(permutations(NAMES)))
+def test_inputs_are_taken_once_all_are_there(order: tuple[str, ...]) -> None:
+    sync: StampSync[str] = StampSync()
+    for name in order:
+        assert sync.take(5, NAMES) is None
+        sync.add(5, name, name.upper())
+    assert sync.take(5, NAMES) == {"a": "A", "b": "B", "c": "C"}
+    assert sync.take(5, NAMES) is None
+    assert sync.dropped == 0
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_any_arrival_gives_the_same_inputs(seed: int) -> None:
+    """Up to ten stamps on the way at once, in any order; each is taken in its turn."""
+    stamps = range(10)
+    arrivals = [(stamp, name) for stamp in stamps for name in NAMES]
+    np.random.default_rng(seed).shuffle(arrivals)
+    sync: StampSync[tuple[int, str]] = StampSync()
+    taken = []
+    due = 0
+    for arrival in arrivals:
+        stamp, name = int(arrival[0]), str(arrival[1])
+        sync.add(stamp, name, (stamp, name))
+        while (inputs := sync.take(due, NAMES)) is not None:
+            taken.append(inputs)
+            due += 1
+    assert taken == [{name: (stamp, name) for name in NAMES} for stamp in stamps]
+    assert sync.dropped == 0
+
+
+def test_the_newest_of_two_equal_stamps_counts() -> None:
+    sync: StampSync[int] = StampSync()
+    sync.add(0, "a", 1)
+    sync.add(0, "a", 2)
+    assert sync.take(0, ("a",)) == {"a": 2}
+
+
+def test_what_is_not_asked_for_does_not_hold_back() -> None:
+    sync: StampSync[int] = StampSync()
+    sync.add(1, "a", 1)
+    sync.add(1, "d", 4)
+    assert sync.take(1, ("a",)) == {"a": 1, "d": 4}
+
+
+def test_old_stamps_are_dropped_and_counted() -> None:
+    sync: StampSync[int] = StampSync()
+    sync.add(3, "a", 3)
+    sync.add(4, "a", 4)
+    assert sync.take(4, ("a",)) == {"a": 4}
+    assert sync.take(3, ("a",)) is None  # older than what was taken
+    sync.add(4, "b", 4)
+    sync.add(2, "a", 2)
+    assert sync.dropped == 2
+    assert sync.take(4, ("b",)) is None
+    sync.add(5, "a", 5)
+    assert sync.take(5, ("a",)) == {"a": 5}
+    assert sync.dropped == 2
+
+
+def test_an_input_that_never_comes_does_not_fill_the_memory() -> None:
+    sync: StampSync[int] = StampSync()
+    for stamp in range(1000):
+        sync.add(stamp, "a", stamp)
+    assert sync.dropped > 900
+    sync.add(999, "b", -999)
+    assert sync.take(999, ("a", "b")) == {"a": 999, "b": -999}
+
+
+def test_time_zero_begins_a_run_only_after_another() -> None:
+    sync: StampSync[int] = StampSync()
+    assert not sync.begins_anew(0)
+    sync.add(0, "a", 0)
+    assert not sync.begins_anew(0)  # the other inputs of the first stamp
+    sync.take(0, ("a",))
+    assert sync.begins_anew(0)
+    assert not sync.begins_anew(1)
+
+
+def test_a_run_that_begins_anew_takes_the_same_stamps_again() -> None:
+    sync: StampSync[str] = StampSync()
+    sync.add(0, "a", "old")
+    sync.take(0, ("a",))
+    sync.add(1, "a", "left over")
+    sync.reset()
+    assert sync.take(1, ("a",)) is None
+    assert not sync.begins_anew(0)
+    sync.add(0, "a", "new")
+    assert sync.take(0, ("a",)) == {"a": "new"}
+    assert sync.dropped == 0
