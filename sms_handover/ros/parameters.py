@@ -25,17 +25,18 @@ def declare(node: Node, cls: type[T], file: str, section: str) -> T:
     The defaults are those of a section of a file in the package's ``config/``; what was given on
     the command line comes on top. Raises ConfigurationError.
     """
-    defaults = read_parameter_files([config_file(file)], section)
+    values = read_parameter_files([config_file(file)], section)
+    given = [item.name for item in fields(cls) if node.has_parameter(item.name)]  # type: ignore[arg-type]
+    values.update({name: node.get_parameter(name).value for name in given})
+    checked = build(cls, values, node.get_name())  # before ROS checks the range in words of its own
     hints = get_type_hints(cls)
-    values = {}
     for item in fields(cls):  # type: ignore[arg-type]
         descriptor = _descriptor(spec_of(item), hints[item.name])
-        if node.has_parameter(item.name):
+        if item.name in given:
             node.set_descriptor(item.name, descriptor)
         else:
-            node.declare_parameter(item.name, defaults.get(item.name), descriptor)
-        values[item.name] = node.get_parameter(item.name).value
-    return build(cls, values, node.get_name())
+            node.declare_parameter(item.name, values[item.name], descriptor)
+    return checked
 
 
 def refuse_unknown(node: Node, *groups: type[object]) -> None:
