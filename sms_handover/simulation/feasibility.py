@@ -158,7 +158,7 @@ class _Walk:
         The joints decide how far the base is pushed, and the base pose which joints reach the targets.
         """
         base = base_in_world
-        joints = self._lead_by_joints(phase, seed)
+        joints = self._with_joint_targets(phase, seed)
         for _ in range(_MAX_SETTLE):
             rest = self._solve(base, joints, self._targets(phase, base, joints))
             joints = rest.joint_position
@@ -177,15 +177,12 @@ class _Walk:
         missed = {arm: error for arm, error in errors.items() if error[0] > limits[0] or error[1] > limits[1]}
         return _Rest(base_in_world, result.joint_position, targets, missed)
 
-    def _lead_by_joints(self, phase: Phase, seed: Array) -> Array:
-        """Return the seed with the arms led by their joints at their desired joints."""
+    def _with_joint_targets(self, phase: Phase, seed: Array) -> Array:
+        """Return the seed with every joint target put in; an arm on hold is where it was anyway."""
         joints = np.array(seed)
         for arm, target in phase.targets.items():
-            part = self._robot.arm_joints[arm]
             if isinstance(target, JointTarget):
-                joints[part] = target.position
-            elif not isinstance(target, ToolTarget | GraspFrameTarget):
-                joints[part] = self._joints[part]
+                joints[self._robot.arm_joints[arm]] = target.position
         return joints
 
     def _targets(self, phase: Phase, base_in_world: Pose, joints: Array) -> dict[str, Pose]:

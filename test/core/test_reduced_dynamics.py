@@ -12,6 +12,7 @@ from sms_handover.model.reduced import (
     base_twist_per_joint_rate,
     generalized_jacobian,
     reduced_dynamics,
+    reduced_inverse_dynamics,
     tool_jacobian,
 )
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
@@ -49,6 +50,16 @@ def test_joint_accelerations_equal_those_of_the_full_robot(robot: RobotModel, dr
         acceleration = np.linalg.solve(reduced.inertia, effort - reduced.bias)
         bound = _rounding(robot, q) * float(np.linalg.norm(full))
         np.testing.assert_allclose(acceleration, full, atol=bound)
+
+
+def test_inverse_dynamics_brings_about_the_accelerations_asked_for(robot: RobotModel, draw: Draw) -> None:
+    """The efforts found for joint accelerations give the full robot, base free, just these."""
+    for _ in range(20):
+        q, v, wanted = draw.q(), draw.v(), draw.vector(14, 5.0)
+        effort = reduced_inverse_dynamics(robot, q, v, wanted)
+        found = pin.aba(robot.pin, robot.data, q, v, np.concatenate([np.zeros(BASE_NV), effort]))[BASE_NV:]
+        scale = float(np.linalg.norm(wanted) + np.linalg.norm(v) ** 2)
+        np.testing.assert_allclose(found, wanted, atol=_rounding(robot, q) * scale)
 
 
 def test_reduced_inertia_is_that_of_a_mechanism(robot: RobotModel, draw: Draw) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from sms_handover.errors import ConfigurationError, UnstableLoopError
 from sms_handover.model.poses import pose_of, pose_row, se3_of
-from sms_handover.model.reduced import base_twist_per_joint_rate
+from sms_handover.model.reduced import base_twist_per_joint_rate, reduced_dynamics
 from sms_handover.run_data import RunData
 from sms_handover.simulation.recorder import IK_STATUS_NUMBER
 from sms_handover.simulation.scenario import Scenario, load_scenario
@@ -127,6 +127,43 @@ def test_progress_is_told_every_period(make_scenario: MakeScenario) -> None:
 
     data = simulate(make_scenario(common={"duration": 0.5}), progress=progress)
     assert told == [(stamp, "approach" if stamp < 400_000_000 else "carry") for stamp in data.reference_ns]
+
+
+@pytest.mark.parametrize("law", ["nmpc", "pid"])
+def test_every_command_follows_from_the_record(make_scenario: MakeScenario, law: str) -> None:
+    """Each command is the law's formula on the recorded state and reference, with the gains of its phase.
+
+    Between two references the desired motion goes on with constant acceleration, which is the
+    difference of the last two reference velocities, but for the first reference of a phase.
+    """
+    scenario = make_scenario(controller={"law": law}, trajectory={"time_law": "quintic"})
+    robot, data, gains = scenario.robot, simulate(scenario), scenario.parameters.controller
+    integral = np.zeros(14)
+    for tick in range(len(data.tick_ns)):
+        row, since = tick // 20, (tick % 20) * 1e-3
+        index = data.phases[row].index
+        fresh = row == 0 or data.phases[row - 1].index != index
+        velocity = data.reference_velocity[row]
+        acceleration = np.zeros(14) if fresh else (velocity - data.reference_velocity[row - 1]) / 0.02
+        desired = data.reference_position[row] + velocity * since + acceleration * since**2 / 2.0
+        error = data.joint_position[tick] - desired
+        rate = data.joint_velocity[tick] - velocity - acceleration * since
+        if law == "pid":
+            effort = -(gains.proportional * error + gains.integral * integral + gains.derivative * rate)
+            integral += error * 1e-3
+        else:
+            period = 2.0 if index == 1 else gains.rolling_period
+            wanted = acceleration - 10.0 / 3.0 / period**2 * error - 5.0 / 2.0 / period * rate
+            base, twist = data.base_pose[tick], data.base_twist[tick]
+            q = np.concatenate([base, data.joint_position[tick]])
+            v = np.concatenate([twist, data.joint_velocity[tick]])
+            dynamics = reduced_dynamics(robot, q, v)
+            effort = dynamics.inertia @ wanted + dynamics.bias
+        effort = np.clip(effort, -robot.effort_limit, robot.effort_limit)
+        # a difference of velocities below 1 over 20 ms, through an inertia below 3; and the integral's sum
+        bound = 14 * 3.0 * _EPS / 0.02 + 1400 * _EPS
+        np.testing.assert_allclose(data.joint_command[tick], effort, atol=bound)
+    assert np.max(np.abs(data.reference_velocity)) > 0.01
 
 
 # --- repeatability -------------------------------------------------------------------------------
