@@ -15,14 +15,13 @@ from sms_handover.model.reduced import base_twist_per_joint_rate, reduced_invers
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.integrators import TABLEAUS, Tableau
 from sms_handover.run_data import RunData
-from sms_handover.simulation.scenario import load_scenario
-from sms_handover.simulation.simulate import simulate
 from sms_handover.types import Array
 from test.core.conftest import Draw, distance, slope
 from test.core.test_integrators import Top, _advance, _driven
 from test.core.test_plant import Drift
 from test.verification.conftest import Record, Table
 from test.verification.lagrangian import Lagrangian
+from test.verification.test_claims import handover
 
 _EPS = float(np.finfo(float).eps)
 _ORDER_TOLERANCE = 0.1  # [-] what is asked of a measured order
@@ -95,7 +94,7 @@ def test_conservation_under_random_efforts(
 @pytest.mark.parametrize("law", ["nmpc", "pid"])
 def test_conservation_over_the_whole_handover(law: str, robot: RobotModel, record: Record) -> None:
     """Over all 60 s of the handover only rounding is left."""
-    run = simulate(load_scenario({"controller": {"law": law}}))
+    run = handover(law)
     centre = _largest_way_of_the_centre(robot, run)
     ticks = run.tick_ns.size
     energy = float(np.max(run.kinetic_energy))
