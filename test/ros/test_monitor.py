@@ -1,0 +1,173 @@
+"""The launcher's ear: progress, grasp events, who waits for whom, and the request to finish."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import PoseStamped
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
+from sms_handover_interfaces.msg import RunState
+from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
+from std_srvs.srv import Trigger
+
+from sms_handover.ros.convert import event_message, header, phase_message, pose_stamped
+from sms_handover.ros.monitor import RunMonitor
+from sms_handover.ros.qos import LATCHED, LOSSLESS
+from sms_handover.topics import DIAGNOSTICS, GRASP_EVENT, RUN_STATE, TASK_PHASE, target_pose, tool_pose
+from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, Pose, TaskPhase
+
+from .bench import Bench
+
+pytestmark = pytest.mark.ros
+
+LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+class FakeGraph:
+    """A node named plant that says whatever it is told to, and a monitor that listens."""
+
+    def __init__(self, bench: Bench) -> None:
+        """Start ROS and match what is volatile."""
+        bench.start()
+        self.bench = bench
+        self.node: Node = bench.plain("plant")
+        self.monitor = RunMonitor(bench.plain("launcher"), ("arm_a", "arm_b"))
+        self.publishers: dict[str, Publisher] = {}
+
+    def say(self, topic: str, message: Any) -> None:
+        """Publish a message, once there is somebody to hear it."""
+        profile = LATCHED if topic in (RUN_STATE, GRASP_EVENT) else LOSSLESS
+        if topic not in self.publishers:
+            self.publishers[topic] = self.node.create_publisher(type(message), topic, profile)
+        publisher = self.publishers[topic]
+        self.bench.until(lambda: publisher.get_subscription_count() == 1, f"the match of {topic}")
+        publisher.publish(message)
+
+    def until(self, condition: Callable[[], object], what: str, *said: tuple[str, Any]) -> None:
+        """Say things again and again until a condition holds: a display may miss what is not latched."""
+
+        def heard() -> object:
+            for topic, message in said:
+                self.say(topic, message)
+            return condition()
+
+        self.bench.until(heard, what)
+
+    def state(self, state: int, stamp_ns: int, detail: str = "") -> None:
+        """Say in which state the run is."""
+        self.say(RUN_STATE, RunState(header=header(stamp_ns), state=state, detail=detail))
+
+
+@pytest.fixture
+def graph(bench: Bench) -> FakeGraph:
+    return FakeGraph(bench)
+
+
+def test_progress_is_followed(graph: FakeGraph) -> None:
+    progress = graph.monitor.progress
+    assert (progress.state, progress.stamp_ns, graph.monitor.finished) == (RunState.WAITING, 0, False)
+    graph.state(RunState.RUNNING, 0)
+    graph.bench.until(lambda: progress.state == RunState.RUNNING, "the start")
+    phase = phase_message(TaskPhase(40_000_000, 1, "carry"))
+    graph.until(lambda: progress.phase == "carry", "the phase", (TASK_PHASE, phase))
+    assert progress.stamp_ns == 40_000_000
+    graph.state(RunState.FINISHED, 50_000_000, "the whole run is done")
+    graph.bench.until(lambda: graph.monitor.finished, "the end")
+    assert (progress.stamp_ns, progress.detail) == (50_000_000, "the whole run is done")
+
+
+def test_a_failed_run_is_over_too(graph: FakeGraph) -> None:
+    graph.state(RunState.FAILED, 7, "why")
+    graph.bench.until(lambda: graph.monitor.finished, "the end")
+
+
+def test_a_reset_sets_the_time_back(graph: FakeGraph) -> None:
+    graph.state(RunState.FINISHED, 50_000_000)
+    graph.bench.until(lambda: graph.monitor.finished, "the end")
+    graph.state(RunState.RUNNING, 0, "reset")
+    graph.bench.until(lambda: not graph.monitor.finished, "the second start")
+    assert graph.monitor.progress.stamp_ns == 0
+
+
+def test_grasp_events_are_kept_in_order(graph: FakeGraph) -> None:
+    nan = float("nan")
+    events = [
+        GraspEvent(
+            20,
+            GraspCommand(GraspAction.GRASP, "arm_a", "end_a"),
+            GraspStatus.MISSED,
+            0.1,
+            0.2,
+            0.3,
+            "too far",
+        ),
+        GraspEvent(
+            40,
+            GraspCommand(GraspAction.RELEASE, "arm_a"),
+            GraspStatus.REJECTED,
+            nan,
+            nan,
+            nan,
+            "holds nothing",
+        ),
+    ]
+    for event in events:
+        graph.say(GRASP_EVENT, event_message(event))
+    graph.bench.until(lambda: len(graph.monitor.progress.events) == 2, "the events")
+    assert repr(graph.monitor.progress.events) == repr(events)
+
+
+def test_tool_errors_are_distances_to_the_targets(graph: FakeGraph) -> None:
+    error = graph.monitor.progress.tool_error
+    target = pose_stamped(Pose(np.array([1.0, 2.0, 3.0]), LEVEL), 0)
+    tool = pose_stamped(Pose(np.array([1.002, 1.997, 3.006]), LEVEL), 0)
+    said = ((target_pose("arm_b"), target), (tool_pose("arm_b"), tool))
+    graph.until(lambda: "arm_b" in error, "the tool", *said)
+    assert error == {"arm_b": pytest.approx(0.007, rel=1e-12)}
+
+
+def test_a_pose_without_a_target_is_no_error(graph: FakeGraph) -> None:
+    said = ((tool_pose("arm_a"), PoseStamped()), (TASK_PHASE, TaskPhaseMessage(name="later")))
+    graph.until(lambda: graph.monitor.progress.phase == "later", "a later message", *said)
+    assert graph.monitor.progress.tool_error == {}
+
+
+def test_who_waits_for_what_is_told(graph: FakeGraph) -> None:
+    waiting = graph.monitor.progress.waiting
+    assert graph.monitor.waiting_for() == "no node says why"
+    warn = DiagnosticStatus(level=DiagnosticStatus.WARN, name="ik", message="waiting for x")
+    graph.until(lambda: waiting, "the warning", (DIAGNOSTICS, DiagnosticArray(status=[warn])))
+    assert graph.monitor.waiting_for() == "ik is waiting for x"
+    fine = DiagnosticStatus(level=DiagnosticStatus.OK, name="ik")
+    graph.until(lambda: not waiting, "the all-clear", (DIAGNOSTICS, DiagnosticArray(status=[fine])))
+
+
+def test_the_plant_is_asked_to_finish(graph: FakeGraph) -> None:
+    graph.monitor.ask_to_finish()  # there is no service yet: nothing happens
+    asked: list[Trigger.Request] = []
+
+    def finish(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        asked.append(request)
+        return response
+
+    graph.node.create_service(Trigger, "~/finish", finish)
+
+    def ask_until_heard() -> bool:
+        if not asked:
+            graph.monitor.ask_to_finish()
+        return bool(asked)
+
+    graph.bench.until(ask_until_heard, "the request")
+
+
+def test_late_listeners_hear_what_was_said(bench: Bench) -> None:
+    bench.start()
+    plant = bench.plain("plant")
+    plant.create_publisher(RunState, RUN_STATE, LATCHED).publish(RunState(state=RunState.FINISHED))
+    plant.create_publisher(GraspEventMessage, GRASP_EVENT, LATCHED).publish(GraspEventMessage())
+    monitor = RunMonitor(bench.plain("launcher"), ("arm_a",))
+    bench.until(lambda: monitor.finished and monitor.progress.events, "what was said before")
