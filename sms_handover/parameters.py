@@ -23,11 +23,13 @@ EVERY_NODE = "/**"  # section of ROS parameter files that holds for every node
 
 
 class YamlLoader(yaml.SafeLoader):
-    """YAML as ROS reads it: 1e-3 is a number, also without a decimal point."""
+    """YAML as ROS reads it: 1e-3 and 1.5e3 are numbers, also without a decimal point or a sign."""
 
 
 YamlLoader.add_implicit_resolver(
-    "tag:yaml.org,2002:float", re.compile(r"^[-+]?[0-9]+[eE][-+]?[0-9]+$"), list("-+0123456789")
+    "tag:yaml.org,2002:float",
+    re.compile(r"^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+$"),
+    list("-+.0123456789"),
 )
 
 

@@ -6,6 +6,7 @@ from math import isfinite, sqrt
 import numpy as np
 
 from sms_handover.errors import RobotDescriptionError
+from sms_handover.parameters import as_float
 from sms_handover.types import Array
 
 _AXIS_TOLERANCE = 1e-9  # [-] on the length of a joint axis
@@ -15,10 +16,9 @@ _TRIANGLE_TOLERANCE = 1e-9  # [-] relative; a flat body fulfils the inequality w
 def number(value: object, what: str, unit: str = "") -> float:
     """Return ``value`` as a finite float; raises RobotDescriptionError."""
     if isinstance(value, bool) or not isinstance(value, int | float):
-        hint = _exponent_hint(value)
-        raise RobotDescriptionError(f"{what} is {value!r}, expected a number{_in(unit)}{hint}")
-    if not isfinite(value):
-        raise RobotDescriptionError(f"{what} is {value}{_unit(unit)}, expected a finite number")
+        raise RobotDescriptionError(f"{what} is {value!r}, expected a number{_in(unit)}")
+    if not isfinite(as_float(value)):
+        raise RobotDescriptionError(f"{what} is {as_float(value)}{_unit(unit)}, expected a finite number")
     return float(value)
 
 
@@ -97,12 +97,3 @@ def _unit(unit: str) -> str:
 def _in(unit: str) -> str:
     """Return the unit as part of a sentence, or nothing."""
     return f" in {unit}" if unit else ""
-
-
-def _exponent_hint(value: object) -> str:
-    """Return what to write where YAML took a number such as 1e-6 for text, or nothing."""
-    try:
-        parsed = float(value) if isinstance(value, str) else None
-    except ValueError:
-        parsed = None
-    return "" if parsed is None else f" (YAML needs a decimal point and a signed exponent: {parsed:.6e})"

@@ -179,7 +179,9 @@ def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
         assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(("written", "read"), [("1e-3", 1e-3), ("-2E+1", -20.0), ("1.0e-3", 1e-3), ("7", 7)])
+@pytest.mark.parametrize(
+    ("written", "read"), [("1e-3", 1e-3), ("-2E+1", -20.0), ("1.5e3", 1500.0), (".5e-1", 0.05), ("7", 7)]
+)
 def test_numbers_are_read_as_ros_reads_them(tmp_path: Path, written: str, read: float) -> None:
     """An exponent makes a number, with or without a decimal point; YAML 1.1 alone would give text."""
     assert read_yaml(_write(tmp_path / "p.yaml", f"a: {written}\nb: 1e\n")) == {"a": read, "b": "1e"}
