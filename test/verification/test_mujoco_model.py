@@ -1,0 +1,132 @@
+"""The same robot in MuJoCo: the two models are equal.
+
+Two engines that share no code are given one description. At random states every quantity of the
+equations of motion agrees to rounding, so what they simulate is one and the same system.
+"""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sms_handover.model.assembly import RobotDescription
+from sms_handover.model.conserved import physics_receipt
+from sms_handover.model.description import load_robot
+from sms_handover.model.parts import Inertia, JointDescription
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.types import Array, Pose
+from test.verification.conftest import Record
+from test.verification.mujoco_model import MujocoRobot, rotation_matrix
+
+_STATES = 100
+_EPS = float(np.finfo(float).eps)
+_ROUNDING = 10 * 12 * _EPS  # [-] ten frames in a chain, a dozen operations each
+_AGAINST = f"MuJoCo {mujoco.__version__}"
+
+
+def _skewed(robot: RobotDescription) -> RobotDescription:
+    """Return a robot with rotors, tilted joint axes and a lopsided base, which the shipped one has not."""
+
+    def joint(old: JointDescription, rotor: float) -> JointDescription:
+        return replace(old, axis=(0.48, -0.6, 0.64), rotor_inertia=rotor)
+
+    arms = tuple(
+        replace(arm, joints=tuple(joint(old, 0.1 + 0.05 * i) for i, old in enumerate(arm.joints)))
+        for arm in robot.arms
+    )
+    lopsided = Inertia("base_link", 200.0, (0.1, -0.2, 0.3), (30.0, 1.0, -2.0, 40.0, 3.0, 35.0))
+    return replace(robot, base=replace(robot.base, inertia=lopsided), arms=arms)
+
+
+@pytest.fixture(params=["shipped", "skewed"])
+def description(request: pytest.FixtureRequest) -> RobotDescription:
+    """The shipped robot, and one whose every number counts."""
+    robot = load_robot()
+    return robot if request.param == "shipped" else _skewed(robot)
+
+
+def _states(robot: RobotModel) -> list[tuple[Array, Array, Array]]:
+    """Return random states q, v and joint efforts."""
+    random = np.random.default_rng(1)
+    found = []
+    for _ in range(_STATES):
+        quaternion = random.normal(size=4)
+        quaternion /= np.linalg.norm(quaternion)
+        joints = random.uniform(robot.lower, robot.upper)
+        q = np.concatenate([random.uniform(-1.0, 1.0, 3), quaternion, joints])
+        v = random.uniform(-1.0, 1.0, 6 + robot.n_joints)
+        found.append((q, v, random.uniform(-1.0, 1.0, robot.n_joints)))
+    return found
+
+
+def test_equations_of_motion_are_the_same(description: RobotDescription, record: Record) -> None:
+    """Mass matrix, bias forces and acceleration; H^-1 magnifies the rounding of the last by cond(H)."""
+    robot, other = RobotModel(description), MujocoRobot(description)
+    assert other.joint_names == robot.joint_names
+    largest = np.zeros(3)  # relative to the largest entry
+    for q, v, effort in _states(robot):
+        mass, bias, acceleration = other.dynamics(q, v, effort)
+        expected_mass = pin.crba(robot.pin, robot.data, q, pin.Convention.WORLD)
+        expected_bias = pin.nonLinearEffects(robot.pin, robot.data, q, v)
+        expected = pin.aba(robot.pin, robot.data, q, v, np.concatenate([np.zeros(6), effort]))
+        pairs = ((mass, expected_mass), (bias, expected_bias), (acceleration, expected))
+        errors = [np.max(np.abs(a - b)) / np.max(np.abs(b)) for a, b in pairs]
+        errors[2] /= np.linalg.cond(expected_mass)
+        largest = np.maximum(largest, errors)
+    name = "shipped" if description == load_robot() else "skewed"
+    record(f"mass matrix, {name} robot, relative", largest[0], _ROUNDING, against=_AGAINST)
+    record(f"bias forces, {name} robot, relative", largest[1], _ROUNDING, against=_AGAINST)
+    record(f"acceleration, {name} robot, relative, per cond(H)", largest[2], _ROUNDING, against=_AGAINST)
+
+
+def test_every_frame_is_at_the_same_place(description: RobotDescription, record: Record) -> None:
+    """Positions and rotation matrices of all links and both tools, which lie within 3 m of the base."""
+    robot, other = RobotModel(description), MujocoRobot(description)
+    position = rotation = 0.0
+    for q, v, effort in _states(robot):
+        other.dynamics(q, v, effort)
+        for name, pose in robot.links_in_world(Pose(q[:3], q[3:7]), q[7:]).items():
+            at, axes = other.frame(name)
+            position = max(position, float(np.max(np.abs(at - pose.position))))
+            rotation = max(rotation, float(np.max(np.abs(axes - rotation_matrix(pose.quaternion_xyzw)))))
+    name = "shipped" if description == load_robot() else "skewed"
+    record(f"position of links and tools, {name} robot", position, 3 * _ROUNDING, unit="m", against=_AGAINST)
+    record(f"axes of links and tools, {name} robot", rotation, _ROUNDING, against=_AGAINST)
+
+
+def test_momentum_is_measured_alike(description: RobotDescription, record: Record) -> None:
+    """Each engine by its own formula, so that drifts measured with one hold for both."""
+    robot, other = RobotModel(description), MujocoRobot(description)
+    errors = np.zeros(2)
+    for q, v, effort in _states(robot):
+        other.dynamics(q, v, effort)
+        receipt = physics_receipt(robot, q, v)
+        pairs = zip(other.momentum(), (receipt.linear_momentum, receipt.angular_momentum), strict=True)
+        errors = np.maximum(errors, [np.linalg.norm(a - b) / np.linalg.norm(b) for a, b in pairs])
+    name = "shipped" if description == load_robot() else "skewed"
+    record(f"linear momentum, {name} robot, relative", errors[0], _ROUNDING, against=_AGAINST)
+    # the angular momentum about the centre of mass is what is left of larger parts about the base
+    record(f"angular momentum, {name} robot, relative", errors[1], 10 * _ROUNDING, against=_AGAINST)
+
+
+def test_mujoco_adds_nothing(description: RobotDescription) -> None:
+    """No damping, friction, spring, limit, gravity, medium, contact or balancing of inertias."""
+    model = MujocoRobot(description).model
+    for name in ("dof_damping", "dof_frictionloss", "jnt_stiffness", "jnt_limited", "body_gravcomp"):
+        assert not np.any(getattr(model, name)), name
+    assert not np.any(model.opt.gravity) and not np.any(model.opt.wind)
+    assert (model.opt.density, model.opt.viscosity) == (0.0, 0.0)
+    assert (model.ngeom, model.neq, model.ntendon, model.nu) == (0, 0, 0, 0)
+    assert model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
+    rotors = [rotor for arm in description.arms for rotor in arm.rotor_inertia]
+    np.testing.assert_array_equal(model.dof_armature, np.concatenate([np.zeros(6), rotors]))
+    parts = [description.base.inertia]
+    for arm in description.arms:
+        parts += [link.inertia for link in arm.links] + [arm.gripper.inertia]
+    for part in parts:
+        body = model.body(part.body)
+        assert body.mass[0] == part.mass
+        np.testing.assert_array_equal(body.ipos, part.com)
+        np.testing.assert_allclose(np.sort(body.inertia), np.linalg.eigvalsh(part.matrix), rtol=10 * _EPS)
