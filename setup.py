@@ -71,9 +71,11 @@ setup(
         "pin>=4.0,<5",
         "pyyaml>=6,<7",
         "rosbags>=0.11.6,<0.12",
+        "zstandard>=0.22,<1",
     ],
     extras_require={
         "test": [
+            "casadi>=3.7,<4",
             "mcap-ros2-support>=0.5.7,<1",
             "mypy>=1.15",
             "pytest>=8.4",
