@@ -69,6 +69,25 @@ def test_blocks_of_the_mass_matrix(motions: list[Motion], robot: RobotModel, rec
     record(claim, whole, 254.0 * _ROUNDING, unit="kg", against=_AGAINST)
 
 
+def test_rates_of_the_other_arm(robot: RobotModel, record: Record) -> None:
+    """The velocity terms of an arm do not depend on the rates of the other; those of H* do."""
+    lagrangian, draw = Lagrangian(robot.description), Draw(robot, seed=9)
+    own, reduced = 0.0, np.inf
+    for _ in range(_STATES):
+        q, v = np.concatenate([draw.vector(6), draw.joints()]), draw.v()
+        other = np.concatenate([v[: BASE_NV + _ARM], draw.vector(_ARM)])
+        first, second = lagrangian.motion(q, v), lagrangian.motion(q, other)
+        change = second.bias - first.bias
+        size = float(np.linalg.norm(first.bias[BASE_NV : BASE_NV + _ARM]))
+        own = max(own, float(np.linalg.norm(change[BASE_NV : BASE_NV + _ARM])) / size)
+        free = _reduced(first.inertia) @ np.linalg.solve(first.inertia, change)[BASE_NV:]
+        reduced = min(reduced, float(np.linalg.norm(free[:_ARM])) / size)
+    claim = "(15): change of c_m of an arm with the rates of the other arm, relative"
+    record(claim, own, 3.0 * _ROUNDING, against=_AGAINST)
+    claim = "(15): largest such change of c_m by the smallest one of c*, which has them"
+    record(claim, own / reduced, 1e-6, against=_AGAINST)
+
+
 def test_signs_of_the_laws(robot: RobotModel, record: Record) -> None:
     """With e = q - q_d both laws have to push against the error."""
     q = robot.configuration(Draw(robot, seed=7).pose(), np.tile([0.2, -0.6, 0.1, -1.5, 0.3, -0.8, 0.4], 2))
