@@ -2,16 +2,18 @@
 PYTHON ?= $(shell python3.11 -c 'import sys; print(sys.executable)' 2>/dev/null || echo python3)
 VENV ?= .venv
 RUNS ?= runs
+MEASURED := build/verification
 
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint .ci/constraints.txt
+MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evidence $(MEASURED)/evidence.json
 TYPED := setup.py interfaces/setup.py sms_handover test $(wildcard benchmarks/*.py)
 
 # The environment stands alone: what a sourced ROS workspace or another environment exports must not leak in.
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover simulate test lint install colcon clean
+.PHONY: help handover simulate test verify measure lint install colcon clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -24,8 +26,20 @@ handover: install  ## hand the deputy over under NMPC, then PID, over DDS in loc
 simulate: install  ## the same handover in one process, without DDS or a recording
 	$(BIN)/sms-handover simulate
 
-test: lint  ## check style and types, then run every test
+test: lint  ## check style and types, then run every test but those of verify
 	$(BIN)/python -m pytest
+
+verify: $(VENV)/.verify  ## measure against independent answers, break every law on purpose, write docs/verification.md
+	@mkdir -p $(MEASURED)
+	status=0; \
+	$(MEASURE) || status=1; \
+	$(BIN)/python test/verification/mutations.py --output $(MEASURED)/breaks.json || status=1; \
+	$(BIN)/python test/verification/report.py $(MEASURED)/evidence.json --breaks $(MEASURED)/breaks.json || status=1; \
+	exit $$status
+
+measure: $(VENV)/.verify  ## the measurements of verify alone: nothing is broken, no report is written
+	@mkdir -p $(MEASURED)
+	$(MEASURE)
 
 lint: $(VENV)/.test  ## check style and types
 	$(BIN)/ruff check
@@ -62,4 +76,8 @@ $(VENV)/.package: $(METADATA) | $(VENV)/.interfaces
 
 $(VENV)/.test: $(VENV)/.package
 	$(PIP) --editable '.[test]'
+	@touch $@
+
+$(VENV)/.verify: $(VENV)/.test
+	$(PIP) --editable '.[test,verify]'
 	@touch $@

@@ -75,13 +75,18 @@ setup(
     ],
     extras_require={
         "test": [
-            "casadi>=3.7,<4",
             "mcap-ros2-support>=0.5.7,<1",
             "mypy>=1.15",
             "pytest>=8.4",
             "ruff>=0.6",
             "types-PyYAML",
             "types-setuptools",
+        ],
+        "verify": [  # second engines and methods; mujoco 4 needs Python 3.11
+            "casadi>=3.7,<4",
+            "daqp>=0.11,<1",
+            "mink>=1.3,<2",
+            "mujoco>=4.0,<5",
         ],
     },
     zip_safe=False,
