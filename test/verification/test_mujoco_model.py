@@ -14,26 +14,35 @@ import pytest
 from sms_handover.model.assembly import RobotDescription
 from sms_handover.model.conserved import physics_receipt
 from sms_handover.model.description import load_robot
-from sms_handover.model.parts import Inertia, JointDescription
+from sms_handover.model.parts import Inertia, JointDescription, Origin
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import Array, Pose
 from test.verification.conftest import Record
 from test.verification.mujoco_model import MujocoRobot, rotation_matrix
 
 _STATES = 100
+_TURN = (0.3, -0.5, 0.7)  # [rad] about all three axes, so that their order counts
 _EPS = float(np.finfo(float).eps)
 _ROUNDING = 10 * 12 * _EPS  # [-] ten frames in a chain, a dozen operations each
 _AGAINST = f"MuJoCo {mujoco.__version__}"
 
 
 def _skewed(robot: RobotDescription) -> RobotDescription:
-    """Return a robot with rotors, tilted joint axes and a lopsided base, which the shipped one has not."""
+    """Return a robot with rotors, tilted axes, turned frames and a lopsided base; the shipped one has none."""
+
+    def turned(old: Origin) -> Origin:
+        return replace(old, rpy=tuple(angle + more for angle, more in zip(old.rpy, _TURN, strict=True)))
 
     def joint(old: JointDescription, rotor: float) -> JointDescription:
-        return replace(old, axis=(0.48, -0.6, 0.64), rotor_inertia=rotor)
+        return replace(old, origin=turned(old.origin), axis=(0.48, -0.6, 0.64), rotor_inertia=rotor)
 
     arms = tuple(
-        replace(arm, joints=tuple(joint(old, 0.1 + 0.05 * i) for i, old in enumerate(arm.joints)))
+        replace(
+            arm,
+            mount=turned(arm.mount),
+            joints=tuple(joint(old, 0.1 + 0.05 * index) for index, old in enumerate(arm.joints)),
+            flange=turned(arm.flange),
+        )
         for arm in robot.arms
     )
     lopsided = Inertia("base_link", 200.0, (0.1, -0.2, 0.3), (30.0, 1.0, -2.0, 40.0, 3.0, 35.0))
