@@ -28,7 +28,7 @@ _AGAINST = f"MuJoCo {mujoco.__version__}"
 
 
 def _skewed(robot: RobotDescription) -> RobotDescription:
-    """Return a robot with rotors, tilted axes, turned frames and a lopsided base; the shipped one has none."""
+    """Return a robot with rotors, tilted axes, turned frames and a lopsided base."""
 
     def turned(old: Origin) -> Origin:
         return replace(old, rpy=tuple(angle + more for angle, more in zip(old.rpy, _TURN, strict=True)))
