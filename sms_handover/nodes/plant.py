@@ -14,21 +14,19 @@ from std_srvs.srv import SetBool, Trigger
 from sms_handover.bag.decode import task_phase
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.frames import BASE, WORLD
+from sms_handover.model.poses import pose_row
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.ros.convert import (
-    energy_message,
     event_message,
     header,
-    pose_stamped,
     stamp_ns_of,
     time_message,
-    vector_stamped,
 )
 from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.loop_clock import LoopClock
 from sms_handover.ros.main import Stop, run_node
 from sms_handover.ros.stamp_sync import StampSync
-from sms_handover.ros.wire import JointStateWire, StateWire
+from sms_handover.ros.wire import JointStateWire, StateWire, energy_wire, pose_wire, vector_wire
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import load_task
 from sms_handover.simulation.wiring import make_plant
@@ -74,6 +72,8 @@ class PlantNode(GraphNode[PlantParameters]):
         self._lockstep = self.common.mode == LOCKSTEP
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
         self._command_wire = JointStateWire(self.robot.joint_names, ("effort",))
+        self._pose_wire, self._vector_wire = pose_wire(WORLD), vector_wire(WORLD)
+        self._energy_wire = energy_wire(WORLD)
         self._inputs: StampSync[Any] = StampSync()
         self._loop_clock = LoopClock(self.common.tick_ns, paced=not self._lockstep)
         self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
@@ -138,28 +138,34 @@ class PlantNode(GraphNode[PlantParameters]):
     # One tick
 
     def _publish_state(self) -> None:
-        """Publish the state of this tick and, each reference period, everything that goes with it."""
-        plant = self._plant
+        """Publish the state of this tick and, each reference period, everything that goes with it.
+
+        What other nodes wait for goes first, so that they work while the rest is published.
+        """
+        plant, publish = self._plant, self._publish
         now_ns = plant.stamp_ns
-        if now_ns % CLOCK_PERIOD_NS == 0:
-            self._publish[CLOCK].publish(Clock(clock=time_message(now_ns)))
+        reference = plant.tick % self.common.ticks_per_reference == 0
         joints, odometry = self._state_wire.pack(plant.state)
-        if plant.tick % self.common.ticks_per_reference == 0:
-            self._publish[SAMPLED_JOINT_STATES].publish(joints)
-            self._publish[SAMPLED_BASE_ODOMETRY].publish(odometry)
+        if reference:
+            publish[SAMPLED_JOINT_STATES].publish(joints)
+            publish[SAMPLED_BASE_ODOMETRY].publish(odometry)
+            publish[DEPUTY_POSE].publish(self._pose_wire.pack(now_ns, pose_row(plant.deputy.deputy_in_world)))
+        publish[JOINT_STATES].publish(joints)
+        publish[BASE_ODOMETRY].publish(odometry)
+        if reference:
             self._publish_period(now_ns)
-        self._publish[JOINT_STATES].publish(joints)
-        self._publish[BASE_ODOMETRY].publish(odometry)
+        if now_ns % CLOCK_PERIOD_NS == 0:
+            publish[CLOCK].publish(Clock(clock=time_message(now_ns)))
 
     def _publish_period(self, now_ns: int) -> None:
-        """Publish poses, momenta and energy of a reference period."""
+        """Publish tool poses, momenta and energy of a reference period."""
         receipt = self._plant.receipt
-        self._publish[DEPUTY_POSE].publish(pose_stamped(self._plant.deputy.deputy_in_world, now_ns))
         for arm, pose in self._plant.tools_in_world.items():
-            self._publish[tool_pose(arm)].publish(pose_stamped(pose, now_ns))
-        self._publish[LINEAR_MOMENTUM].publish(vector_stamped(receipt.linear_momentum, now_ns))
-        self._publish[ANGULAR_MOMENTUM].publish(vector_stamped(receipt.angular_momentum, now_ns))
-        self._publish[ENERGY].publish(energy_message(receipt.kinetic_energy, self._plant.work, now_ns))
+            self._publish[tool_pose(arm)].publish(self._pose_wire.pack(now_ns, pose_row(pose)))
+        vector, energy = self._vector_wire, np.array([receipt.kinetic_energy, self._plant.work])
+        self._publish[LINEAR_MOMENTUM].publish(vector.pack(now_ns, receipt.linear_momentum))
+        self._publish[ANGULAR_MOMENTUM].publish(vector.pack(now_ns, receipt.angular_momentum))
+        self._publish[ENERGY].publish(self._energy_wire.pack(now_ns, energy))
 
     def _on_command(self, data: bytes) -> None:
         """Take a command; in lock step it may complete the tick."""

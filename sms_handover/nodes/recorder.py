@@ -17,10 +17,10 @@ from sms_handover.bag.parameters import RecorderParameters
 from sms_handover.bag.provenance import provenance
 from sms_handover.bag.recording import Recording
 from sms_handover.bag.stamp import stamp_ns
-from sms_handover.bag.transforms import TF_TYPE, transforms_cdr
+from sms_handover.bag.transforms import TF_TYPE, TransformsWire
 from sms_handover.errors import BagError, ConfigurationError, SmsHandoverError
 from sms_handover.frames import BASE, DEPUTY, WORLD
-from sms_handover.model.link_tree import link_transforms
+from sms_handover.model.link_tree import LinkTree
 from sms_handover.ros.convert import pose_of_message
 from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.main import EXIT_OK, Stop, run_node
@@ -75,6 +75,9 @@ class RecorderNode(GraphNode[RecorderParameters]):
         self._last_message = monotonic()
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
         self._tf: StampSync[bytes] = StampSync()
+        self._links = LinkTree(self.robot)
+        frames = [*self._links.frames, (WORLD, DEPUTY)]
+        self._tf_wire = TransformsWire(self._recording.writer.types, frames)
         self._topics: set[str] = set()
         for topic in self.endpoints.topics:
             self._record(topic)
@@ -173,10 +176,9 @@ class RecorderNode(GraphNode[RecorderParameters]):
         if inputs is None:
             return
         state = self._state_wire.read(inputs[SAMPLED_JOINT_STATES], inputs[SAMPLED_BASE_ODOMETRY])
-        transforms = link_transforms(self.robot, state.base_in_world, state.joint_position)
-        transforms.append((WORLD, DEPUTY, _pose(inputs[DEPUTY_POSE])))
-        data = transforms_cdr(self._recording.writer.types, transforms, stamp)
-        self._recording.receive_at(TF, data, stamp, time_ns())
+        poses = self._links.poses(state.base_in_world, state.joint_position)
+        poses.append(_pose(inputs[DEPUTY_POSE]))
+        self._recording.receive_at(TF, self._tf_wire.pack(stamp, poses), stamp, time_ns())
 
     def _look_for_topics(self) -> None:
         """Record topics beyond the graph, with the quality of service that their publishers offer."""

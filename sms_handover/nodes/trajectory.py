@@ -8,19 +8,19 @@ from sms_handover_interfaces.srv import SolveIK
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.errors import GraphError
 from sms_handover.frames import BASE, WORLD
+from sms_handover.model.poses import pose_row
 from sms_handover.ros.convert import (
     joint_positions_message,
     joints_in_order,
     phase_message,
     pose_message,
     pose_of_message,
-    pose_stamped,
     stamp_ns_of,
 )
 from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.main import run_node
 from sms_handover.ros.stamp_sync import StampSync
-from sms_handover.ros.wire import JointStateWire, StateWire
+from sms_handover.ros.wire import JointStateWire, StateWire, pose_wire
 from sms_handover.simulation.feasibility import check_feasibility
 from sms_handover.simulation.scenario import Scenario, load_parameters, load_task
 from sms_handover.topics import (
@@ -55,6 +55,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._generator = TrajectoryGenerator(self.robot, schedule, self.parameters)
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
         self._reference_wire = JointStateWire(self.robot.joint_names, ("position", "velocity"))
+        self._pose_wire = pose_wire(WORLD)
         self._inputs: StampSync[Any] = StampSync()
         self._stamp_ns = 0
         self._failures = 0
@@ -121,22 +122,22 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         if not answer.valid:
             raise GraphError(f"the IK service refused a request: {answer.message}")
         self._failures += answer.status.status != answer.status.CONVERGED
-        self._ik_status.publish(answer.status)
         solution = answer.solution
         joints = joints_in_order(self.robot.joint_names, solution.name, solution.position)
         self._publish(state, phase, targets, joints)
+        self._ik_status.publish(answer.status)
 
     def _publish(self, state: RobotState, phase: TaskPhase, targets: Targets, joints: Array) -> None:
-        """Publish phase, targets and reference of one period."""
+        """Publish phase, reference and targets of one period; what the loop waits for goes first."""
         reference, targets_in_world = self._generator.reference(state, targets, joints)
-        for arm, pose in targets_in_world.items():
-            self._targets[arm].publish(pose_stamped(pose, state.stamp_ns))
         self._phase.publish(phase_message(phase))
         self._reference.publish(
             self._reference_wire.pack(
                 state.stamp_ns, position=reference.position, velocity=reference.velocity
             )
         )
+        for arm, pose in targets_in_world.items():
+            self._targets[arm].publish(self._pose_wire.pack(state.stamp_ns, pose_row(pose)))
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -100,7 +100,10 @@ class FreeFloatingPlant:
 
     @property
     def saturated_ticks(self) -> dict[str, int]:
-        """Return for each joint in how many ticks its command exceeded the effort limit."""
+        """Return for each joint in how many ticks its command was at the effort limit or beyond.
+
+        The laws of this package stop at the limit themselves; another controller may ask for more.
+        """
         return dict(zip(self._robot.joint_names, self._saturated_ticks.tolist(), strict=True))
 
     @property
@@ -133,7 +136,7 @@ class FreeFloatingPlant:
         """
         limit = self._robot.effort_limit
         effort = np.minimum(np.maximum(command.effort, -limit), limit)
-        self._saturated_ticks += effort != command.effort
+        self._saturated_ticks += np.abs(command.effort) >= limit
         generalized = np.concatenate([np.zeros(BASE_NV), effort])
         model, data = self._robot.pin, self._robot.data
 

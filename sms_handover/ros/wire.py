@@ -6,7 +6,7 @@ of another layout (other names, other order, another sender's padding) is read t
 """
 
 import struct
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -97,6 +97,46 @@ class OdometryWire:
         return pose_of_message(message.pose.pose), Twist(_array(linear), _array(angular))
 
 
+class StampedWire:
+    """Packs messages that are a header and then a fixed count of doubles, such as PoseStamped."""
+
+    def __init__(
+        self, type_name: str, frame: str, fields: Callable[[MessageTypes, Array], dict[str, Any]]
+    ) -> None:
+        """Fix type and frame; ``fields`` makes the fields beside the header from some numbers."""
+        types = MessageTypes()
+        numbers = np.arange(1.0, 16.0)
+        message = types.make(type_name, header=_header(types, frame), **fields(types, numbers))
+        self._template = types.serialize(message)
+        self._at = self._template.index(numbers[:1].tobytes())
+
+    def pack(self, stamp_ns: int, numbers: Array) -> bytes:
+        """Return the bytes of a message with a stamp and all its numbers in the order of the fields."""
+        buffer = bytearray(self._template)
+        _STAMP.pack_into(buffer, _STAMP_AT, stamp_ns // NS_PER_S, stamp_ns % NS_PER_S)
+        if numbers.nbytes != len(buffer) - self._at:
+            raise GraphError(f"{numbers.size} numbers do not fill a message of this layout")
+        buffer[self._at :] = numbers.tobytes()
+        return bytes(buffer)
+
+
+def pose_wire(frame: str) -> StampedWire:
+    """Return what packs PoseStamped: position, then quaternion x y z w."""
+    return StampedWire("geometry_msgs/msg/PoseStamped", frame, lambda types, n: {"pose": _pose(types, n)})
+
+
+def vector_wire(frame: str) -> StampedWire:
+    """Return what packs Vector3Stamped."""
+    name = "geometry_msgs/msg/Vector3Stamped"
+    return StampedWire(name, frame, lambda types, n: {"vector": _geometry(types, "Vector3", n[:3])})
+
+
+def energy_wire(frame: str) -> StampedWire:
+    """Return what packs EnergyStamped: kinetic energy, then work."""
+    name = "sms_handover_interfaces/msg/EnergyStamped"
+    return StampedWire(name, frame, lambda types, n: {"kinetic": float(n[0]), "work": float(n[1])})
+
+
 class StateWire:
     """Packs and reads the two messages that carry a robot state."""
 
@@ -141,23 +181,30 @@ def _joint_state(names: tuple[str, ...], blocks: dict[str, Array]) -> bytes:
 def _odometry(frame: str, child_frame: str, pose: Array, twist: Array) -> bytes:
     """Return the bytes of an Odometry with stamp zero and zero covariances."""
     types = MessageTypes()
-
-    def geometry(name: str, **values: Any) -> Any:
-        return types.make(f"geometry_msgs/msg/{name}", **values)
-
-    def vector(name: str, values: Array) -> Any:
-        return geometry(name, **dict(zip("xyzw", values.tolist(), strict=False)))
-
-    where = geometry("Pose", position=vector("Point", pose[:3]), orientation=vector("Quaternion", pose[3:]))
-    motion = geometry("Twist", linear=vector("Vector3", twist[:3]), angular=vector("Vector3", twist[3:]))
+    linear, angular = (_geometry(types, "Vector3", part) for part in (twist[:3], twist[3:]))
+    motion = types.make("geometry_msgs/msg/Twist", linear=linear, angular=angular)
+    covariance = {"covariance": np.zeros(36)}
     message = types.make(
         "nav_msgs/msg/Odometry",
         header=_header(types, frame),
         child_frame_id=child_frame,
-        pose=geometry("PoseWithCovariance", pose=where, covariance=np.zeros(36)),
-        twist=geometry("TwistWithCovariance", twist=motion, covariance=np.zeros(36)),
+        pose=types.make("geometry_msgs/msg/PoseWithCovariance", pose=_pose(types, pose), **covariance),
+        twist=types.make("geometry_msgs/msg/TwistWithCovariance", twist=motion, **covariance),
     )
     return types.serialize(message)
+
+
+def _pose(types: MessageTypes, numbers: Array) -> Any:
+    """Return a Pose message from position and quaternion."""
+    position = _geometry(types, "Point", numbers[:3])
+    return types.make(
+        "geometry_msgs/msg/Pose", position=position, orientation=_geometry(types, "Quaternion", numbers[3:7])
+    )
+
+
+def _geometry(types: MessageTypes, name: str, numbers: Array) -> Any:
+    """Return a Point, Vector3 or Quaternion message from its components."""
+    return types.make(f"geometry_msgs/msg/{name}", **dict(zip("xyzw", numbers.tolist(), strict=False)))
 
 
 def _header(types: MessageTypes, frame: str) -> Any:
