@@ -1,5 +1,6 @@
 """Runs one node as a process: start, spin, orderly end, and one line of text for every error."""
 
+import gc
 import os
 import signal
 import sys
@@ -63,6 +64,8 @@ def run_node(make: Callable[[], RunnableNode], args: Sequence[str] | None = None
         name = node.get_name()
         executor = EventsExecutor()
         executor.add_node(node)
+        gc.collect()
+        gc.freeze()  # what start-up has made lives to the end; no collection needs to look at it again
         return node.run(executor, stop)
     except ConfigurationError as error:
         print(f"{name}: error: {error}", file=sys.stderr)
