@@ -24,7 +24,7 @@ from sms_handover.ros.convert import (
 )
 from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.loop_clock import LoopClock
-from sms_handover.ros.main import Stop, run_node
+from sms_handover.ros.main import EXIT_OK, Stop, run_node
 from sms_handover.ros.stamp_sync import StampSync
 from sms_handover.ros.wire import JointStateWire, StateWire, energy_wire, pose_wire, vector_wire
 from sms_handover.simulation.parameters import LOCKSTEP
@@ -100,11 +100,13 @@ class PlantNode(GraphNode[PlantParameters]):
 
     def run(self, executor: Executor, stop: Stop) -> int:
         """Handle events until asked to stop, and in real time begin every tick at its deadline."""
-        while not self._lockstep and not stop.asked and not self.finished:
+        if self._lockstep:
+            return super().run(executor, stop)
+        while not stop.asked:
             executor.spin_once(timeout_sec=self._loop_clock.wait_s())
-            if self._run_state == RunState.RUNNING and self._loop_clock.due():
+            if self._loop_clock.due():
                 self._tick_now()
-        return super().run(executor, stop)
+        return EXIT_OK
 
     def _make_endpoints(self) -> None:
         """Make publishers, subscriptions and services."""
@@ -132,7 +134,6 @@ class PlantNode(GraphNode[PlantParameters]):
         """Begin the run once every node is ready."""
         if self._run_state == RunState.WAITING and not self._waiting_for and not self.endpoints.unmatched:
             self._enter(RunState.RUNNING, "")
-            self._loop_clock.start()
             self._publish_state()
 
     # One tick
@@ -239,7 +240,6 @@ class PlantNode(GraphNode[PlantParameters]):
         elif response.success and not request.data and self._run_state == RunState.PAUSED:
             self._steps_left = 0
             self._enter(RunState.RUNNING, "")
-            self._loop_clock.start()
             self._advance()
         return response
 
@@ -277,13 +277,12 @@ class PlantNode(GraphNode[PlantParameters]):
     def _begin_anew(self) -> None:
         """Go back to time zero; the other nodes do so when they see the state of that time."""
         self._reset_asked = False
+        self._steps_left = 0
         self.finished = False
         self._plant.reset()
         self._inputs.reset()
         self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
-        if self._run_state != RunState.PAUSED:
-            self._enter(RunState.RUNNING, "reset")
-        self._loop_clock.start()
+        self._enter(RunState.PAUSED if self._run_state == RunState.PAUSED else RunState.RUNNING, "reset")
         self._publish_state()
 
     def _finish(self, detail: str) -> None:
@@ -293,8 +292,12 @@ class PlantNode(GraphNode[PlantParameters]):
         self.publish_counts()
 
     def _enter(self, state: int, detail: str) -> None:
-        """Change the state of the run and tell everybody."""
+        """Change the state of the run, with the clock of the loop, and tell everybody."""
         self._run_state = state
+        if state == RunState.RUNNING:
+            self._loop_clock.start()
+        else:
+            self._loop_clock.stop()
         message = RunState(header=header(self._plant.stamp_ns), state=state, tick=self._plant.tick)
         message.detail = detail
         self._publish[RUN_STATE].publish(message)

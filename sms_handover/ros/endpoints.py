@@ -53,7 +53,7 @@ class Endpoints:
         me, node = self._node.get_name(), self._node
         missing = []
         for name, publisher in self._publishers.items():
-            readers = self._peers & {*self._topics[name].subscribers, RECORDER}
+            readers = self._peers & ({*self._topics[name].subscribers} - {me} | {RECORDER})
             there = node.get_subscriptions_info_by_topic(publisher.topic_name)
             profile = profile_of(self._topics[name])
             served = [reader for reader in there if _serves(profile, reader.qos_profile)]

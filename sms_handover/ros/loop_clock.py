@@ -50,6 +50,10 @@ class LoopClock:
         self._deadline = self._last + self._tick_s if self._paced else None
         self._interval = _Interval(self._last)
 
+    def stop(self) -> None:
+        """Have nothing due until the next start."""
+        self._deadline = None
+
     def wait_s(self) -> float:
         """Return how long to wait for the next deadline, at least zero."""
         if self._deadline is None:

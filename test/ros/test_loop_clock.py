@@ -113,6 +113,18 @@ def test_a_pause_is_not_a_late_tick(wall: WallClock, paced: LoopClock) -> None:
     assert (report.ticks, report.late_ticks, report.period_max) == (2, 0, TICK_S)
 
 
+def test_a_stopped_clock_has_nothing_due(wall: WallClock, paced: LoopClock) -> None:
+    wall.now += TICK_S
+    assert paced.due()
+    paced.stop()
+    wall.now += 100.0
+    assert not paced.due()
+    assert paced.wait_s() > 0.0  # a loop that waits so long does not spin
+    paced.start()
+    wall.now += TICK_S
+    assert paced.due()
+
+
 def test_held_commands_are_counted(wall: WallClock, paced: LoopClock) -> None:
     for held in (False, True, True):
         wall.now += TICK_S

@@ -1,0 +1,134 @@
+"""The whole graph in one process: the real nodes, and an ear in the place of the recorder."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from rclpy.node import Node
+from std_msgs.msg import String
+
+from sms_handover.bag.message_types import MessageTypes
+from sms_handover.bag.stamp import stamp_ns
+from sms_handover.nodes.controller import ControllerNode
+from sms_handover.nodes.ik import IkNode
+from sms_handover.nodes.plant import PlantNode
+from sms_handover.nodes.trajectory import TrajectoryNode
+from sms_handover.ros.endpoints import Endpoints
+from sms_handover.topics import CONTROLLER, IK, PLANT, RECORDER, RUN_READY, TRAJECTORY, Topic, graph_topics
+
+from .bench import Bench, Parameters
+from .short_handover import short_handover
+
+ARMS = ("arm_a", "arm_b")
+TOPICS = graph_topics(ARMS)
+REAL = {PLANT: PlantNode, TRAJECTORY: TrajectoryNode, IK: IkNode, CONTROLLER: ControllerNode}
+
+
+class Ear:
+    """A node in the place of the recorder: it keeps the bytes of every message, by topic."""
+
+    def __init__(self, node: Node, peers: Sequence[str]) -> None:
+        """Listen to every topic of the graph."""
+        self.heard: dict[str, list[bytes]] = {topic.name: [] for topic in TOPICS}
+        self._endpoints = Endpoints(node, TOPICS, peers)
+        self._ready = self._endpoints.publisher(RUN_READY)
+        for topic in TOPICS:
+            self._endpoints.subscribe(topic.name, self.heard[topic.name].append, raw=True)
+
+    def get_ready(self, bench: Bench) -> None:
+        """Wait for the other nodes, and say so."""
+        bench.until(lambda: not self._endpoints.unmatched, "the endpoints of the graph")
+        self._ready.publish(String(data=RECORDER))
+
+
+class Graph:
+    """Some of the nodes in one process with an ear, ready to run."""
+
+    def __init__(
+        self,
+        bench: Bench,
+        parameters: Parameters | None = None,
+        *,
+        schedule: str | None = None,
+        fakes: Mapping[str, Callable[[Node, Sequence[str]], Any]] | None = None,
+        names: Sequence[str] = tuple(REAL),
+    ) -> None:
+        """Start the nodes of these names; ``fakes`` puts something on a plain node in place of a real one."""
+        path = bench.folder / "schedule.yaml"
+        path.write_text(short_handover() if schedule is None else schedule, encoding="utf-8")
+        self.peers = (*names, RECORDER)
+        parameters = dict(parameters or {})
+        parameters["common"] = {
+            "peers": self.peers,
+            "schedule": str(path),
+            **parameters.get("common", {}),
+        }
+        self.bench = bench
+        bench.start(parameters)
+        self.ear = Ear(bench.plain(RECORDER), self.peers)
+        self.fakes = {name: make(bench.plain(name), self.peers) for name, make in (fakes or {}).items()}
+        self.nodes = {name: bench.add(REAL[name]) for name in names if name not in self.fakes}
+        self.client = bench.plain("client")
+
+    @property
+    def heard(self) -> dict[str, list[bytes]]:
+        """Return the bytes of the messages so far, by topic."""
+        return self.ear.heard
+
+    @property
+    def plant(self) -> PlantNode:
+        """Return the plant."""
+        plant = self.nodes[PLANT]
+        assert isinstance(plant, PlantNode)
+        return plant
+
+    def run(self) -> None:
+        """Run to the end, and until the ear has all of it."""
+        self.ear.get_ready(self.bench)
+        self.wait_for_end()
+
+    def wait_for_end(self) -> None:
+        """Wait for the end of the run and for what is still on the way."""
+        self.bench.until(lambda: self.plant.finished, "the end of the run")
+        self.bench.until(self.everything_heard, "all messages")
+
+    def everything_heard(self) -> bool:
+        """Tell whether the ear has as many messages as the nodes have published."""
+        published: dict[str, int] = {}
+        for node in self.nodes.values():
+            for name, count in node.endpoints.counts.items():
+                published[name.lstrip("/")] = published.get(name.lstrip("/"), 0) + count
+        heard = {name.lstrip("/"): len(messages) for name, messages in self.heard.items()}
+        return all(heard[name] >= count for name, count in published.items())
+
+    def call(self, service: str, kind: Any, **values: Any) -> Any:
+        """Return the answer of a service of the plant."""
+        client = self.client.create_client(kind, f"{PLANT}/{service}")
+        self.bench.until(client.service_is_ready, f"the service {service}")
+        answer = self.bench.result(client.call_async(kind.Request(**values)), f"the answer of {service}")
+        self.client.destroy_client(client)
+        return answer
+
+    def stamps(self, topic: str) -> list[int]:
+        """Return the stamps heard on a topic, in ns."""
+        return [stamp_ns(data) for data in self.heard[topic]]
+
+
+class Messages:
+    """Decodes what an ear has heard."""
+
+    def __init__(self) -> None:
+        """Know the types of the graph."""
+        self._types = MessageTypes()
+        self._topics: dict[str, Topic] = {topic.name: topic for topic in TOPICS}
+
+    def of(self, graph: Graph, topic: str) -> list[Any]:
+        """Return the messages heard on a topic."""
+        kind = self._topics[topic].type
+        return [self._types.deserialize(data, kind) for data in graph.heard[topic]]
+
+    def last_run(self, graph: Graph, topic: str) -> list[bytes]:
+        """Return what was heard on a topic since time last began at zero, its padding made zero."""
+        messages, kind = graph.heard[topic], self._topics[topic].type
+        starts = [index for index, data in enumerate(messages) if stamp_ns(data) == 0]
+        begin = starts[-1] if starts else 0
+        return [self._types.serialize(self._types.deserialize(data, kind)) for data in messages[begin:]]

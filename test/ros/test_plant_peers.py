@@ -1,0 +1,303 @@
+"""The plant node against made-up peers: what it takes, what it applies, what it reports, and in real time."""
+
+from collections.abc import Callable, Mapping, Sequence
+from time import monotonic
+from typing import Any
+
+import numpy as np
+import pytest
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from sms_handover_interfaces.msg import GraspEvent, LoopTiming, RunState
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
+
+from sms_handover.bag.stamp import stamp_ns
+from sms_handover.errors import GraphError
+from sms_handover.ros.convert import header, phase_message
+from sms_handover.ros.endpoints import Endpoints
+from sms_handover.topics import (
+    BASE_ODOMETRY,
+    CONTROLLER,
+    DEPUTY_POSE,
+    DIAGNOSTICS,
+    GRASP_EVENT,
+    JOINT_COMMAND,
+    JOINT_STATES,
+    LOOP_TIMING,
+    PLANT,
+    RUN_PUBLISHED,
+    RUN_READY,
+    RUN_STATE,
+    TASK_PHASE,
+)
+from sms_handover.types import Array, GraspAction, GraspCommand, TaskPhase
+
+from .bench import DEADLINE_S, Bench
+from .graph import TOPICS, Graph, Messages
+
+pytestmark = pytest.mark.ros
+
+TICK_NS = 1_000_000
+REFERENCE_NS = 20_000_000
+GRASP_A = GraspCommand(GraspAction.GRASP, "arm_a", "end_a")
+RELEASE_A = GraspCommand(GraspAction.RELEASE, "arm_a")
+
+Effort = Callable[[int], Array]
+
+
+class FakeController:
+    """Answers every state, and in place of the trajectory node gives the phases."""
+
+    def __init__(
+        self,
+        node: Node,
+        peers: Sequence[str],
+        effort: Effort,
+        commands: Mapping[int, tuple[GraspCommand, ...]],
+        *,
+        names: Sequence[str] | None = None,
+        silent: bool = False,
+    ) -> None:
+        """Give ``effort`` by tick, in the order of ``names``, and grasp commands by stamp."""
+        self._effort, self._commands, self._names, self._silent = effort, commands, names, silent
+        self._endpoints = Endpoints(node, TOPICS, peers)
+        self._command = self._endpoints.publisher(JOINT_COMMAND)
+        self._phase = self._endpoints.publisher(TASK_PHASE)
+        self._ready = self._endpoints.publisher(RUN_READY)
+        for unused in (DIAGNOSTICS, RUN_PUBLISHED):
+            self._endpoints.publisher(unused)
+        self._endpoints.subscribe(JOINT_STATES, self._on_state)
+        self._endpoints.subscribe(BASE_ODOMETRY, lambda message: None)
+        self._endpoints.subscribe(RUN_STATE, lambda message: None)
+
+    def get_ready(self, bench: Bench) -> None:
+        """Wait for the plant, and say so."""
+        bench.until(lambda: not self._endpoints.unmatched, "the endpoints of the plant")
+        self._ready.publish(String(data=CONTROLLER))
+
+    def _on_state(self, message: Any) -> None:
+        """Answer a state, a phase first where one is due."""
+        stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+        if stamp % REFERENCE_NS == 0:
+            phase = TaskPhase(stamp, 0, "made up", self._commands.get(stamp, ()))
+            self._phase.publish(phase_message(phase))
+        if self._silent:
+            return
+        names = self._names or message.name
+        answer = JointState(header=header(stamp, ""), name=list(names))
+        answer.effort = self._effort(stamp // TICK_NS).tolist()
+        self._command.publish(answer)
+
+
+def no_effort(tick: int) -> Array:
+    return np.zeros(14)
+
+
+def plant_with(
+    bench: Bench,
+    effort: Effort = no_effort,
+    commands: Mapping[int, tuple[GraspCommand, ...]] | None = None,
+    *,
+    duration: float = 0.04,
+    common: Mapping[str, object] | None = None,
+    **options: Any,
+) -> Graph:
+    """Return a plant with a made-up controller, ready to run."""
+
+    def fake(node: Node, peers: Sequence[str]) -> FakeController:
+        return FakeController(node, peers, effort, commands or {}, **options)
+
+    parameters = {"common": {"duration": duration, **(common or {})}}
+    graph = Graph(bench, parameters, fakes={CONTROLLER: fake}, names=(PLANT, CONTROLLER))
+    graph.fakes[CONTROLLER].get_ready(bench)
+    return graph
+
+
+def efforts(graph: Graph) -> list[list[float]]:
+    return [list(state.effort) for state in Messages().of(graph, JOINT_STATES)]
+
+
+def test_every_state_tells_what_was_applied_before_it(bench: Bench) -> None:
+    """Effort k of the command acts over the tick that ends at stamp k + 1; the limits of the Gen3 hold."""
+    wanted = np.array([1.0, -2.0, 0.5, 0.0, 0.1, -0.1, 0.01] * 2)
+    graph = plant_with(bench, lambda tick: wanted * (tick % 3))
+    graph.run()
+    assert efforts(graph) == [[0.0] * 14] + [(wanted * (k % 3)).tolist() for k in range(40)]
+    assert not any(name.startswith("saturated") for name in graph.plant.diagnostic_values())
+
+
+def test_saturation_is_applied_and_reported(bench: Bench) -> None:
+    """All joints beyond their limits for ten ticks, then one of them for five more."""
+
+    def effort(tick: int) -> Array:
+        values = np.zeros(14)
+        if tick < 10:
+            values[:] = 1000.0
+            values[7:] = -1000.0
+        elif tick < 15:
+            values[2] = 39.5
+        return values
+
+    graph = plant_with(bench, effort)
+    graph.run()
+    limits = [39.0] * 4 + [9.0] * 3
+    assert efforts(graph)[1] == limits + [-limit for limit in limits]
+    assert efforts(graph)[11] == [0.0, 0.0, 39.0] + [0.0] * 11
+    told = graph.plant.diagnostic_values()
+    names = graph.plant.robot.joint_names
+    assert {name: told[f"saturated_{name}"] for name in names} == {**dict.fromkeys(names, 10), names[2]: 15}
+
+
+def test_commands_are_matched_by_name(bench: Bench) -> None:
+    names = [f"{arm}_joint_{number}" for arm in ("arm_b", "arm_a") for number in (7, 1, 6, 2, 5, 3, 4)]
+    values = np.linspace(-1.0, 1.0, 14)
+    graph = plant_with(bench, lambda tick: values, names=names)
+    graph.run()
+    by_name = dict(zip(names, values.tolist(), strict=True))
+    assert efforts(graph)[1] == [by_name[name] for name in graph.plant.robot.joint_names]
+
+
+def test_a_command_without_a_joint_ends_the_run_in_words(bench: Bench) -> None:
+    names = [f"{arm}_joint_{number}" for arm in ("arm_a", "arm_b") for number in range(1, 8)]
+    graph = plant_with(bench, names=[*names[:-1], "arm_b_joint_8"])
+    with pytest.raises(GraphError, match="a joint message lacks 'arm_b_joint_7'"):
+        graph.run()
+
+
+def test_without_an_answer_the_plant_waits(bench: Bench) -> None:
+    graph = plant_with(bench, silent=True)
+    graph.ear.get_ready(bench)
+    bench.until(lambda: graph.heard[TASK_PHASE], "the first phase")
+    assert graph.call("pause", SetBool, data=True).success  # as long as many ticks take
+    assert graph.stamps(JOINT_STATES) == [0]
+
+
+def test_a_grasp_far_away_misses_and_what_makes_no_sense_is_rejected(bench: Bench) -> None:
+    commands = {
+        0: (RELEASE_A,),
+        20_000_000: (GraspCommand(GraspAction.GRASP, "arm_b", "end_a"),),
+        40_000_000: (GRASP_A, GRASP_A, RELEASE_A),
+    }
+    graph = plant_with(bench, commands=commands)
+    graph.run()
+    messages = Messages()
+    found = [
+        (stamp, event.status)
+        for stamp, event in zip(graph.stamps(GRASP_EVENT), messages.of(graph, GRASP_EVENT), strict=True)
+    ]
+    assert found == [
+        (0, GraspEvent.REJECTED),
+        (20_000_000, GraspEvent.MISSED),
+        (40_000_000, GraspEvent.SUCCEEDED),
+        (40_000_000, GraspEvent.REJECTED),
+        (40_000_000, GraspEvent.SUCCEEDED),
+    ]
+    details = [event.detail for event in messages.of(graph, GRASP_EVENT)]
+    assert details[0] == "arm_a does not hold the deputy"
+    assert "distance" in details[1]
+    assert details[2:] == ["arm_a holds the deputy", "arm_a holds the deputy already", "arm_a let go"]
+    first, *others = messages.of(graph, DEPUTY_POSE)
+    assert all(pose.pose == first.pose for pose in others)  # nobody moved
+
+
+# Real time
+
+
+class FastClock:
+    """A wall clock that moves by half a tick whenever somebody looks at it."""
+
+    def __init__(self) -> None:
+        """Start somewhere."""
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        """Return the time in s."""
+        self.now += 0.0005
+        return self.now
+
+
+class StopWhen:
+    """Asks a node to stop when a condition holds, and fails the test if it never does."""
+
+    def __init__(self, condition: Callable[[], bool]) -> None:
+        """Take the condition."""
+        self._condition = condition
+        self._deadline = monotonic() + DEADLINE_S
+
+    @property
+    def asked(self) -> bool:
+        """Tell whether to stop."""
+        assert monotonic() < self._deadline, "waited in vain"
+        return self._condition()
+
+
+@pytest.fixture
+def fast_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sms_handover.ros.loop_clock.monotonic", FastClock())
+
+
+def run_until(graph: Graph, condition: Callable[[], bool]) -> None:
+    """Let the plant's own loop run until a condition holds."""
+    stop: Any = StopWhen(condition)
+    graph.plant.run(graph.bench.executor, stop)
+
+
+REALTIME = {"mode": "realtime"}
+
+
+def test_in_real_time_the_last_command_is_held(bench: Bench, fast_clock: None) -> None:
+    """The controller never answers: every tick goes on with the command of the start, and counts as held."""
+    graph = plant_with(bench, common=REALTIME, duration=0.5, silent=True)
+    graph.ear.get_ready(bench)
+    run_until(graph, lambda: graph.plant.finished and graph.everything_heard())
+    assert graph.stamps(JOINT_STATES) == [k * TICK_NS for k in range(501)]
+    assert efforts(graph) == [[0.0] * 14] * 501
+    last = Messages().of(graph, RUN_STATE)[-1]
+    assert (last.state, last.tick) == (RunState.FINISHED, 500)
+
+
+def test_in_real_time_a_reset_after_the_end_runs_again(bench: Bench, fast_clock: None) -> None:
+    graph = plant_with(bench, common=REALTIME, duration=0.1)
+    graph.ear.get_ready(bench)
+    client = graph.client.create_client(Trigger, f"{PLANT}/reset")
+    asked = []
+
+    def ended_twice() -> bool:
+        changes = len(graph.heard[RUN_STATE])
+        if changes == 2 and not asked:
+            asked.append(client.call_async(Trigger.Request()))
+        return changes == 4
+
+    run_until(graph, ended_twice)
+    bench.until(graph.everything_heard, "all messages")
+    states = [state.state for state in Messages().of(graph, RUN_STATE)]
+    assert states == [RunState.RUNNING, RunState.FINISHED] * 2
+    assert graph.stamps(JOINT_STATES) == [k * TICK_NS for k in range(101)] * 2
+
+
+def test_in_real_time_a_paused_plant_stands_still_and_goes_on(bench: Bench, fast_clock: None) -> None:
+    graph = plant_with(bench, common=REALTIME, duration=0.3)
+    graph.ear.get_ready(bench)
+    run_until(graph, lambda: graph.plant.diagnostic_stamp_ns() >= 50 * TICK_NS)
+    pause = graph.client.create_client(SetBool, f"{PLANT}/pause")
+    bench.until(pause.service_is_ready, "the service")
+    asked = pause.call_async(SetBool.Request(data=True))
+    run_until(graph, asked.done)
+    at = graph.plant.diagnostic_stamp_ns()
+    looks: list[int] = []
+    run_until(graph, lambda: len(looks) > 50 or looks.append(0) is not None)
+    assert graph.plant.diagnostic_stamp_ns() == at
+    pause.call_async(SetBool.Request(data=False))
+    run_until(graph, lambda: graph.plant.finished and graph.everything_heard())
+    assert graph.stamps(JOINT_STATES) == [k * TICK_NS for k in range(301)]
+
+
+def test_in_real_time_the_loop_reports_its_timing(bench: Bench) -> None:
+    graph = plant_with(bench, common=REALTIME, duration=60.0)
+    graph.ear.get_ready(bench)
+    run_until(graph, lambda: len(graph.heard[LOOP_TIMING]) >= 1)
+    report: LoopTiming = Messages().of(graph, LOOP_TIMING)[0]
+    assert 0 < report.ticks <= len(graph.heard[JOINT_STATES])
+    assert 0.0 < report.period_mean <= report.period_max
+    assert stamp_ns(graph.heard[LOOP_TIMING][0]) <= graph.plant.diagnostic_stamp_ns()
