@@ -81,7 +81,7 @@ def test_conservation_under_random_efforts(
     for index, (law, unit) in enumerate(_LAWS):
         found = [float(run.worst[index]) for run in runs]
         bound = 2.0 * found[2] / 4.0**order + _rounding(runs[0].energy, 800)
-        against = f"2 x (departure at 4 ms) / 4^{order}"
+        against = f"2 x (departure at 4 ms) / 4^{order} + rounding"
         record(f"{law}: largest departure, {about}", found[0], bound, unit=unit, against=against)
         if kind == "the shipped robot":
             off = abs(
@@ -157,7 +157,9 @@ def test_time_reversal(robot: RobotModel, draw: Draw, integrator: str, record: R
     record(claim, short, _ORDER_TOLERANCE, against="order of the tableau, or better")
     bound = 2.0 * errors[2] / 4.0**tableau.order + 800 * _EPS * float(np.linalg.norm(v))
     claim = f"time reversal, {integrator}: distance from the start after 0.4 s and back, 1 ms"
-    record(claim, errors[3], bound, unit="SI", against=f"2 x (distance at 4 ms) / 4^{tableau.order}")
+    record(
+        claim, errors[3], bound, unit="SI", against=f"2 x (distance at 4 ms) / 4^{tableau.order} + rounding"
+    )
 
 
 class Loop:
