@@ -6,15 +6,30 @@ from typing import Any
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import PoseStamped, Vector3Stamped
 from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
+from sms_handover_interfaces.msg import EnergyStamped
 
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.errors import GraphError
-from sms_handover.ros.convert import pose_message, time_message
-from sms_handover.ros.wire import JointStateWire, OdometryWire, StateWire
+from sms_handover.ros.convert import (
+    energy_message,
+    pose_message,
+    pose_stamped,
+    time_message,
+    vector_stamped,
+)
+from sms_handover.ros.wire import (
+    JointStateWire,
+    OdometryWire,
+    StateWire,
+    energy_wire,
+    pose_wire,
+    vector_wire,
+)
 from sms_handover.types import Array, Pose, RobotState, Twist
 from sms_handover.units import NS_PER_S
 
@@ -68,6 +83,11 @@ def joint_state(
     return bytes(data)
 
 
+def geometry(name: str, fields: str, values: Array) -> Any:
+    """Return a Point, Vector3 or Quaternion."""
+    return rosbags_message(f"geometry_msgs/msg/{name}", **dict(zip(fields, values.tolist(), strict=True)))
+
+
 def odometry(
     frames: tuple[str, str],
     stamp: int,
@@ -78,11 +98,6 @@ def odometry(
     little_endian: bool = True,
 ) -> bytes:
     """Return an Odometry as rosbags serialises it."""
-
-    def geometry(name: str, fields: str, values: Array) -> Any:
-        parts = dict(zip(fields, values.tolist(), strict=True))
-        return rosbags_message(f"geometry_msgs/msg/{name}", **parts)
-
     where = rosbags_message(
         "geometry_msgs/msg/Pose",
         position=geometry("Point", "xyz", pose[:3]),
@@ -311,6 +326,43 @@ def test_other_frames_are_refused(frames: tuple[str, str], little_endian: bool) 
     with pytest.raises(GraphError, match=r"between frames .*expected \('world', 'base_link'\)") as caught:
         OdometryWire("world", "base_link").read(data)
     assert str(frames) in str(caught.value)
+
+
+# What is a header and some numbers
+
+
+@pytest.mark.parametrize("stamp", STAMPS)
+@pytest.mark.parametrize("frame", ["", "w", "wo", "wor", "worl", "world", "base_link"])
+def test_stamped_messages_have_the_bytes_of_rosbags(frame: str, stamp: int) -> None:
+    values, header = numbers(7, 1), rosbags_header(stamp, frame)
+    pose = rosbags_message(
+        "geometry_msgs/msg/Pose",
+        position=geometry("Point", "xyz", values[:3]),
+        orientation=geometry("Quaternion", "xyzw", values[3:]),
+    )
+    stamped = rosbags_message("geometry_msgs/msg/PoseStamped", header=header, pose=pose)
+    expected = bytes(ROSBAGS.serialize_cdr(stamped, "geometry_msgs/msg/PoseStamped"))
+    assert pose_wire(frame).pack(stamp, values) == expected
+    vector = geometry("Vector3", "xyz", values[:3])
+    stamped = rosbags_message("geometry_msgs/msg/Vector3Stamped", header=header, vector=vector)
+    expected = bytes(ROSBAGS.serialize_cdr(stamped, "geometry_msgs/msg/Vector3Stamped"))
+    assert vector_wire(frame).pack(stamp, values[:3]) == expected
+
+
+def test_rclpy_reads_the_stamped_messages() -> None:
+    values = np.arange(1.0, 8.0)
+    pose: Any = deserialize_message(pose_wire("world").pack(3_000_000_004, values), PoseStamped)
+    assert pose == pose_stamped(Pose(values[:3], values[3:]), 3_000_000_004)
+    vector: Any = deserialize_message(vector_wire("world").pack(5, values[:3]), Vector3Stamped)
+    assert vector == vector_stamped(values[:3], 5)
+    energy: Any = deserialize_message(energy_wire("world").pack(6, values[:2]), EnergyStamped)
+    assert energy == energy_message(1.0, 2.0, 6)
+
+
+@pytest.mark.parametrize("size", [0, 2, 4, 7])
+def test_numbers_that_do_not_fill_a_message_are_refused(size: int) -> None:
+    with pytest.raises(GraphError, match=f"{size} numbers do not fill"):
+        vector_wire("world").pack(0, np.zeros(size))
 
 
 # Both
