@@ -1,6 +1,6 @@
 """The recorder node."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -28,6 +28,7 @@ from sms_handover.ros.message_types import message_class
 from sms_handover.ros.peer_parameters import PeerParameters
 from sms_handover.ros.qos import LOSSLESS, profile_of, stored
 from sms_handover.ros.stamp_sync import StampSync
+from sms_handover.ros.taps import Receive, Taps
 from sms_handover.ros.wire import StateWire
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import load_task
@@ -47,7 +48,8 @@ from sms_handover.types import Pose
 
 EXIT_LOSS = 3  # the bag is whole, but messages are missing in it
 
-_POLL_S = 0.05  # [s] of wall time between two looks at what else is to be done
+_POLL_S = 0.005  # [s] of wall time between two batches: long enough to be cheap, short enough to lose little
+_QUIET_S = 0.05  # [s] of wall time without a message after which nothing is on the way any more
 _DISCOVERY_PERIOD_S = 1.0  # [s] of wall time between two looks for topics beyond the graph
 _TF_INPUTS = (SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
 
@@ -79,6 +81,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
         frames = [*self._links.frames, (WORLD, DEPUTY)]
         self._tf_wire = TransformsWire(self._recording.writer.types, frames)
         self._topics: set[str] = set()
+        self._taps = Taps(self)
         for topic in self.endpoints.topics:
             self._record(topic)
         self._recording.add_topic(TF, TF_TYPE, (stored(LOSSLESS),), self.common.reference_ns)
@@ -110,10 +113,12 @@ class RecorderNode(GraphNode[RecorderParameters]):
         try:
             while not stop.asked and not self._drained():
                 executor.spin_once(timeout_sec=_POLL_S)
+                self._taps.empty()
             if stop.asked:
                 self._take_the_rest(executor)
         finally:
             self._recording.close()
+            self._taps.destroy()
         ledger = self._recording.ledger
         print(ledger_table(ledger))
         return EXIT_OK if ledger.complete else EXIT_LOSS
@@ -129,7 +134,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
     def _take_the_rest(self, executor: Executor) -> None:
         """Take what is on the way when the recorder is asked to stop before the end of the run."""
         self._last_message = monotonic()
-        while monotonic() - self._last_message < _POLL_S:
+        while self._taps.empty() or monotonic() - self._last_message < _QUIET_S:
             executor.spin_once(timeout_sec=_POLL_S)
 
     def _record(self, topic: Topic) -> None:
@@ -143,31 +148,36 @@ class RecorderNode(GraphNode[RecorderParameters]):
         }
         evenly = self.common.mode == LOCKSTEP or topic.publishers == (PLANT,)
         self._open(name, topic.type, profile, periods.get(topic.rate, 0) if evenly else 0)
-        receive: Callable[[bytes], None] = partial(self._receive, name)
+        receive: Receive = partial(self._receive, name)
         if topic.name in _TF_INPUTS:
             receive = partial(self._receive_for_tf, topic.name, name)
         elif topic.name == RUN_PUBLISHED:
             receive = partial(self._receive_counts, name)
-        self.endpoints.subscribe(topic.name, receive, raw=True)
+        subscription = self.endpoints.subscribe(topic.name, lambda data: None, raw=True)
+        self._taps.take_over(subscription, receive)
 
     def _open(self, name: str, type_name: str, profile: QoSProfile, period_ns: int) -> None:
         """Open a topic in the bag."""
         self._recording.add_topic(name, type_name, (stored(profile),), period_ns)
         self._topics.add(name)
 
-    def _receive(self, name: str, data: bytes) -> None:
-        """Record one message."""
+    def _receive(self, name: str, data: bytes, sent_ns: int) -> None:
+        """Record one message that was sent at a wall-clock time."""
         self._last_message = monotonic()
-        self._recording.receive(name, data, time_ns())
+        self._recording.receive(name, data, sent_ns)
 
-    def _receive_counts(self, name: str, data: bytes) -> None:
+    def _receive_now(self, name: str, data: bytes) -> None:
+        """Record one message of a topic beyond the graph, which comes by the executor."""
+        self._receive(name, data, time_ns())
+
+    def _receive_counts(self, name: str, data: bytes, sent_ns: int) -> None:
         """Record what a node has published in all, and note that it has told."""
-        self._receive(name, data)
+        self._receive(name, data, sent_ns)
         self._reported.add(deserialize_message(data, PublishedCounts).node)
 
-    def _receive_for_tf(self, topic: str, name: str, data: bytes) -> None:
-        """Record one message and, each reference period, the transforms that follow from it."""
-        self._receive(name, data)
+    def _receive_for_tf(self, topic: str, name: str, data: bytes, sent_ns: int) -> None:
+        """Record one message and, when its companions are there too, the transforms that follow."""
+        self._receive(name, data, sent_ns)
         stamp = stamp_ns(data)
         if self._tf.begins_anew(stamp):
             self._tf.reset()
@@ -178,7 +188,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
         state = self._state_wire.read(inputs[SAMPLED_JOINT_STATES], inputs[SAMPLED_BASE_ODOMETRY])
         poses = self._links.poses(state.base_in_world, state.joint_position)
         poses.append(_pose(inputs[DEPUTY_POSE]))
-        self._recording.receive_at(TF, self._tf_wire.pack(stamp, poses), stamp, time_ns())
+        self._recording.receive_at(TF, self._tf_wire.pack(stamp, poses), stamp, sent_ns)
 
     def _look_for_topics(self) -> None:
         """Record topics beyond the graph, with the quality of service that their publishers offer."""
@@ -194,7 +204,8 @@ class RecorderNode(GraphNode[RecorderParameters]):
             except SmsHandoverError as error:
                 self.get_logger().warning(f"{name} is not recorded: {error}")
                 continue
-            self.create_subscription(kind, name, partial(self._receive, name), _weakest(offers), raw=True)
+            receive = partial(self._receive_now, name)
+            self.create_subscription(kind, name, receive, _weakest(offers), raw=True)
 
 
 def _weakest(offers: Sequence[QoSProfile]) -> QoSProfile:
