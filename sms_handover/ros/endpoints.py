@@ -40,12 +40,14 @@ class Endpoints:
         self._publishers[name] = CountedPublisher(publisher)
         return self._publishers[name]
 
-    def subscribe(self, name: str, callback: Callable[[Any], None], *, raw: bool = False) -> None:
+    def subscribe(self, name: str, callback: Callable[[Any], None], *, raw: bool = False) -> Subscription:
         """Call ``callback`` with every message of a topic of the table, as CDR bytes if ``raw``."""
         topic = self._topics[name]
-        self._subscriptions[name] = self._node.create_subscription(
+        subscription = self._node.create_subscription(
             message_class(topic.type), topic.name, callback, profile_of(topic), raw=raw
         )
+        self._subscriptions[name] = subscription
+        return subscription
 
     @property
     def unmatched(self) -> list[str]:
