@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 from sms_handover_interfaces.srv import SolveIK
 
-from sms_handover.errors import SmsHandoverError
+from sms_handover.errors import GraphError, SmsHandoverError
 from sms_handover.ik.levenberg_marquardt import solve_ik
 from sms_handover.ik.parameters import IkParameters
 from sms_handover.ros.convert import (
@@ -18,7 +19,7 @@ from sms_handover.ros.convert import (
 from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.main import run_node
 from sms_handover.topics import IK, SOLVE_IK
-from sms_handover.types import IkRequest, IkStatus
+from sms_handover.types import IkRequest, IkStatus, Pose
 
 
 class IkNode(GraphNode[IkParameters]):
@@ -39,11 +40,7 @@ class IkNode(GraphNode[IkParameters]):
     def _on_request(self, request: Any, response: Any) -> Any:
         """Solve one request; a malformed one is answered with ``valid`` false and the reason."""
         try:
-            seed = joints_in_order(self.robot.joint_names, request.seed.name, request.seed.position)
-            for arm in request.arms:
-                self.robot.require_arm(arm)
-            targets = zip(request.arms, map(pose_of_message, request.tool_in_world), strict=True)
-            question = IkRequest(pose_of_message(request.base_in_world), seed, dict(targets))
+            question = self._question(request)
         except (SmsHandoverError, ValueError) as error:
             self._refused += 1
             response.message = str(error)
@@ -56,6 +53,29 @@ class IkNode(GraphNode[IkParameters]):
         response.valid = True
         response.message = result.status.value
         return response
+
+    def _question(self, request: Any) -> IkRequest:
+        """Return what a request asks; raises SmsHandoverError or ValueError where it is malformed."""
+        seed = joints_in_order(self.robot.joint_names, request.seed.name, request.seed.position)
+        if not np.all(np.isfinite(seed)):
+            raise GraphError("the seed is not finite")
+        targets: dict[str, Pose] = {}
+        for arm, message in zip(request.arms, request.tool_in_world, strict=True):
+            self.robot.require_arm(arm)
+            if arm in targets:
+                raise GraphError(f"there are two targets for {arm}")
+            targets[arm] = _pose(message, f"the target of {arm}")
+        return IkRequest(_pose(request.base_in_world, "the pose of the base"), seed, targets)
+
+
+def _pose(message: Any, name: str) -> Pose:
+    """Return the pose in a message; raises GraphError if it is none."""
+    pose = pose_of_message(message)
+    if not (np.all(np.isfinite(pose.position)) and np.all(np.isfinite(pose.quaternion_xyzw))):
+        raise GraphError(f"{name} is not finite")
+    if not np.any(pose.quaternion_xyzw):
+        raise GraphError(f"{name} has no orientation: its quaternion is zero")
+    return pose
 
 
 def main(args: Sequence[str] | None = None) -> int:
