@@ -1,0 +1,223 @@
+"""The controller answers inputs of equal stamp only, in whatever order they arrive."""
+
+from collections.abc import Mapping
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+import pytest
+from sms_handover_interfaces.msg import RunState
+
+from sms_handover.bag.stamp import stamp_ns
+from sms_handover.control.controller import JointController
+from sms_handover.errors import UnstableLoopError
+from sms_handover.frames import BASE, WORLD
+from sms_handover.nodes.controller import ControllerNode
+from sms_handover.ros.convert import phase_message
+from sms_handover.ros.endpoints import CountedPublisher, Endpoints
+from sms_handover.ros.wire import JointStateWire, StateWire
+from sms_handover.simulation.scenario import Scenario, load_scenario
+from sms_handover.simulation.wiring import initial_joints, make_controller
+from sms_handover.topics import (
+    BASE_ODOMETRY,
+    CONTROLLER,
+    JOINT_COMMAND,
+    JOINT_REFERENCE,
+    JOINT_STATES,
+    PLANT,
+    RUN_READY,
+    RUN_STATE,
+    TASK_PHASE,
+    TRAJECTORY,
+)
+from sms_handover.types import Array, JointReference, Pose, RobotState, TaskPhase, Twist
+
+from .bench import Bench
+from .graph import TOPICS
+from .short_handover import short_handover
+
+pytestmark = pytest.mark.ros
+
+REFERENCE_NS = 20_000_000
+INPUTS = (JOINT_STATES, BASE_ODOMETRY, JOINT_REFERENCE, TASK_PHASE)
+
+
+class Rest:
+    """The rest of the graph by hand: publishers of all inputs, and the commands that come back."""
+
+    def __init__(self, bench: Bench, **controller: object) -> None:
+        """Start a controller and match it."""
+        path = bench.folder / "schedule.yaml"
+        path.write_text(short_handover(), encoding="utf-8")
+        common = {"schedule": str(path), "peers": (PLANT, CONTROLLER)}
+        common.update({key: controller.pop(key) for key in ("mode",) if key in controller})  # type: ignore[misc]
+        bench.start({"common": common, CONTROLLER: controller})
+        self.bench = bench
+        self.scenario: Scenario = load_scenario({"common": common, CONTROLLER: controller})
+        self.node = bench.add(ControllerNode)
+        endpoints = Endpoints(bench.plain(PLANT), TOPICS, (PLANT, CONTROLLER))
+        self._publish: dict[str, CountedPublisher] = {
+            name: endpoints.publisher(name) for name in (*INPUTS, RUN_STATE)
+        }
+        self.commands: list[bytes] = []
+        endpoints.subscribe(JOINT_COMMAND, self.commands.append, raw=True)
+        ready: list[Any] = []
+        endpoints.subscribe(RUN_READY, ready.append)
+        bench.until(lambda: ready and not endpoints.unmatched, "the controller")
+        names = self.scenario.robot.joint_names
+        self._state_wire = StateWire(names, WORLD, BASE)
+        self._reference_wire = JointStateWire(names, ("position", "velocity"))
+        self._command_wire = JointStateWire(names, ("effort",))
+
+    def messages(self, state: RobotState, reference: JointReference, phase: TaskPhase) -> dict[str, Any]:
+        """Return the messages of one stamp by topic."""
+        joints, odometry = self._state_wire.pack(state)
+        position, velocity = reference.position, reference.velocity
+        packed = self._reference_wire.pack(reference.stamp_ns, position=position, velocity=velocity)
+        return {
+            JOINT_STATES: joints,
+            BASE_ODOMETRY: odometry,
+            JOINT_REFERENCE: packed,
+            TASK_PHASE: phase_message(phase),
+        }
+
+    def send(self, messages: Mapping[str, Any], *topics: str) -> None:
+        """Publish the messages of some topics in this order."""
+        for topic in topics:
+            self._publish[topic].publish(messages[topic])
+
+    def end_of_run(self) -> None:
+        """Say that the run is over."""
+        self._publish[RUN_STATE].publish(RunState(state=RunState.FINISHED))
+
+    def wait_for(self, count: int) -> None:
+        """Wait for a number of commands in all."""
+        self.bench.until(lambda: len(self.commands) >= count, f"{count} commands")
+
+    def efforts(self) -> list[Array]:
+        """Return the commands so far."""
+        return [self._command_wire.read(data)["effort"] for data in self.commands]
+
+    def by_hand(self) -> JointController:
+        """Return the controller of the core."""
+        s = self.scenario
+        return make_controller(s.robot, s.schedule, s.parameters.common, s.parameters.controller)
+
+
+def inputs(rest: Rest, stamp: int, seed: int) -> tuple[RobotState, JointReference, TaskPhase]:
+    """Return a state near the start, a reference near it, and a phase."""
+    random = np.random.default_rng(seed)
+    start = initial_joints(rest.scenario.robot, rest.scenario.schedule)
+    noise = random.normal(scale=0.01, size=(5, 14))
+    base = Pose(0.1 * noise[0, :3], np.array([0.0, 0.0, 0.0, 1.0]))
+    twist = Twist(noise[1, :3], noise[1, 3:6])
+    state = RobotState(stamp, base, twist, start + noise[2], noise[3], np.zeros(14))
+    reference = JointReference(stamp, start + noise[4], 0.1 * noise[0])
+    index = min(stamp // (8 * REFERENCE_NS), 2)
+    return state, reference, TaskPhase(stamp, index, rest.scenario.schedule.phases[index].name)
+
+
+@pytest.mark.parametrize("law", ["nmpc", "pid"])
+def test_any_order_of_arrival_gives_the_same_command(bench: Bench, law: str) -> None:
+    """Each stamp in another of the 24 orders, from the first to the last phase."""
+    rest = Rest(bench, law=law)
+    expected = rest.by_hand()
+    for number, order in enumerate(permutations(INPUTS)):
+        state, reference, phase = inputs(rest, number * REFERENCE_NS, number)
+        rest.send(rest.messages(state, reference, phase), *order)
+        rest.wait_for(number + 1)
+        expected.enter(phase)
+        expected.track(reference)
+        assert rest.efforts()[-1].tobytes() == expected.step(state).effort.tobytes()
+        assert stamp_ns(rest.commands[-1]) == state.stamp_ns
+    assert len(rest.commands) == 24
+    assert rest.node.diagnostic_values() == {"law": law, "answered": 24, "late": 0}
+
+
+@pytest.mark.parametrize("missing", INPUTS)
+def test_nothing_is_answered_before_all_inputs_are_there(bench: Bench, missing: str) -> None:
+    """Inputs of another stamp do not complete one, neither those before nor those after it."""
+    rest = Rest(bench)
+    now = rest.messages(*inputs(rest, 0, 0))
+    later = rest.messages(*inputs(rest, REFERENCE_NS, 1))
+    others = [topic for topic in INPUTS if topic != missing]
+    rest.send(now, *others)
+    rest.send(later, missing)
+    rest.end_of_run()
+    rest.bench.until(lambda: rest.node.finished, "the end of the run, told after the inputs")
+    assert rest.commands == []
+    rest.send(now, missing)
+    rest.wait_for(1)
+    rest.send(later, *others)
+    rest.wait_for(2)
+    assert [stamp_ns(data) for data in rest.commands] == [0, REFERENCE_NS]
+
+
+def test_between_references_the_state_is_enough(bench: Bench) -> None:
+    rest = Rest(bench)
+    expected = rest.by_hand()
+    first = inputs(rest, 0, 0)
+    rest.send(rest.messages(*first), *INPUTS)
+    expected.enter(first[2])
+    expected.track(first[1])
+    expected.step(first[0])
+    for tick, order in ((1, INPUTS[:2]), (2, INPUTS[1::-1]), (3, INPUTS[:2])):
+        state, reference, phase = inputs(rest, tick * 1_000_000, tick)
+        rest.send(rest.messages(state, reference, phase), *order)
+        rest.wait_for(tick + 1)
+        assert rest.efforts()[-1].tobytes() == expected.step(state).effort.tobytes()
+
+
+def test_an_answered_stamp_is_not_answered_again(bench: Bench) -> None:
+    rest = Rest(bench)
+    messages = [rest.messages(*inputs(rest, k * REFERENCE_NS, k)) for k in range(3)]
+    for message in (*messages[:2], messages[1], messages[2]):
+        rest.send(message, *INPUTS)
+    rest.wait_for(3)
+    assert [stamp_ns(data) for data in rest.commands] == [0, REFERENCE_NS, 2 * REFERENCE_NS]
+    assert rest.node.diagnostic_values()["late"] == 4
+
+
+@pytest.mark.parametrize("law", ["nmpc", "pid"])
+def test_time_zero_begins_anew(bench: Bench, law: str) -> None:
+    """After a whole run the same inputs give the same bits: nothing of the first one is left."""
+    rest = Rest(bench, law=law)
+    for number in (*range(20), *range(20)):
+        rest.send(rest.messages(*inputs(rest, number * REFERENCE_NS, number)), *INPUTS)
+    rest.wait_for(40)
+    assert rest.commands[20:] == rest.commands[:20]
+    assert rest.node.diagnostic_values()["late"] == 0
+
+
+def test_in_real_time_the_last_reference_holds(bench: Bench) -> None:
+    """No reference yet: no effort. Then the last one, whatever its stamp."""
+    rest = Rest(bench, mode="realtime")
+    expected = rest.by_hand()
+    state, reference, phase = inputs(rest, 0, 0)
+    rest.send(rest.messages(state, reference, phase), *INPUTS[:2])
+    rest.wait_for(1)
+    assert not np.any(rest.efforts()[0])
+    expected.step(state)
+    rest.send(rest.messages(state, reference, phase), TASK_PHASE, JOINT_REFERENCE)
+    expected.enter(phase)
+    expected.track(reference)
+    for number in (1, 2, 3):
+        state, *unsent = inputs(rest, number * REFERENCE_NS, number)
+        rest.send(rest.messages(state, *unsent), *INPUTS[:2])
+        rest.wait_for(number + 1)
+        assert rest.efforts()[-1].tobytes() == expected.step(state).effort.tobytes()
+
+
+def test_gains_that_cannot_work_are_refused_at_the_start(bench: Bench) -> None:
+    bench.start({"common": {"tick": 0.002}, CONTROLLER: {"law": "pid"}})
+    with pytest.raises(UnstableLoopError, match=r"unstable at the start configuration.*joint_7"):
+        bench.add(ControllerNode)
+
+
+def test_peers_of_the_controller_are_what_it_waits_for(bench: Bench) -> None:
+    bench.start({"common": {"peers": (PLANT, TRAJECTORY, CONTROLLER)}})
+    node = bench.add(ControllerNode)
+    missing = node.endpoints.unmatched
+    assert "0 of 1 subscriptions of joint_command" in missing
+    assert "0 of 1 publishers of joint_states" in missing
+    assert "0 of 1 publishers of task/phase" in missing
