@@ -89,11 +89,12 @@ def first_failure(folder: Path, *tests: str) -> str:
         return f"no end after {TIMEOUT_S:g} s"
     if done.returncode == 0:
         return SURVIVED
-    for line in done.stdout.splitlines():
-        kind, _, rest = line.partition(" ")
-        if kind in {"FAILED", "ERROR"}:
-            return rest.split(" - ")[0]
-    return f"pytest ended with {done.returncode}: {(done.stderr or done.stdout).strip()[-200:]}"
+    failures = [line for line in done.stdout.splitlines() if line.startswith(("FAILED ", "ERROR "))]
+    if done.returncode != 1 or not failures:  # a copy that cannot even be imported shows nothing about tests
+        raise RuntimeError(
+            f"pytest ended with {done.returncode}: {(done.stderr or done.stdout).strip()[-500:]}"
+        )
+    return failures[0].partition(" ")[2].split(" - ")[0]
 
 
 @contextmanager
