@@ -50,6 +50,7 @@ EXIT_LOSS = 3  # the bag is whole, but messages are missing in it
 
 _POLL_S = 0.005  # [s] of wall time between two batches: long enough to be cheap, short enough to lose little
 _QUIET_S = 0.05  # [s] of wall time without a message after which nothing is on the way any more
+_REST_S = 1.0  # [s] of wall time at most to wait for that
 _DISCOVERY_PERIOD_S = 1.0  # [s] of wall time between two looks for topics beyond the graph
 _TF_INPUTS = (SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
 
@@ -132,9 +133,11 @@ class RecorderNode(GraphNode[RecorderParameters]):
         return monotonic() - self._last_message > self.parameters.drain_timeout
 
     def _take_the_rest(self, executor: Executor) -> None:
-        """Take what is on the way when the recorder is asked to stop before the end of the run."""
-        self._last_message = monotonic()
+        """Take what is on the way when the recorder is asked to stop; a graph that goes on is left alone."""
+        begin = self._last_message = monotonic()
         while self._taps.empty() or monotonic() - self._last_message < _QUIET_S:
+            if monotonic() - begin > _REST_S:
+                break
             executor.spin_once(timeout_sec=_POLL_S)
 
     def _record(self, topic: Topic) -> None:

@@ -1,0 +1,325 @@
+"""The recorder, with the real nodes or made-up ones, all in one process: what the bag holds at the end."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from rclpy.node import Node
+from sms_handover_interfaces.msg import PublishedCounts, RunState
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from sms_handover.analysis.equality import compare_runs
+from sms_handover.bag.files import read_messages
+from sms_handover.bag.info import BagInfo, read_info
+from sms_handover.bag.message_types import MessageTypes
+from sms_handover.bag.reader import read_run
+from sms_handover.errors import ConfigurationError
+from sms_handover.frames import BASE, WORLD
+from sms_handover.nodes.controller import ControllerNode
+from sms_handover.nodes.ik import IkNode
+from sms_handover.nodes.plant import PlantNode
+from sms_handover.nodes.recorder import EXIT_LOSS, RecorderNode
+from sms_handover.nodes.trajectory import TrajectoryNode
+from sms_handover.ros.endpoints import Endpoints
+from sms_handover.ros.main import EXIT_OK
+from sms_handover.ros.qos import LATCHED, LOSSLESS
+from sms_handover.ros.wire import JointStateWire
+from sms_handover.simulation.scenario import Overrides, load_scenario
+from sms_handover.simulation.simulate import simulate
+from sms_handover.topics import JOINT_STATES, NODES, PLANT, RECORDER, RUN_PUBLISHED, RUN_STATE, TF, Rate
+
+from .bench import Bench
+from .graph import TOPICS
+from .short_handover import END_S, short_handover
+
+pytestmark = pytest.mark.ros
+
+TICKS = round(END_S * 1000) + 1
+PERIODS = (TICKS - 1) // 20 + 1
+
+
+class Stop:
+    """Asks the recorder to stop when a condition holds."""
+
+    def __init__(self, condition: Callable[[], bool] = lambda: False) -> None:
+        """Take the condition."""
+        self._condition = condition
+
+    @property
+    def asked(self) -> bool:
+        """Tell whether to stop."""
+        return self._condition()
+
+
+class Recorded:
+    """The whole graph in one process with the real recorder."""
+
+    def __init__(self, bench: Bench, overrides: Overrides | None = None, **recorder: object) -> None:
+        """Start every node."""
+        self.folder = bench.folder / "bag"
+        schedule = bench.folder / "schedule.yaml"
+        schedule.write_text(short_handover(), encoding="utf-8")
+        overrides = dict(overrides or {})
+        overrides["common"] = {"schedule": str(schedule), "peers": NODES, **overrides.get("common", {})}
+        self.overrides: Overrides = overrides
+        bench.start({**overrides, RECORDER: {"folder": str(self.folder), **recorder}})
+        self.bench = bench
+        self.plant = bench.add(PlantNode)
+        for make in (TrajectoryNode, IkNode, ControllerNode):
+            bench.add(make)
+        self.recorder = bench.add(RecorderNode)
+
+    def run(self, condition: Callable[[], bool] = lambda: False) -> int:
+        """Record to the end, or until a condition holds; return the recorder's exit code."""
+        stop: Any = Stop(condition)
+        return self.recorder.run(self.bench.executor, stop)
+
+    @property
+    def info(self) -> BagInfo:
+        """Return what the bag says of itself."""
+        return read_info(self.folder)
+
+
+def test_bag_is_the_simulated_run_bit_for_bit(bench: Bench) -> None:
+    overrides: Overrides = {"controller": {"law": "pid"}, "trajectory": {"time_law": "quintic"}}
+    recorded = Recorded(bench, overrides)
+    assert recorded.run() == EXIT_OK
+    run = read_run(recorded.folder)
+    assert len(run.tick_ns) == TICKS and len(run.grasp_events) == 2
+    assert compare_runs(run, simulate(load_scenario(recorded.overrides))) == ()
+
+
+def test_bag_stands_on_its_own(bench: Bench) -> None:
+    recorded = Recorded(bench)
+    assert recorded.run() == EXIT_OK
+    info = recorded.info
+    assert info.schedule_text == short_handover()
+    assert info.urdf_text == recorded.plant.robot.urdf
+    assert set(info.parameters) == set(NODES)
+    for name in NODES:
+        assert info.parameters[name]["tick"] == 0.001
+        assert info.parameters[name]["peers"] == list(NODES)
+    assert info.parameters["controller"]["law"] == "nmpc"
+    assert info.parameters["recorder"]["folder"] == str(recorded.folder)
+    assert {"start", "git_revision", "seed", "python", "platform"} <= set(info.provenance)
+    assert all(text for text in info.provenance.values())
+
+
+def test_every_topic_of_the_graph_is_there_with_every_message(bench: Bench) -> None:
+    recorded = Recorded(bench)
+    assert recorded.run() == EXIT_OK
+    info = recorded.info
+    counts = {Rate.TICK: TICKS, Rate.REFERENCE: PERIODS, Rate.CLOCK: (TICKS - 1) // 10 + 1}
+    for topic in TOPICS:
+        found = info.topics[topic.name if topic.name.startswith("/") else f"/{topic.name}"]
+        assert (found.type, found.encoding, found.schema_encoding) == (topic.type, "cdr", "ros2msg")
+        assert found.type_hash.startswith("RIHS01_")
+        (qos,) = yaml.safe_load(found.qos)
+        assert qos["durability"] == ("transient_local" if topic.latched else "volatile")
+        if topic.rate in counts:
+            assert found.message_count == counts[topic.rate], topic.name
+    assert info.topics[TF].message_count == PERIODS
+    assert info.topics["/task/grasp_event"].message_count == 2
+    assert info.topics["/run/published"].message_count == 4
+    ledger = info.ledger
+    assert ledger is not None and ledger.complete
+    for account in ledger.topics:
+        assert account.missing == account.duplicates == account.out_of_order == 0 or account.period_ns == 0
+    by_name = {account.name: account for account in ledger.topics}
+    for name in ("/joint_states", "/joint_command", "/base_odometry"):
+        assert by_name[name].published == by_name[name].received == TICKS
+
+
+def test_transforms_are_those_of_the_run(bench: Bench) -> None:
+    recorded = Recorded(bench)
+    recorded.run()
+    run = read_run(recorded.folder)
+    types = MessageTypes()
+    tf = [types.deserialize(m.data, m.type) for m in read_messages(recorded.folder, (TF,))]
+    assert len(tf) == PERIODS
+    for row, message in enumerate(tf):
+        by_child = {item.child_frame_id: item for item in message.transforms}
+        base, deputy = by_child[BASE], by_child["deputy"]
+        assert base.header.frame_id == deputy.header.frame_id == WORLD
+        place = base.transform.translation
+        assert (place.x, place.y, place.z) == tuple(run.base_pose[20 * row, :3])
+        place = deputy.transform.translation
+        assert (place.x, place.y, place.z) == tuple(run.deputy_pose[row, :3])
+
+
+@pytest.mark.parametrize("profile", [LATCHED, LOSSLESS])
+def test_topics_beyond_the_graph_are_recorded(bench: Bench, profile: Any) -> None:
+    recorded = Recorded(bench)
+    user = bench.plain("user")
+    publisher = user.create_publisher(String, "notes", profile)
+    before = recorded.recorder.diagnostic_values()["messages"]
+    bench.until(lambda: publisher.get_subscription_count() == 1, "the recorder to find the topic")
+
+    def heard() -> bool:
+        publisher.publish(String(data="a note"))
+        return int(str(recorded.recorder.diagnostic_values()["messages"])) >= int(str(before)) + 50
+
+    bench.until(heard, "the notes, and a few messages of other topics")
+    assert recorded.run() == EXIT_OK
+    notes = recorded.info.topics["/notes"]
+    assert notes.type == "std_msgs/msg/String"
+    assert notes.message_count >= 3
+    (qos,) = yaml.safe_load(notes.qos)
+    assert qos["durability"] == ("transient_local" if profile is LATCHED else "volatile")
+
+
+def test_only_the_graph_is_recorded_if_wanted(bench: Bench) -> None:
+    recorded = Recorded(bench, record_all=False)
+    bench.plain("user").create_publisher(String, "notes", LATCHED).publish(String(data="a note"))
+    assert recorded.run() == EXIT_OK
+    graph = {topic.name if topic.name.startswith("/") else f"/{topic.name}" for topic in TOPICS}
+    assert set(recorded.info.topics) == {*graph, TF}
+
+
+def test_asked_to_stop_it_stops_and_the_bag_is_whole(bench: Bench) -> None:
+    """The graph goes on; that must not keep the recorder from its end."""
+    recorded = Recorded(bench, {"common": {"schedule": ""}})
+    code = recorded.run(lambda: recorded.recorder.diagnostic_stamp_ns() >= 100_000_000)
+    assert not recorded.plant.finished
+    assert recorded.plant.diagnostic_stamp_ns() < 59_000_000_000
+    assert code == EXIT_OK  # nobody has told that anything is missing
+    run = read_run(recorded.folder)
+    assert len(run.tick_ns) >= 100
+    assert run.tick_ns.tolist() == [k * 1_000_000 for k in range(len(run.tick_ns))]
+    assert set(recorded.info.parameters) == set(NODES)
+    ledger = recorded.info.ledger
+    assert ledger is not None and ledger.complete
+
+
+def test_an_error_leaves_a_whole_bag(bench: Bench) -> None:
+    recorded = Recorded(bench)
+
+    def fail_later() -> bool:
+        if recorded.recorder.diagnostic_stamp_ns() >= 50_000_000:
+            raise RuntimeError("as a bug would")
+        return False
+
+    with pytest.raises(RuntimeError, match="as a bug would"):
+        recorded.run(fail_later)
+    assert len(read_run(recorded.folder).tick_ns) >= 50
+
+
+def test_a_reset_run_is_read_from_its_last_start(bench: Bench) -> None:
+    recorded = Recorded(bench)
+    client = bench.plain("client").create_client(Trigger, f"{PLANT}/reset")
+    asked: list[Any] = []
+
+    def reset_once() -> bool:
+        if not asked and recorded.plant.diagnostic_stamp_ns() >= 150_000_000 and client.service_is_ready():
+            asked.append(client.call_async(Trigger.Request()))
+        return False
+
+    assert recorded.run(reset_once) == EXIT_OK
+    assert asked
+    info, run = recorded.info, read_run(recorded.folder)
+    assert info.topics["/joint_states"].message_count > TICKS + 150
+    assert info.ledger is not None and info.ledger.complete
+    assert compare_runs(run, simulate(load_scenario(recorded.overrides))) == ()
+
+
+# A recorder alone with a made-up plant
+
+
+class FakePlant:
+    """Publishes joint states of some stamps, and says how many there were."""
+
+    def __init__(self, node: Node) -> None:
+        """Prepare."""
+        self._endpoints = Endpoints(node, TOPICS, (PLANT, RECORDER))
+        self._state = self._endpoints.publisher(JOINT_STATES)
+        self._run_state = self._endpoints.publisher(RUN_STATE)
+        self._counts = self._endpoints.publisher(RUN_PUBLISHED)
+        self._wire = JointStateWire(("joint",), ("position",))
+
+    def matched(self) -> bool:
+        """Tell whether the recorder listens."""
+        return not self._endpoints.unmatched
+
+    def run(self, ticks: list[int], told: int) -> None:
+        """Publish a whole run, and tell a count."""
+        for tick in ticks:
+            self._state.publish(self._wire.pack(tick * 1_000_000, position=np.ones(1)))
+        self._run_state.publish(RunState(state=RunState.FINISHED))
+        self._counts.publish(PublishedCounts(node=PLANT, topics=["/joint_states"], counts=[told]))
+
+
+@pytest.fixture
+def lone(bench: Bench) -> tuple[RecorderNode, FakePlant]:
+    """A recorder and a made-up plant that have found each other."""
+    common = {"peers": (PLANT, RECORDER)}
+    folder = bench.folder / "bag"
+    bench.start({"common": common, RECORDER: {"folder": str(folder), "drain_timeout": 0.3}})
+    plant = FakePlant(bench.plain(PLANT))
+    recorder = bench.add(RecorderNode)
+    subscription = recorder.endpoints
+    bench.until(
+        lambda: (
+            plant.matched() and not any("publishers of joint_states" in t for t in subscription.unmatched)
+        ),
+        "the match",
+    )
+    return recorder, plant
+
+
+@pytest.mark.parametrize(
+    ("ticks", "told", "code", "missing"),
+    [
+        ([0, 1, 2, 3], 4, EXIT_OK, 0),
+        ([0, 1, 3], 3, EXIT_LOSS, 1),
+        ([0, 1, 2], 5, EXIT_LOSS, 0),
+        ([0, 2, 1, 3], 4, EXIT_OK, 0),
+    ],
+)
+def test_what_is_missing_is_counted_and_told(
+    bench: Bench,
+    lone: tuple[RecorderNode, FakePlant],
+    capsys: pytest.CaptureFixture[str],
+    ticks: list[int],
+    told: int,
+    code: int,
+    missing: int,
+) -> None:
+    recorder, plant = lone
+    plant.run(ticks, told)
+    never: Any = Stop()
+    assert recorder.run(bench.executor, never) == code
+    ledger = read_info(bench.folder / "bag").ledger
+    assert ledger is not None
+    account = next(account for account in ledger.topics if account.name == "/joint_states")
+    assert (account.received, account.published, account.missing) == (len(ticks), told, missing)
+    assert ledger.complete is (code == EXIT_OK)
+    (row,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("/joint_states"))
+    assert row.split()[1:4] == [str(len(ticks)), str(told), str(missing)]
+
+
+def test_a_folder_that_exists_is_refused(bench: Bench, tmp_path: Path) -> None:
+    folder = tmp_path / "there"
+    folder.mkdir()
+    (folder / "mine").write_text("keep", encoding="utf-8")
+    bench.start({RECORDER: {"folder": str(folder)}})
+    with pytest.raises(ConfigurationError, match="there"):
+        bench.add(RecorderNode)
+    assert [path.name for path in folder.iterdir()] == ["mine"]
+
+
+def test_a_second_recorder_on_the_folder_is_refused(bench: Bench, tmp_path: Path) -> None:
+    bench.start({RECORDER: {"folder": str(tmp_path / "bag")}})
+    bench.add(RecorderNode)
+    with pytest.raises(ConfigurationError, match="exists"):
+        bench.add(RecorderNode)
+
+
+def test_a_folder_that_cannot_be_made_is_refused(bench: Bench, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    bench.start({RECORDER: {"folder": str(tmp_path / "file" / "bag")}})
+    with pytest.raises(ConfigurationError, match="file"):
+        bench.add(RecorderNode)
