@@ -1,5 +1,6 @@
 """The recorder node."""
 
+import os
 from collections.abc import Sequence
 from datetime import datetime
 from functools import partial
@@ -111,6 +112,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
 
     def run(self, executor: Executor, stop: Stop) -> int:
         """Record until the run is over and everything has come, or until asked to stop; close the bag."""
+        os.nice(self.parameters.niceness)
         try:
             while not stop.asked and not self._drained():
                 executor.spin_once(timeout_sec=_POLL_S)
