@@ -1,6 +1,5 @@
 """The recorder node."""
 
-import os
 from collections.abc import Sequence
 from datetime import datetime
 from functools import partial
@@ -91,6 +90,11 @@ class RecorderNode(GraphNode[RecorderParameters]):
         if self.parameters.record_all:
             self.create_timer(_DISCOVERY_PERIOD_S, self._look_for_topics)
 
+    @property
+    def niceness(self) -> int:
+        """Return how far the process stands back behind others, as its parameter says."""
+        return self.parameters.niceness
+
     def prepared(self) -> bool:
         """Tell whether the parameters of every node have been written into the bag."""
         if not self._described and self._peer_parameters.poll():
@@ -112,7 +116,6 @@ class RecorderNode(GraphNode[RecorderParameters]):
 
     def run(self, executor: Executor, stop: Stop) -> int:
         """Record until the run is over and everything has come, or until asked to stop; close the bag."""
-        os.nice(self.parameters.niceness)
         try:
             while not stop.asked and not self._drained():
                 executor.spin_once(timeout_sec=_POLL_S)

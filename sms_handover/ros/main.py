@@ -44,6 +44,11 @@ class Stop:
 class RunnableNode(Node, ABC):
     """A node that can be run as a process."""
 
+    @property
+    def niceness(self) -> int:
+        """Return how far the process stands back behind others, as in nice(1); a node may override this."""
+        return 0
+
     @abstractmethod
     def run(self, executor: Executor, stop: Stop) -> int:
         """Work until asked to stop; return the exit code."""
@@ -64,6 +69,7 @@ def run_node(make: Callable[[], RunnableNode], args: Sequence[str] | None = None
         name = node.get_name()
         executor = EventsExecutor()
         executor.add_node(node)
+        os.nice(node.niceness)
         gc.collect()
         gc.freeze()  # what start-up has made lives to the end; no collection needs to look at it again
         return node.run(executor, stop)
