@@ -13,6 +13,7 @@ from sms_handover.nodes.ik import IkNode
 from sms_handover.nodes.plant import PlantNode
 from sms_handover.nodes.trajectory import TrajectoryNode
 from sms_handover.ros.endpoints import Endpoints
+from sms_handover.ros.graph_node import GraphNode
 from sms_handover.topics import CONTROLLER, IK, PLANT, RECORDER, RUN_READY, TRAJECTORY, Topic, graph_topics
 
 from .bench import Bench, Parameters
@@ -20,7 +21,12 @@ from .short_handover import short_handover
 
 ARMS = ("arm_a", "arm_b")
 TOPICS = graph_topics(ARMS)
-REAL = {PLANT: PlantNode, TRAJECTORY: TrajectoryNode, IK: IkNode, CONTROLLER: ControllerNode}
+REAL: Mapping[str, Callable[[], GraphNode[Any]]] = {
+    PLANT: PlantNode,
+    TRAJECTORY: TrajectoryNode,
+    IK: IkNode,
+    CONTROLLER: ControllerNode,
+}
 
 
 class Ear:

@@ -202,8 +202,8 @@ def test_in_real_time_the_last_reference_holds(bench: Bench) -> None:
     expected.enter(phase)
     expected.track(reference)
     for number in (1, 2, 3):
-        state, *unsent = inputs(rest, number * REFERENCE_NS, number)
-        rest.send(rest.messages(state, *unsent), *INPUTS[:2])
+        state, reference, phase = inputs(rest, number * REFERENCE_NS, number)
+        rest.send(rest.messages(state, reference, phase), *INPUTS[:2])
         rest.wait_for(number + 1)
         assert rest.efforts()[-1].tobytes() == expected.step(state).effort.tobytes()
 

@@ -261,7 +261,7 @@ def test_in_real_time_a_reset_after_the_end_runs_again(bench: Bench, fast_clock:
     graph = plant_with(bench, common=REALTIME, duration=0.1)
     graph.ear.get_ready(bench)
     client = graph.client.create_client(Trigger, f"{PLANT}/reset")
-    asked = []
+    asked: list[Any] = []
 
     def ended_twice() -> bool:
         changes = len(graph.heard[RUN_STATE])
@@ -285,8 +285,8 @@ def test_in_real_time_a_paused_plant_stands_still_and_goes_on(bench: Bench, fast
     asked = pause.call_async(SetBool.Request(data=True))
     run_until(graph, asked.done)
     at = graph.plant.diagnostic_stamp_ns()
-    looks: list[int] = []
-    run_until(graph, lambda: len(looks) > 50 or looks.append(0) is not None)
+    looks = iter(range(51))
+    run_until(graph, lambda: next(looks) == 50)
     assert graph.plant.diagnostic_stamp_ns() == at
     pause.call_async(SetBool.Request(data=False))
     run_until(graph, lambda: graph.plant.finished and graph.everything_heard())

@@ -61,7 +61,11 @@ def test_several_topics_are_emptied_at_once(bench: Bench) -> None:
     for name, messages in heard.items():
         speaker.create_publisher(String, name, LATCHED).publish(String(data=name))
         subscription = listener.create_subscription(String, name, lambda data: None, LATCHED, raw=True)
-        taps.take_over(subscription, lambda data, sent_ns, messages=messages: messages.append(data))
+
+        def keep(data: bytes, sent_ns: int, into: list[bytes] = messages) -> None:
+            into.append(data)
+
+        taps.take_over(subscription, keep)
     bench.until(lambda: taps.empty() >= 0 and all(heard.values()), "the messages")
     assert all(name.encode() in messages[0] for name, messages in heard.items())
     taps.destroy()
