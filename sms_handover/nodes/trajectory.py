@@ -1,6 +1,8 @@
 """The trajectory node."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from math import inf
 from typing import Any
 
 from sms_handover_interfaces.srv import SolveIK
@@ -22,7 +24,7 @@ from sms_handover.ros.main import run_node
 from sms_handover.ros.stamp_sync import StampSync
 from sms_handover.ros.wire import JointStateWire, StateWire, pose_wire
 from sms_handover.simulation.feasibility import check_feasibility
-from sms_handover.simulation.scenario import Scenario, load_parameters, load_task
+from sms_handover.simulation.scenario import ParameterSet, Scenario, load_parameters, load_task
 from sms_handover.topics import (
     DEPUTY_POSE,
     IK_STATUS,
@@ -51,7 +53,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         """Read the schedule and check that it can be carried out; raises ScheduleError."""
         super().__init__(TRAJECTORY, TrajectoryParameters)
         schedule = load_task(self.common, self.robot)
-        check_feasibility(Scenario(load_parameters(), self.robot, schedule))
+        check_feasibility(Scenario(_for_any_plant(load_parameters()), self.robot, schedule))
         self._generator = TrajectoryGenerator(self.robot, schedule, self.parameters)
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
         self._reference_wire = JointStateWire(self.robot.joint_names, ("position", "velocity"))
@@ -138,6 +140,14 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         )
         for arm, pose in targets_in_world.items():
             self._targets[arm].publish(self._pose_wire.pack(state.stamp_ns, pose_row(pose)))
+
+
+def _for_any_plant(parameters: ParameterSet) -> ParameterSet:
+    """Return the parameters with a plant that grasps from anywhere: what it tolerates is for it to say."""
+    plant = replace(
+        parameters.plant, grasp_position_tolerance=inf, grasp_angle_tolerance=inf, grasp_speed_tolerance=inf
+    )
+    return replace(parameters, plant=plant)
 
 
 def main(args: Sequence[str] | None = None) -> int:
