@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 import rclpy
 from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
@@ -61,10 +62,10 @@ def run_node(make: Callable[[], RunnableNode], args: Sequence[str] | None = None
     the wheels of rclpy 7.1.
     """
     stop = Stop()
-    rclpy.init(args=list(sys.argv if args is None else args), signal_handler_options=SignalHandlerOptions.NO)
     name = "node"
     node = None
     try:
+        _init(list(sys.argv if args is None else args))
         node = make()
         name = node.get_name()
         executor = EventsExecutor()
@@ -83,6 +84,15 @@ def run_node(make: Callable[[], RunnableNode], args: Sequence[str] | None = None
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
+
+
+def _init(args: list[str]) -> None:
+    """Start ROS with the arguments of a command line; raises ConfigurationError where it cannot read them."""
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
+        reason = str(error).split(", at /", 1)[0]  # the rest tells where in the sources of rcl
+        raise ConfigurationError(" ".join(reason.split())) from error
 
 
 def spin(executor: Executor, stop: Stop) -> None:

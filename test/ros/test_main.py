@@ -1,0 +1,178 @@
+"""One node as a process: exit codes, one line for every error, an orderly end on a signal."""
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import rclpy
+from rclpy.executors import Executor
+
+from sms_handover.errors import BagError, ConfigurationError, GraphError
+from sms_handover.nodes import controller, ik, plant, recorder, trajectory
+from sms_handover.ros.main import EXIT_FAILED, EXIT_OK, EXIT_USAGE, LAUNCHER_PID, RunnableNode, Stop, run_node
+from sms_handover.ros.main import spin as spin_until_stopped
+
+from .bench import Bench
+
+pytestmark = pytest.mark.ros
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+MAINS = {
+    module.__name__.rsplit(".", 1)[1]: module.main for module in (plant, trajectory, ik, controller, recorder)
+}
+
+
+@pytest.fixture(autouse=True)
+def handlers(bench: Bench) -> Iterator[None]:
+    """Put back what a node does with signals, and use the domain and the environment of the bench."""
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.fixture(autouse=True)
+def own_domain(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+    monkeypatch.delenv(LAUNCHER_PID, raising=False)
+
+
+class Worker(RunnableNode):
+    """A node that does what it is told once."""
+
+    def __init__(self, work: Callable[[Stop], None] = lambda stop: None, code: int = EXIT_OK) -> None:
+        """Take the work and the exit code."""
+        super().__init__("worker", start_parameter_services=False)
+        self._work, self._code = work, code
+
+    def run(self, executor: Executor, stop: Stop) -> int:
+        """Do the work, and wait for the end."""
+        self._work(stop)
+        return self._code
+
+
+def fail(error: Exception) -> Callable[[Stop], None]:
+    def work(stop: Stop) -> None:
+        raise error
+
+    return work
+
+
+def test_exit_code_is_that_of_the_node() -> None:
+    assert run_node(lambda: Worker(code=3), []) == 3
+    assert not rclpy.ok()
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (ConfigurationError("bad value"), EXIT_USAGE),
+        (GraphError("a reader is stuck"), EXIT_FAILED),
+        (BagError("the disk is full"), EXIT_FAILED),
+    ],
+)
+def test_an_error_is_one_line(capfd: pytest.CaptureFixture[str], error: Exception, code: int) -> None:
+    assert run_node(lambda: Worker(fail(error)), []) == code
+    assert capfd.readouterr().err == f"worker: error: {error}\n"
+    assert not rclpy.ok()
+
+
+def test_an_error_of_the_making_is_one_line(capfd: pytest.CaptureFixture[str]) -> None:
+    def make() -> Worker:
+        raise ConfigurationError("bad value")
+
+    assert run_node(make, []) == EXIT_USAGE
+    assert capfd.readouterr().err == "node: error: bad value\n"
+
+
+def test_a_bug_is_not_hidden() -> None:
+    with pytest.raises(ZeroDivisionError):
+        run_node(lambda: Worker(fail(ZeroDivisionError())), [])
+    assert not rclpy.ok()
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_a_signal_asks_for_an_orderly_end(number: signal.Signals) -> None:
+    asked: list[bool] = []
+
+    def work(stop: Stop) -> None:
+        asked.append(stop.asked)
+        os.kill(os.getpid(), number)
+        asked.append(stop.asked)
+
+    assert run_node(lambda: Worker(work), []) == EXIT_OK
+    assert asked == [False, True]
+
+
+def test_a_spinning_node_ends_on_a_signal() -> None:
+    class Spinner(RunnableNode):
+        def __init__(self) -> None:
+            super().__init__("spinner", start_parameter_services=False)
+            self.create_timer(0.01, lambda: os.kill(os.getpid(), signal.SIGTERM))
+
+        def run(self, executor: Executor, stop: Stop) -> int:
+            spin_until_stopped(executor, stop)
+            return EXIT_OK
+
+    assert run_node(Spinner, []) == EXIT_OK
+
+
+def test_a_node_ends_when_its_launcher_is_gone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(LAUNCHER_PID, str(os.getppid()))
+    assert not Stop().asked
+    monkeypatch.setenv(LAUNCHER_PID, str(os.getpid()))  # not the parent of this process
+    assert Stop().asked
+
+
+BAD: dict[str, tuple[str, ...]] = {
+    "controller": ("law:=fast", "unknown value 'fast'"),
+    "plant": ("grasp_position_tolerance:=-0.01", "-0.01 m, allowed is at least 0.0"),
+    "trajectory": ("time_law:=cubic", "unknown value 'cubic'"),
+    "ik": ("max_iterations:=0", "is 0, allowed is at least 1"),
+    "recorder": ("drain_timeout:=nothing", "'nothing', expected a number s"),
+}
+
+
+@pytest.mark.parametrize("name", list(MAINS))
+def test_a_bad_parameter_ends_a_node_with_one_line(
+    name: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    value, text = BAD[name]
+    assert MAINS[name]([name, "--ros-args", "-p", value]) == EXIT_USAGE
+    lines = capfd.readouterr().err.splitlines()
+    assert [line for line in lines if "error:" in line] == lines[-1:]
+    assert text in lines[-1]
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith("handover")]  # no bag was begun
+
+
+@pytest.mark.parametrize("name", list(MAINS))
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("-p", "no_such_parameter:=1"), "unknown parameter 'no_such_parameter'"),
+        (("-p", "robot:=/no/such/robot.yaml"), "cannot read /no/such/robot.yaml"),
+        (("-p", "mode:=fast"), "unknown value 'fast'"),
+        (("-p", "peers:=[plant, wheel]"), "unknown node 'wheel'"),
+        (("-p", "tick"), "-p tick"),
+        (("--no-such-flag",), "--no-such-flag"),
+        (("--params-file", "/no/such/file.yaml"), "/no/such/file.yaml"),
+    ],
+)
+def test_bad_arguments_end_every_node_with_one_line(
+    name: str,
+    arguments: tuple[str, ...],
+    text: str,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert MAINS[name]([name, "--ros-args", *arguments]) == EXIT_USAGE
+    lines = capfd.readouterr().err.splitlines()
+    assert [line for line in lines if "error:" in line] == lines[-1:]
+    assert text in lines[-1]
+    assert not rclpy.ok()
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith("handover")]
