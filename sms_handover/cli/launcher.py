@@ -17,7 +17,7 @@ from sms_handover_interfaces.msg import RunState
 from sms_handover.cli.display import Display
 from sms_handover.cli.processes import Death, NodeProcesses
 from sms_handover.errors import GraphError
-from sms_handover.ros.main import EXIT_OK
+from sms_handover.ros.main import EXIT_LOSS, EXIT_OK
 from sms_handover.ros.monitor import RunMonitor
 from sms_handover.ros.parameters import as_arguments
 from sms_handover.simulation.scenario import COMMON, Scenario
@@ -28,6 +28,7 @@ from sms_handover.units import ns_to_seconds
 _POLL_S = 0.1  # [s] longest wait for a message before the processes are looked at again
 _START_PATIENCE_S = 60.0  # [s] of wall time until the run must have begun
 _STALL_PATIENCE_S = 30.0  # [s] of wall time without progress of simulated time
+_NEWS_PATIENCE_S = 20.0  # [s] of wall time for the news that the run is over, once the recorder has ended
 _DRAIN_PATIENCE_S = 60.0  # [s] of wall time for the recorder to finish
 
 
@@ -112,6 +113,7 @@ class _Watch:
         self._display = Display(end_ns)
         self._events_shown = 0
         self._interrupts = 0
+        self._recorder_seen_gone = 0.0
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._on_signal)
 
@@ -173,9 +175,18 @@ class _Watch:
         """Handle what has come, and raise GraphError if a node has died."""
         self._executor.spin_once(timeout_sec=_POLL_S)
         for death in self._processes.dead():
-            if death.name == RECORDER and self._monitor.finished:
-                continue
-            raise GraphError(_obituary(death))
+            if not self._recorder_is_done(death):
+                raise GraphError(_obituary(death))
+
+    def _recorder_is_done(self, death: Death) -> bool:
+        """Tell whether a process that ended is the recorder at the end of the run.
+
+        The recorder may close the bag and end before the news of the end has come to the launcher.
+        """
+        if death.name != RECORDER or death.code not in (EXIT_OK, EXIT_LOSS):
+            return False
+        self._recorder_seen_gone = self._recorder_seen_gone or monotonic()
+        return self._monitor.finished or monotonic() - self._recorder_seen_gone < _NEWS_PATIENCE_S
 
     def _show(self, *, last: bool = False) -> None:
         """Show progress, and every grasp event once."""

@@ -11,12 +11,12 @@ from sms_handover.cli.folders import BAG, LOGS
 from sms_handover.cli.launcher import LaunchPlan, launch
 from sms_handover.cli.options import add_scenario_options, scenario_of
 from sms_handover.errors import ConfigurationError
+from sms_handover.ros.main import EXIT_LOSS
 from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.parameters import LOCKSTEP, REALTIME
 from sms_handover.simulation.scenario import Scenario
 from sms_handover.types import GraspStatus
 
-EXIT_LOSS = 3
 EXIT_MISSED = 4
 EXIT_INTERRUPTED = 130
 

@@ -23,7 +23,7 @@ from sms_handover.frames import BASE, DEPUTY, WORLD
 from sms_handover.model.link_tree import LinkTree
 from sms_handover.ros.convert import pose_of_message
 from sms_handover.ros.graph_node import GraphNode
-from sms_handover.ros.main import EXIT_OK, Stop, run_node
+from sms_handover.ros.main import EXIT_LOSS, EXIT_OK, Stop, run_node
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.peer_parameters import PeerParameters
 from sms_handover.ros.qos import LOSSLESS, profile_of, stored
@@ -45,8 +45,6 @@ from sms_handover.topics import (
     Topic,
 )
 from sms_handover.types import Pose
-
-EXIT_LOSS = 3  # the bag is whole, but messages are missing in it
 
 _POLL_S = 0.005  # [s] of wall time between two batches: long enough to be cheap, short enough to lose little
 _QUIET_S = 0.05  # [s] of wall time without a message after which nothing is on the way any more

@@ -17,6 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 from sms_handover.errors import ConfigurationError, SmsHandoverError
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
+EXIT_LOSS = 3  # the recorder: the bag is whole, but messages are missing in it
 
 LAUNCHER_PID = "SMS_HANDOVER_LAUNCHER_PID"  # environment variable, set for the nodes that a launcher starts
 

@@ -22,10 +22,10 @@ from sms_handover.frames import BASE, WORLD
 from sms_handover.nodes.controller import ControllerNode
 from sms_handover.nodes.ik import IkNode
 from sms_handover.nodes.plant import PlantNode
-from sms_handover.nodes.recorder import EXIT_LOSS, RecorderNode
+from sms_handover.nodes.recorder import RecorderNode
 from sms_handover.nodes.trajectory import TrajectoryNode
 from sms_handover.ros.endpoints import Endpoints
-from sms_handover.ros.main import EXIT_OK
+from sms_handover.ros.main import EXIT_LOSS, EXIT_OK
 from sms_handover.ros.qos import LATCHED, LOSSLESS
 from sms_handover.ros.wire import JointStateWire
 from sms_handover.simulation.scenario import Overrides, load_scenario

@@ -1,0 +1,47 @@
+"""A recorded run over DDS is the run in one process, bit for bit, whatever else the machine does."""
+
+from pathlib import Path
+
+import pytest
+
+from sms_handover.analysis.equality import compare_runs
+from sms_handover.bag.reader import read_run
+from sms_handover.run_data import RunData
+from sms_handover.types import GraspStatus
+
+from .conftest import LAWS, TICKS
+from .runs import Ended, busy_cores, sms_handover
+
+pytestmark = [pytest.mark.system, pytest.mark.slow]
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_first_run(law: str, recorded: dict[str, tuple[Path, Ended]], simulated: dict[str, RunData]) -> None:
+    folder, ended = recorded[law]
+    run = read_run(folder / "bag")
+    assert len(run.tick_ns) == TICKS
+    assert [event.status for event in run.grasp_events] == [GraspStatus.SUCCEEDED] * 2
+    assert compare_runs(run, simulated[law]) == ()
+    assert "the whole run is done at 2.04 s" in ended.out
+    assert "grasp by arm_a: succeeded" in ended.err and "transfer by arm_b: succeeded" in ended.err
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("loaded", [False, True])
+def test_further_run(
+    law: str, loaded: bool, schedule: Path, simulated: dict[str, RunData], tmp_path: Path
+) -> None:
+    """A second time, and while as many other processes as there are cores never rest."""
+    arguments = ("run", "--controller", law, "--schedule", schedule, "-o", "out")
+    if loaded:
+        with busy_cores():
+            ended = sms_handover(*arguments, cwd=tmp_path)
+    else:
+        ended = sms_handover(*arguments, cwd=tmp_path)
+    assert ended.code == 0, ended
+    assert compare_runs(read_run(tmp_path / "out" / "bag"), simulated[law]) == ()
+
+
+def test_the_laws_differ(simulated: dict[str, RunData]) -> None:
+    """The comparison would notice: two runs of another law are not the same."""
+    assert compare_runs(simulated["nmpc"], simulated["pid"])
