@@ -53,8 +53,8 @@ def command(options: Namespace) -> int:
     """Carry out the command; return the exit code."""
     scenario = scenario_of(options, REALTIME if options.real_time else LOCKSTEP)
     check_scenario(scenario)
-    output = _output_folder(options, scenario)
     with reserved_domain(options.domain_id) as domain:
+        output = _output_folder(options, scenario)
         plan = LaunchPlan(
             scenario=scenario,
             parameter_files=tuple(path.resolve() for path in options.params_file),

@@ -16,7 +16,7 @@ SHIPPED = config_file("handover.yaml")
 WRONG = {
     "controller": (["--controller", "pdi"], "invalid choice: 'pdi'"),
     "missing schedule": (["--schedule", "nowhere.yaml"], "cannot read the schedule"),
-    "unknown grasp frame": (["--schedule", "frame.yaml"], "did you mean 'end_a'?"),
+    "unknown grasp frame": (["--schedule", "frame.yaml"], "did you mean 'end_b'?"),
     "target out of reach": (["--schedule", "reach.yaml"], "is out of reach"),
     "robot": (["--robot", "reach.yaml"], "unknown key 'initial'"),
     "parameter name": (["-p", "plant.integrater:=rk4"], "did you mean 'integrator'?"),
