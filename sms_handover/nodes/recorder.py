@@ -159,6 +159,8 @@ class RecorderNode(GraphNode[RecorderParameters]):
             receive = partial(self._receive_for_tf, topic.name, name)
         elif topic.name == RUN_PUBLISHED:
             receive = partial(self._receive_counts, name)
+        elif topic.rate is Rate.WALL:
+            receive = partial(self._receive_anyway, name)
         subscription = self.endpoints.subscribe(topic.name, lambda data: None, raw=True)
         self._taps.take_over(subscription, receive)
 
@@ -172,9 +174,13 @@ class RecorderNode(GraphNode[RecorderParameters]):
         self._last_message = monotonic()
         self._recording.receive(name, data, sent_ns)
 
+    def _receive_anyway(self, name: str, data: bytes, sent_ns: int) -> None:
+        """Record one message of a topic that goes on after the run, which is no sign that more is to come."""
+        self._recording.receive(name, data, sent_ns)
+
     def _receive_now(self, name: str, data: bytes) -> None:
         """Record one message of a topic beyond the graph, which comes by the executor."""
-        self._receive(name, data, time_ns())
+        self._receive_anyway(name, data, time_ns())
 
     def _receive_counts(self, name: str, data: bytes, sent_ns: int) -> None:
         """Record what a node has published in all, and note that it has told."""

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from sms_handover_interfaces.msg import PublishedCounts, RunState
 from std_msgs.msg import String
@@ -230,7 +231,7 @@ def test_a_reset_run_is_read_from_its_last_start(bench: Bench) -> None:
 
 
 class FakePlant:
-    """Publishes joint states of some stamps, and says how many there were."""
+    """Publishes joint states of some stamps, says how many there were, and goes on with diagnostics."""
 
     def __init__(self, node: Node) -> None:
         """Prepare."""
@@ -238,6 +239,8 @@ class FakePlant:
         self._state = self._endpoints.publisher(JOINT_STATES)
         self._run_state = self._endpoints.publisher(RUN_STATE)
         self._counts = self._endpoints.publisher(RUN_PUBLISHED)
+        diagnostics = self._endpoints.publisher(DIAGNOSTICS)
+        node.create_timer(0.05, lambda: diagnostics.publish(DiagnosticArray()))  # s, well below drain_timeout
         self._wire = JointStateWire(("joint",), ("position",))
 
     def matched(self) -> bool:
