@@ -31,7 +31,17 @@ from sms_handover.ros.qos import LATCHED, LOSSLESS
 from sms_handover.ros.wire import JointStateWire
 from sms_handover.simulation.scenario import Overrides, load_scenario
 from sms_handover.simulation.simulate import simulate
-from sms_handover.topics import JOINT_STATES, NODES, PLANT, RECORDER, RUN_PUBLISHED, RUN_STATE, TF, Rate
+from sms_handover.topics import (
+    DIAGNOSTICS,
+    JOINT_STATES,
+    NODES,
+    PLANT,
+    RECORDER,
+    RUN_PUBLISHED,
+    RUN_STATE,
+    TF,
+    Rate,
+)
 
 from .bench import Bench
 from .graph import TOPICS
