@@ -17,14 +17,14 @@ class Display:
     def __init__(self, end_ns: int) -> None:
         """Begin to count wall time."""
         self._end_s = ns_to_seconds(end_ns)
-        self._begin = monotonic()
+        self._begin, self._begin_s = monotonic(), 0.0
         self._shown = 0.0
         self._terminal = sys.stderr.isatty()
         self._width = 0
 
-    def start(self) -> None:
-        """Count wall time from now on, as the run has begun."""
-        self._begin = monotonic()
+    def start(self, stamp_ns: int) -> None:
+        """Count wall time from now on, with the run at this simulated time."""
+        self._begin, self._begin_s = monotonic(), ns_to_seconds(stamp_ns)
 
     def show(self, stamp_ns: int, phase: str, tool_error: Mapping[str, float], *, last: bool = False) -> None:
         """Show simulated time, phase, real-time factor and the tools' distance to their targets in mm."""
@@ -34,7 +34,7 @@ class Display:
             return
         self._shown = now
         time_s = ns_to_seconds(stamp_ns)
-        factor = time_s / max(now - self._begin, 1e-9)
+        factor = (time_s - self._begin_s) / max(now - self._begin, 1e-9)
         errors = "  ".join(f"{arm} {error * MM_PER_M:7.2f} mm" for arm, error in sorted(tool_error.items()))
         self._write(
             f"{time_s:6.2f} of {self._end_s:g} s  {phase:<12}  {factor:4.2f} x real time  {errors}", last

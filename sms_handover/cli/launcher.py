@@ -118,7 +118,10 @@ class _Watch:
             signal.signal(number, self._on_signal)
 
     def to_the_end(self) -> Outcome:
-        """Return how the run ended; raises GraphError if a node died or nothing went on."""
+        """Return how the run ended; raises GraphError if a node died or nothing went on.
+
+        Raises KeyboardInterrupt on an interrupt before the run has begun, and on a second one.
+        """
         self._wait_for_start()
         self._wait_for_end()
         code = self._wait_for_recorder() if self._plan.bag else EXIT_OK
@@ -132,12 +135,12 @@ class _Watch:
         while self._monitor.progress.state == RunState.WAITING:
             self._look()
             if self._interrupts:
-                raise GraphError("interrupted before the run had begun")
+                raise KeyboardInterrupt
             if monotonic() > deadline:
                 raise GraphError(
                     f"the run has not begun after {_START_PATIENCE_S:g} s: {self._monitor.waiting_for()}"
                 )
-        self._display.start()
+        self._display.start(self._monitor.progress.stamp_ns)
 
     def _wait_for_end(self) -> None:
         """Wait until the plant says that the run is over."""
@@ -149,7 +152,7 @@ class _Watch:
             if self._interrupts > asked:
                 asked = self._interrupts
                 if asked > 1:
-                    raise GraphError("interrupted twice: the bag may lack its end")
+                    raise KeyboardInterrupt
                 self._monitor.ask_to_finish()
             now_ns = self._monitor.progress.stamp_ns
             if now_ns != seen_ns:
@@ -168,7 +171,9 @@ class _Watch:
             if code is not None:
                 return code
             self._look()
-            if monotonic() > deadline or self._interrupts > 1:
+            if self._interrupts > 1:
+                raise KeyboardInterrupt
+            if monotonic() > deadline:
                 raise GraphError("the recorder has not closed the bag; what was written can be recovered")
 
     def _look(self) -> None:

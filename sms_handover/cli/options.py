@@ -1,15 +1,19 @@
 """Options that several commands share, and the scenario that they describe."""
 
 from argparse import ArgumentParser, Namespace
+from dataclasses import replace
 from pathlib import Path
 
 import yaml
 
+from sms_handover.bag.parameters import RecorderParameters
 from sms_handover.control.parameters import LAWS
 from sms_handover.errors import ConfigurationError
+from sms_handover.parameters import YamlLoader, build, read_parameter_files
+from sms_handover.share import config_file
 from sms_handover.simulation.parameters import MODES
 from sms_handover.simulation.scenario import COMMON, Scenario, load_scenario
-from sms_handover.topics import CONTROLLER, TRAJECTORY
+from sms_handover.topics import CONTROLLER, RECORDER, TRAJECTORY
 from sms_handover.trajectory.time_law import TIME_LAWS
 
 Overrides = dict[str, dict[str, object]]
@@ -65,11 +69,20 @@ def overrides_of(options: Namespace) -> Overrides:
     return overrides
 
 
-def scenario_of(options: Namespace, mode: str = MODES[0]) -> Scenario:
-    """Return the scenario that the options describe, read and checked; raises ConfigurationError."""
+def scenario_of(options: Namespace, mode: str = MODES[0], *, recorded: bool = False) -> Scenario:
+    """Return the scenario that the options describe, read and checked; raises ConfigurationError.
+
+    If it is to be ``recorded``, the options may hold parameters of the recorder too.
+    """
     overrides = overrides_of(options)
     overrides.setdefault(COMMON, {}).setdefault("mode", mode)
-    return load_scenario(overrides, [path.resolve() for path in options.params_file])
+    of_recorder = overrides.pop(RECORDER, {}) if recorded else {}
+    files = [path.resolve() for path in options.params_file]
+    scenario = load_scenario(overrides, files)
+    if recorded:
+        values = read_parameter_files([config_file("recorder.yaml"), *files], RECORDER)
+        build(RecorderParameters, {**values, **of_recorder}, RECORDER)
+    return replace(scenario, overrides={**overrides, RECORDER: of_recorder})
 
 
 def _parse(text: str) -> tuple[str, str, object]:
@@ -79,6 +92,6 @@ def _parse(text: str) -> tuple[str, str, object]:
     if not (assigned and dot and node and name):
         raise ConfigurationError(f"parameter {text!r} is not of the form NODE.NAME:=VALUE")
     try:
-        return node, name, yaml.safe_load(value)
+        return node, name, yaml.load(value, YamlLoader)
     except yaml.YAMLError as error:
         raise ConfigurationError(f"the value of parameter {text!r} is not YAML") from error

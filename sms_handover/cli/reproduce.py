@@ -8,7 +8,7 @@ from sms_handover.analysis.equality import compare_runs
 from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.reader import read_run
 from sms_handover.cli.folders import bag_of
-from sms_handover.errors import BagError
+from sms_handover.errors import BagError, ConfigurationError
 from sms_handover.simulation.parameters import CommonParameters
 from sms_handover.simulation.scenario import COMMON, Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
@@ -32,10 +32,13 @@ def add_parser(parser: ArgumentParser) -> None:
 def command(options: Namespace) -> int:
     """Carry out the command; return the exit code."""
     bag = bag_of(options.run)
-    info = read_info(bag)
-    recorded = read_run(bag)
     with tempfile.TemporaryDirectory() as folder:
-        again = simulate(scenario_in(info, Path(folder)))
+        try:
+            recorded = read_run(bag)
+            scenario = scenario_in(read_info(bag), Path(folder))
+        except BagError as error:
+            raise ConfigurationError(str(error)) from error  # exit code 2: what was given cannot be used
+        again = simulate(scenario)
     differences = compare_runs(recorded, again)
     for difference in differences:
         print(difference)
@@ -48,7 +51,7 @@ def command(options: Namespace) -> int:
 
 def scenario_in(info: BagInfo, folder: Path) -> Scenario:
     """Return the scenario that a bag was made with; its schedule is unpacked into ``folder``."""
-    if info.parameters is None or info.schedule_text is None or info.urdf_text is None:
+    if not info.parameters.keys() >= {*_NODES} or info.schedule_text is None or info.urdf_text is None:
         raise BagError(f"{info.path} does not say what it was made with")
     schedule = folder / "schedule.yaml"
     schedule.write_text(info.schedule_text, encoding="utf-8")

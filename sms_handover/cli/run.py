@@ -51,7 +51,8 @@ def add_parser(parser: ArgumentParser) -> None:
 
 def command(options: Namespace) -> int:
     """Carry out the command; return the exit code."""
-    scenario = scenario_of(options, REALTIME if options.real_time else LOCKSTEP)
+    mode = REALTIME if options.real_time else LOCKSTEP
+    scenario = scenario_of(options, mode, recorded=not options.no_record)
     check_scenario(scenario)
     with reserved_domain(options.domain_id) as domain:
         output = _output_folder(options, scenario)

@@ -23,7 +23,7 @@ from sms_handover.frames import BASE, DEPUTY, WORLD
 from sms_handover.model.link_tree import LinkTree
 from sms_handover.ros.convert import pose_of_message
 from sms_handover.ros.graph_node import GraphNode
-from sms_handover.ros.main import EXIT_LOSS, EXIT_OK, Stop, run_node
+from sms_handover.ros.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, Stop, run_node
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.peer_parameters import PeerParameters
 from sms_handover.ros.qos import LOSSLESS, profile_of, stored
@@ -125,6 +125,8 @@ class RecorderNode(GraphNode[RecorderParameters]):
             self._taps.destroy()
         ledger = self._recording.ledger
         print(ledger_table(ledger))
+        if not self.finished:
+            return EXIT_STOPPED
         return EXIT_OK if ledger.complete else EXIT_LOSS
 
     def _drained(self) -> bool:

@@ -18,6 +18,7 @@ from sms_handover.errors import ConfigurationError, SmsHandoverError
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
 EXIT_LOSS = 3  # the recorder: the bag is whole, but messages are missing in it
+EXIT_STOPPED = 130  # the recorder: the bag is whole, but the run was not over when a signal came
 
 LAUNCHER_PID = "SMS_HANDOVER_LAUNCHER_PID"  # environment variable, set for the nodes that a launcher starts
 
