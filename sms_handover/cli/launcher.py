@@ -4,6 +4,7 @@ import signal
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from time import monotonic
 
@@ -27,6 +28,7 @@ from sms_handover.units import ns_to_seconds
 
 _POLL_S = 0.1  # [s] longest wait for a message before the processes are looked at again
 _START_PATIENCE_S = 60.0  # [s] of wall time until the run must have begun
+_BEGUN_PATIENCE_S = 2.0  # [s] of wall time for the news that the run has begun, when it is interrupted
 _STALL_PATIENCE_S = 30.0  # [s] of wall time without progress of simulated time
 _NEWS_PATIENCE_S = 20.0  # [s] of wall time for the news that the run is over, once the recorder has ended
 _DRAIN_PATIENCE_S = 60.0  # [s] of wall time for the recorder to finish
@@ -132,10 +134,13 @@ class _Watch:
     def _wait_for_start(self) -> None:
         """Wait until every endpoint has matched and the plant has begun."""
         deadline = monotonic() + _START_PATIENCE_S
+        interrupted = inf
         while self._monitor.progress.state == RunState.WAITING:
             self._look()
             if self._interrupts:
-                raise KeyboardInterrupt
+                interrupted = min(interrupted, monotonic())
+                if self._interrupts > 1 or monotonic() - interrupted > _BEGUN_PATIENCE_S:
+                    raise KeyboardInterrupt
             if monotonic() > deadline:
                 raise GraphError(
                     f"the run has not begun after {_START_PATIENCE_S:g} s: {self._monitor.waiting_for()}"
@@ -145,15 +150,14 @@ class _Watch:
     def _wait_for_end(self) -> None:
         """Wait until the plant says that the run is over."""
         seen_ns, since = -1, monotonic()
-        asked = 0
+        asked = False
         while not self._monitor.finished:
             self._look()
             self._show()
-            if self._interrupts > asked:
-                asked = self._interrupts
-                if asked > 1:
-                    raise KeyboardInterrupt
-                self._monitor.ask_to_finish()
+            if self._interrupts > 1:
+                raise KeyboardInterrupt
+            if self._interrupts and not asked:
+                asked = self._monitor.ask_to_finish()
             now_ns = self._monitor.progress.stamp_ns
             if now_ns != seen_ns:
                 seen_ns, since = now_ns, monotonic()

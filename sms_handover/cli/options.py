@@ -79,9 +79,10 @@ def scenario_of(options: Namespace, mode: str = MODES[0], *, recorded: bool = Fa
     of_recorder = overrides.pop(RECORDER, {}) if recorded else {}
     files = [path.resolve() for path in options.params_file]
     scenario = load_scenario(overrides, files)
-    if recorded:
-        values = read_parameter_files([config_file("recorder.yaml"), *files], RECORDER)
-        build(RecorderParameters, {**values, **of_recorder}, RECORDER)
+    if not recorded:
+        return scenario
+    values = read_parameter_files([config_file("recorder.yaml"), *files], RECORDER)
+    build(RecorderParameters, {**values, **of_recorder}, RECORDER)
     return replace(scenario, overrides={**overrides, RECORDER: of_recorder})
 
 

@@ -67,10 +67,12 @@ class RunMonitor:
         """Tell whether the plant has said that the run is over."""
         return self.progress.state in (RunState.FINISHED, RunState.FAILED)
 
-    def ask_to_finish(self) -> None:
-        """Ask the plant to end the run at the present tick, if it is there."""
-        if self._finish.service_is_ready():
+    def ask_to_finish(self) -> bool:
+        """Ask the plant to end the run at the present tick; tell whether it could be asked."""
+        ready = bool(self._finish.service_is_ready())
+        if ready:
             self._finish.call_async(Trigger.Request())
+        return ready
 
     def waiting_for(self) -> str:
         """Return in words what the nodes say they wait for."""

@@ -147,7 +147,7 @@ def test_who_waits_for_what_is_told(graph: FakeGraph) -> None:
 
 
 def test_the_plant_is_asked_to_finish(graph: FakeGraph) -> None:
-    graph.monitor.ask_to_finish()  # there is no service yet: nothing happens
+    assert not graph.monitor.ask_to_finish()  # there is no service yet
     asked: list[Trigger.Request] = []
 
     def finish(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -156,12 +156,9 @@ def test_the_plant_is_asked_to_finish(graph: FakeGraph) -> None:
 
     graph.node.create_service(Trigger, "~/finish", finish)
 
-    def ask_until_heard() -> bool:
-        if not asked:
-            graph.monitor.ask_to_finish()
-        return bool(asked)
-
-    graph.bench.until(ask_until_heard, "the request")
+    graph.bench.until(graph.monitor.ask_to_finish, "the service")
+    graph.bench.until(lambda: asked, "the request")
+    assert len(asked) == 1
 
 
 def test_late_listeners_hear_what_was_said(bench: Bench) -> None:

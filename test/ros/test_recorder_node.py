@@ -26,7 +26,7 @@ from sms_handover.nodes.plant import PlantNode
 from sms_handover.nodes.recorder import RecorderNode
 from sms_handover.nodes.trajectory import TrajectoryNode
 from sms_handover.ros.endpoints import Endpoints
-from sms_handover.ros.main import EXIT_LOSS, EXIT_OK
+from sms_handover.ros.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED
 from sms_handover.ros.qos import LATCHED, LOSSLESS
 from sms_handover.ros.wire import JointStateWire
 from sms_handover.simulation.scenario import Overrides, load_scenario
@@ -197,7 +197,7 @@ def test_asked_to_stop_it_stops_and_the_bag_is_whole(bench: Bench) -> None:
     code = recorded.run(lambda: recorded.recorder.diagnostic_stamp_ns() >= 100_000_000)
     assert not recorded.plant.finished
     assert recorded.plant.diagnostic_stamp_ns() < 59_000_000_000
-    assert code == EXIT_OK  # nobody has told that anything is missing
+    assert code == EXIT_STOPPED
     run = read_run(recorded.folder)
     assert len(run.tick_ns) >= 100
     assert run.tick_ns.tolist() == [k * 1_000_000 for k in range(len(run.tick_ns))]

@@ -12,7 +12,7 @@ from time import monotonic
 
 from sms_handover.ros.main import LAUNCHER_PID
 
-DEADLINE_S = 40.0  # s of wall time after which something that hangs has failed; nothing is measured by it
+DEADLINE_S = 180.0  # s of wall time after which something that hangs has failed; nothing is measured by it
 
 _LOOK_S = 0.02  # s of wall time between two looks at a condition
 _NODES = "sms_handover.nodes."

@@ -2,84 +2,176 @@
 
 import os
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
+from sms_handover.analysis.equality import compare_runs
 from sms_handover.bag.info import read_info
 from sms_handover.bag.reader import read_run
+from sms_handover.run_data import RunData
 from sms_handover.topics import NODES
 
-from .commands import DEADLINE_S, nodes_of, sms_handover, started, wait_until
+from ..ros.short_handover import short_handover
+from .runs import running, sms_handover
 
 pytestmark = [pytest.mark.system, pytest.mark.slow]
 
-
-def recording(bag: Path) -> bool:
-    """Tell whether a run has got so far that its bag is being filled."""
-    file = bag / "bag_0.mcap"
-    return file.exists() and file.stat().st_size > 200_000  # byte, some hundred ticks
+UNDER_WAY = 200_000  # bytes of a bag; more than it begins with, less than one second of the loop gives
 
 
-def test_an_interrupt_leaves_a_complete_bag(tmp_path: Path) -> None:
-    """The plant ends at the tick it is at, the others tell their counts, the recorder takes all of it."""
-    with started(tmp_path, "run", "-o", "run") as process:
-        wait_until(lambda: recording(tmp_path / "run" / "bag"), "a recording")
-        process.send_signal(signal.SIGINT)
-        assert process.wait(DEADLINE_S) == 130
-        assert nodes_of(process.pid) == {}
-    info = read_info(tmp_path / "run" / "bag")
+def beginning(bag: Path) -> RunData:
+    """Return what a bag holds of a run that was cut short, and make sure that nothing of it is missing."""
+    run = read_run(bag)
+    ticks = len(run.tick_ns)
+    assert 0 < ticks < 60_001
+    assert run.tick_ns.tolist() == [k * 1_000_000 for k in range(ticks)]
+    info = read_info(bag)
     assert info.ledger is not None and info.ledger.complete
-    run = read_run(tmp_path / "run" / "bag")
-    assert 0 < run.tick_ns.size < 60_000
+    assert set(info.parameters) == set(NODES)
+    return run
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_leaves_a_complete_bag(number: signal.Signals, tmp_path: Path) -> None:
+    """The plant ends at the tick it is at, the others tell their counts, the recorder takes all of it."""
+    bag = tmp_path / "run" / "bag"
+    with running("run", "-o", "run", cwd=tmp_path) as run:
+        run.until_recorded(bag, UNDER_WAY)
+        assert set(run.nodes) == set(NODES)
+        run.send(number)
+        assert run.end() == 130
+        assert "stopped on request at" in run.text
+        run.wait_for_nodes()
+    ledger = read_info(bag).ledger
+    assert ledger is not None
+    accounts = {account.name: account for account in ledger.topics}
+    states = accounts["/joint_states"]
+    assert states.received == states.published == len(beginning(bag).tick_ns)
+
+
+def test_an_interrupt_before_the_start_ends_everything(tmp_path: Path) -> None:
+    with running("run", "-o", "run", cwd=tmp_path) as run:
+        run.until_all_nodes(NODES)
+        run.send(signal.SIGINT)
+        assert run.end() == 130
+        assert "Traceback" not in run.text
+        run.wait_for_nodes()
+
+
+def test_a_second_interrupt_ends_everything_at_once(tmp_path: Path) -> None:
+    bag = tmp_path / "run" / "bag"
+    with running("run", "-o", "run", cwd=tmp_path) as run:
+        run.until_recorded(bag, UNDER_WAY)
+        os.kill(run.nodes["plant"], signal.SIGSTOP)  # it will not end on request
+        run.send(signal.SIGINT)
+        run.until(lambda: "ending the run" in run.text, "the first interrupt")
+        run.send(signal.SIGINT)
+        run.until(lambda: run.text.count("ending the run") == 2, "the second interrupt")
+        os.kill(run.nodes["plant"], signal.SIGCONT)
+        assert run.end() == 130
+        assert "Traceback" not in run.text
+        run.wait_for_nodes()
+    assert len(read_run(bag).tick_ns) > 0
 
 
 def test_a_dead_node_ends_the_run_and_is_named(tmp_path: Path) -> None:
     """The run ends with exit code 1 and the name of who died; nobody else is left."""
-    with started(tmp_path, "run", "-o", "run") as process:
-        wait_until(lambda: recording(tmp_path / "run" / "bag"), "a recording")
-        nodes = nodes_of(process.pid)
-        assert set(nodes) == set(NODES)
-        os.kill(nodes["controller"], signal.SIGKILL)
-        output, _ = process.communicate(timeout=DEADLINE_S)
-        assert process.returncode == 1
-        assert "node 'controller' was killed by signal 9" in output
-        assert nodes_of(process.pid) == {}
-    assert read_run(tmp_path / "run" / "bag").tick_ns.size > 0
+    bag = tmp_path / "run" / "bag"
+    with running("run", "-o", "run", cwd=tmp_path) as run:
+        run.until_recorded(bag, UNDER_WAY)
+        assert set(run.nodes) == set(NODES)
+        os.kill(run.nodes["controller"], signal.SIGKILL)
+        assert run.end() == 1
+        (line,) = (line for line in run.text.splitlines() if "error:" in line)
+        assert "node 'controller' was killed by signal 9" in line
+        run.wait_for_nodes()
+    beginning(bag)
+
+
+def test_a_recorder_that_is_ended_closes_its_bag_and_is_missed(tmp_path: Path) -> None:
+    """Without it the run is not what was asked for; the launcher must not go on and call it whole."""
+    bag = tmp_path / "run" / "bag"
+    with running("run", "-o", "run", cwd=tmp_path) as run:
+        run.until_recorded(bag, UNDER_WAY)
+        os.kill(run.nodes["recorder"], signal.SIGTERM)
+        assert run.end() == 1
+        assert "node 'recorder' ended with exit code 130" in run.text
+        run.wait_for_nodes()
+    beginning(bag)
+    assert (bag / "metadata.yaml").is_file()
 
 
 def test_nodes_end_when_their_launcher_is_gone(tmp_path: Path) -> None:
     """A launcher that is killed cannot end its nodes; they notice and end by themselves."""
-    with started(tmp_path, "run", "-o", "run") as process:
-        wait_until(lambda: recording(tmp_path / "run" / "bag"), "a recording")
-        assert set(nodes_of(process.pid)) == set(NODES)
-        process.kill()
-        process.wait(DEADLINE_S)
-        wait_until(lambda: nodes_of(process.pid) == {}, "the end of every node")
-    assert read_run(tmp_path / "run" / "bag").tick_ns.size > 0
-
-
-def test_runs_side_by_side_do_not_hear_each_other(schedule: Path, tmp_path: Path) -> None:
-    """Each run takes a domain of its own, so both are whole."""
-    arguments = ("run", "--schedule", str(schedule), "-o")
-    with started(tmp_path, *arguments, "one") as process:
-        other = sms_handover(tmp_path, *arguments, "two")
-        output, _ = process.communicate(timeout=DEADLINE_S)
-    assert (process.returncode, other.returncode) == (0, 0), output + other.stdout + other.stderr
-    domains = {text.split("running on ROS domain ")[1].split(",")[0] for text in (output, other.stdout)}
-    assert len(domains) == 2
-    assert read_run(tmp_path / "one" / "bag").tick_ns.size == read_run(tmp_path / "two" / "bag").tick_ns.size
-
-
-def test_a_second_recorder_on_the_same_folder_is_refused(schedule: Path, tmp_path: Path) -> None:
-    """The recorder says so in one line and exits with 2; the bag that is there stays as it is."""
-    assert sms_handover(tmp_path, "run", "--schedule", str(schedule), "-o", "run").returncode == 0
     bag = tmp_path / "run" / "bag"
-    before = (bag / "bag_0.mcap").read_bytes()
-    command = [sys.executable, "-m", "sms_handover.nodes.recorder", "--ros-args", "-p", f"folder:={bag}"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S, check=False)
-    assert done.returncode == 2
-    assert "exists" in done.stderr and "Traceback" not in done.stderr
-    assert (bag / "bag_0.mcap").read_bytes() == before
+    with running("run", "-o", "run", cwd=tmp_path) as run:
+        run.until_recorded(bag, UNDER_WAY)
+        assert set(run.nodes) == set(NODES)
+        run.send(signal.SIGKILL)
+        assert run.end() == -9
+        run.wait_for_nodes()
+    beginning(bag)
+
+
+def test_runs_side_by_side_do_not_hear_each_other(
+    schedule: Path, simulated: dict[str, RunData], tmp_path: Path
+) -> None:
+    """Each run takes a domain of its own, so both are whole, under different laws."""
+    with running("run", "--schedule", schedule, "-o", "nmpc", cwd=tmp_path) as one:
+        other = sms_handover("run", "--schedule", schedule, "--controller", "pid", "-o", "pid", cwd=tmp_path)
+        assert (one.end(), other.code) == (0, 0), one.text + other.out + other.err
+        domains = {text.split("running on ROS domain ")[1].split(",")[0] for text in (one.text, other.out)}
+    assert len(domains) == 2
+    for law in ("nmpc", "pid"):
+        assert compare_runs(read_run(tmp_path / law / "bag"), simulated[law]) == ()
+
+
+def test_a_missed_grasp_has_an_exit_code_of_its_own(tmp_path: Path) -> None:
+    """The target is in reach, but not within so short a phase: that shows only in the run."""
+    schedule = tmp_path / "schedule.yaml"
+    schedule.write_text(short_handover(stretch=2.0, deputy_off=(0.0, 0.03, 0.04)), encoding="utf-8")
+    done = sms_handover("run", "--schedule", schedule, "-o", "run", cwd=tmp_path)
+    assert done.code == 4, done
+    assert "grasp by arm_a: missed" in done.err
+    assert "transfer by arm_b: rejected" in done.err
+
+
+def test_without_a_recorder_nothing_is_recorded(schedule: Path, tmp_path: Path) -> None:
+    done = sms_handover("run", "--no-record", "--schedule", schedule, "-o", "run", cwd=tmp_path)
+    assert done.code == 0, done
+    assert "the whole run is done at 2.04 s" in done.out
+    assert not (tmp_path / "run" / "bag").exists()
+
+
+def test_an_earlier_run_is_replaced_only_if_wanted(schedule: Path, tmp_path: Path) -> None:
+    arguments = ("run", "--schedule", schedule, "--duration", "0.1", "-o", "run")
+    assert sms_handover(*arguments, cwd=tmp_path).code == 0
+    before = (tmp_path / "run" / "bag" / "bag_0.mcap").read_bytes()
+    refused = sms_handover(*arguments, cwd=tmp_path)
+    assert (refused.code, len(refused.errors)) == (2, 1)
+    assert (tmp_path / "run" / "bag" / "bag_0.mcap").read_bytes() == before
+    again = sms_handover(*arguments[:-2], "--overwrite", "--duration", "0.2", "-o", "run", cwd=tmp_path)
+    assert again.code == 0, again
+    assert len(read_run(tmp_path / "run" / "bag").tick_ns) == 201
+
+
+# A recorder alone
+
+
+def test_a_second_recorder_on_the_same_folder_is_refused(tmp_path: Path) -> None:
+    """It says so in one line and exits with 2, while the first one goes on and closes its bag."""
+    arguments = ("--ros-args", "-p", "folder:=bag")
+    module = "sms_handover.nodes.recorder"
+    with running(*arguments, cwd=tmp_path, module=module) as first:
+        first.until((tmp_path / "bag" / "bag_0.mcap").is_file, "the bag of the first")
+        with running(*arguments, cwd=tmp_path, module=module) as second:
+            assert second.end() == 2
+            (line,) = (line for line in second.text.splitlines() if "error:" in line)
+            assert "bag exists" in line
+            assert "Traceback" not in second.text
+        first.send(signal.SIGINT)
+        assert first.end() == 130
+    info = read_info(tmp_path / "bag")
+    assert info.schedule_text and info.urdf_text and info.provenance
+    assert info.ledger is not None

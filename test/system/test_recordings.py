@@ -1,79 +1,176 @@
 """What the bag of a run over DDS holds, and the commands that read it."""
 
+import json
+import shutil
+from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
-from sms_handover.bag.info import read_info
-from sms_handover.simulation.scenario import load_scenario
-from sms_handover.topics import NODES
+from sms_handover.bag.info import BagInfo, read_info
+from sms_handover.bag.reader import read_run
+from sms_handover.bag.writer import BagWriter
+from sms_handover.run_data import RunData
+from sms_handover.simulation.scenario import load_robot_model, load_scenario
+from sms_handover.topics import LOOP_NODES, NODES, Rate, graph_topics
 
-from .commands import sms_handover
-from .conftest import TICKS
+from .conftest import LAWS, TICKS
+from .runs import Ended, sms_handover
 
 pytestmark = [pytest.mark.system, pytest.mark.slow]
 
+Recorded = dict[str, tuple[Path, Ended]]
 
-def recorded(folder: Path, schedule: Path, law: str, name: str) -> Path:
-    """Return the bag of a run over DDS."""
-    done = sms_handover(folder, "run", "--controller", law, "--schedule", str(schedule), "-o", name)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return folder / name / "bag"
+PERIODS = (TICKS - 1) // 20 + 1
+COUNTS = {Rate.TICK: TICKS, Rate.REFERENCE: PERIODS, Rate.CLOCK: (TICKS - 1) // 10 + 1}
+TOPICS = graph_topics(("arm_a", "arm_b"))
 
 
-def test_the_bag_has_every_message_and_stands_on_its_own(schedule: Path, tmp_path: Path) -> None:
-    """Three readers count the same, and parameters, schedule, robot and versions are inside."""
-    bag = recorded(tmp_path, schedule, "nmpc", "run")
-    scenario = load_scenario({"common": {"schedule": str(schedule)}})
-    common = scenario.parameters.common
-    ticks = common.last_tick(scenario.schedule.end_ns)
-    expected = {"/joint_states": ticks + 1, "/base_odometry": ticks + 1, "/joint_command": ticks + 1}
-    for topic in ("/joint_reference", "/task/phase", "/deputy/pose", "/arm_a/tool_pose", "/tf"):
-        expected[topic] = ticks // common.ticks_per_reference + 1
+@pytest.fixture(params=LAWS)
+def bag(request: pytest.FixtureRequest, recorded: Recorded) -> Path:
+    """The bag of a run under each law."""
+    return recorded[request.param][0] / "bag"
+
+
+def expected() -> dict[str, int]:
+    """Return how many messages the topics of the loop must have."""
+    counts = {f"/{t.name.lstrip('/')}": COUNTS[t.rate] for t in TOPICS if t.rate in COUNTS}
+    return {**counts, "/tf": PERIODS, "/task/grasp_event": 2, "/robot_description": 1}
+
+
+def of_expected(counts: Counter[str]) -> dict[str, int]:
+    return {name: counts[name] for name in expected()}
+
+
+def test_no_message_is_missing(bag: Path) -> None:
     info = read_info(bag)
-    counts = {topic: info.topics[topic].message_count for topic in expected}
-    with AnyReader([bag]) as reader:
-        by_rosbags = {topic: 0 for topic in expected}
-        for connection, _, raw in reader.messages():
-            reader.deserialize(raw, connection.msgtype)
-            if connection.topic in by_rosbags:
-                by_rosbags[connection.topic] += 1
-    by_mcap = {topic: 0 for topic in expected}
+    assert of_expected(Counter({t.name: t.message_count for t in info.topics.values()})) == expected()
+    ledger = info.ledger
+    assert ledger is not None and ledger.complete
+    accounts = {account.name: account for account in ledger.topics}
+    for topic in TOPICS:
+        account = accounts[f"/{topic.name.lstrip('/')}"]
+        if topic.rate in COUNTS:
+            assert account.received == account.published == COUNTS[topic.rate], topic.name
+            assert account.missing == account.duplicates == account.out_of_order == 0, topic.name
+    assert info.topics["/run/published"].message_count == len(LOOP_NODES)
+
+
+def test_mcap_reads_it(bag: Path) -> None:
+    counts: Counter[str] = Counter()
     with (bag / "bag_0.mcap").open("rb") as stream:
-        for _, channel, _, _ in make_reader(
-            stream, decoder_factories=[DecoderFactory()]
-        ).iter_decoded_messages():
-            if channel.topic in by_mcap:
-                by_mcap[channel.topic] += 1
-    assert counts == by_rosbags == by_mcap == expected
-    assert info.ledger is not None and info.ledger.complete
-    assert info.parameters is not None and set(info.parameters) == set(NODES)
-    assert info.schedule_text == schedule.read_text(encoding="utf-8")
-    assert info.urdf_text == scenario.robot.urdf
-    assert info.provenance["version.pin"] != "unknown"
+        reader = make_reader(stream, validate_crcs=True)
+        assert reader.get_header().profile == "ros2"
+        for _, channel, message in reader.iter_messages():
+            counts[channel.topic] += 1
+            assert message.data[:2] == b"\0\1"  # little-endian CDR
+    assert of_expected(counts) == expected()
 
 
-def test_a_bag_reproduces_itself_and_compares(schedule: Path, tmp_path: Path) -> None:
-    """``reproduce`` needs the bag only, and tells a changed bit; ``compare`` prints the grasps."""
-    recorded(tmp_path, schedule, "nmpc", "run")
-    schedule_copy = schedule.read_text(encoding="utf-8")
-    again = sms_handover(tmp_path, "reproduce", "run")
-    assert (again.returncode, again.stderr) == (0, "")
-    assert "the same bit for bit" in again.stdout
-    compared = sms_handover(tmp_path, "compare", "run", "--json", "figures.json")
-    assert compared.returncode == 0, compared.stderr
-    assert "arm_b takes end_b from arm_a" in compared.stdout
-    assert (tmp_path / "figures.json").stat().st_size > 0
-    assert schedule.read_text(encoding="utf-8") == schedule_copy
+def test_mcap_ros2_support_reads_it(bag: Path) -> None:
+    counts: Counter[str] = Counter()
+    with (bag / "bag_0.mcap").open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        for _, channel, message, decoded in reader.iter_decoded_messages():
+            counts[channel.topic] += 1
+            if channel.topic == "/joint_states":
+                assert len(decoded.name) == len(decoded.position) == 14
+                stamp_ns = decoded.header.stamp.sec * 10**9 + decoded.header.stamp.nanosec
+                assert stamp_ns == message.log_time
+    assert of_expected(counts) == expected()
+
+
+def test_rosbags_reads_it(bag: Path) -> None:
+    counts: Counter[str] = Counter()
+    run = read_run(bag)
+    positions = []
+    with AnyReader([bag]) as reader:
+        for connection, _, raw in reader.messages():
+            message: Any = reader.deserialize(raw, connection.msgtype)
+            counts[connection.topic] += 1
+            if connection.topic == "/joint_states":
+                positions.append(message.position)
+        assert reader.message_count == counts.total()
+    assert of_expected(counts) == expected()
+    assert [row.tobytes() for row in positions] == [row.tobytes() for row in run.joint_position]
+
+
+def test_metadata_is_that_of_rosbag2(bag: Path) -> None:
+    text = (bag / "metadata.yaml").read_text(encoding="utf-8")
+    metadata = yaml.safe_load(text)["rosbag2_bagfile_information"]
+    info = read_info(bag)
+    assert metadata["message_count"] == info.message_count
+    assert metadata["storage_identifier"] == "mcap"
+    assert metadata["relative_file_paths"] == ["bag_0.mcap"]
+    assert metadata["duration"]["nanoseconds"] == (TICKS - 1) * 1_000_000
+
+
+def test_it_stands_on_its_own(recorded: Recorded, schedule: Path) -> None:
+    robot = load_robot_model(load_scenario().parameters.common)
+    for law, (folder, _) in recorded.items():
+        info: BagInfo = read_info(folder / "bag")
+        assert info.schedule_text == schedule.read_text(encoding="utf-8")
+        assert info.urdf_text == robot.urdf
+        assert set(info.parameters) == set(NODES)
+        assert info.parameters["controller"]["law"] == law
+        for name in NODES:
+            assert info.parameters[name]["peers"] == list(NODES)
+            assert info.parameters[name]["schedule"] == str(schedule)
+        provenance = dict(info.provenance)
+        assert {"start", "git_revision", "git_state", "seed", "python", "platform"} <= set(provenance)
+        assert provenance["version.pin"] != "unknown" != provenance["version.mcap"]
+
+
+def test_laws_share_everything_but_the_commands(recorded: Recorded) -> None:
+    """Both begin in the same state, and part with the first command."""
+    runs: dict[str, RunData] = {law: read_run(folder / "bag") for law, (folder, _) in recorded.items()}
+    nmpc, pid = runs["nmpc"], runs["pid"]
+    assert nmpc.joint_position[0].tobytes() == pid.joint_position[0].tobytes()
+    assert nmpc.joint_command[0].tobytes() != pid.joint_command[0].tobytes()
+
+
+def test_a_bag_reproduces_itself(recorded: Recorded, tmp_path: Path) -> None:
+    """From a bag alone: the schedule and the output folder of then need not be there."""
+    for law, (folder, _) in recorded.items():
+        shutil.copytree(folder / "bag", tmp_path / law)
+        again = sms_handover("reproduce", law, cwd=tmp_path)
+        assert (again.code, again.err) == (0, "")
+        assert f"the same bit for bit: {TICKS} states, {PERIODS} references" in again.out
+
+
+def test_reproduce_tells_what_it_cannot_use(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    BagWriter(tmp_path / "foreign").close()
+    for folder, told in (("nowhere", "no bag"), ("empty", "not a bag"), ("foreign", "no run")):
+        done = sms_handover("reproduce", folder, cwd=tmp_path)
+        assert (done.code, len(done.errors)) == (2, 1), done
+        assert told in done.errors[0]
+        assert done.err.count("\n") == 1
+
+
+def test_compare_prints_a_table_and_writes_figures(recorded: Recorded, tmp_path: Path) -> None:
+    folders = [folder for folder, _ in recorded.values()]
+    done = sms_handover("compare", *folders, "--json", "figures.json", cwd=tmp_path)
+    assert done.code == 0, done
+    table = done.out.splitlines()
+    assert any("nmpc" in line and "pid" in line for line in table)
+    assert "arm_b takes end_b from arm_a" in done.out
+    figures = json.loads((tmp_path / "figures.json").read_text(encoding="utf-8"))
+    assert figures
 
 
 def test_real_time_ends_and_tells_how_it_kept_time(schedule: Path, tmp_path: Path) -> None:
     """Paced by the wall clock the whole run is recorded too, with the timing of its loop."""
-    done = sms_handover(tmp_path, "run", "--real-time", "--schedule", str(schedule), "-o", "run")
-    assert done.returncode in (0, 4), done.stdout + done.stderr  # 4: a late command made a grasp miss
+    done = sms_handover(
+        "run", "--real-time", "--duration", "1.5", "--schedule", schedule, "-o", "run", cwd=tmp_path
+    )
+    assert done.code in (0, 4), done  # 4: a late command made a grasp miss
     info = read_info(tmp_path / "run" / "bag")
     assert info.topics["/loop_timing"].message_count > 0
-    assert info.topics["/joint_states"].message_count == TICKS
+    assert info.topics["/joint_states"].message_count == 1501
+    assert info.parameters["plant"]["mode"] == "realtime"

@@ -3,55 +3,135 @@
 from pathlib import Path
 
 import pytest
+import yaml
 
-from sms_handover.cli.folders import LOGS
 from sms_handover.share import config_file
 
-from .commands import sms_handover
+from .runs import sms_handover
 
 pytestmark = pytest.mark.system
 
-SHIPPED = config_file("handover.yaml")
+
+def parameters(node: str, **values: object) -> str:
+    """Return the text of a parameter file in ROS form."""
+    return yaml.safe_dump({node: {"ros__parameters": values}})
+
+
+def files() -> dict[str, str]:
+    """Return the texts of the files that the cases use, by name."""
+    shipped = config_file("handover.yaml").read_text(encoding="utf-8")
+    target = yaml.safe_load(shipped)["phases"][1]["arms"]["arm_a"]["tool_in_world"]["xyz"]
+    far = [target[0] + 1.0, *target[1:]]
+    return {
+        "frame.yaml": shipped.replace("{grasp_frame: end_a}", "{grasp_frame: end_x}", 1),
+        "reach.yaml": shipped.replace(str(target), str(far), 1),
+        "broken.yaml": "phases: [",
+        "list.yaml": "- 1\n",
+        "unknown.yaml": parameters("controller", no_such=1.0),
+        "type.yaml": parameters("/**", tick="often"),
+        "recorder.yaml": parameters("recorder", drain_timeout=-1.0),
+        "text": "",
+        "taken/mine": "keep",
+    }
+
 
 WRONG = {
     "controller": (["--controller", "pdi"], "invalid choice: 'pdi'"),
+    "time law": (["--time-law", "cubic"], "invalid choice: 'cubic'"),
+    "option": (["--no-such-option"], "unrecognized arguments"),
     "missing schedule": (["--schedule", "nowhere.yaml"], "cannot read the schedule"),
-    "unknown grasp frame": (["--schedule", "frame.yaml"], "did you mean 'end_b'?"),
+    "folder for a schedule": (["--schedule", "taken"], "cannot read the schedule"),
+    "schedule that is no YAML": (["--schedule", "broken.yaml"], "broken.yaml"),
+    "schedule that is no mapping": (["--schedule", "list.yaml"], "list.yaml"),
+    "unknown grasp frame": (["--schedule", "frame.yaml"], "unknown grasp frame 'end_x'"),
     "target out of reach": (["--schedule", "reach.yaml"], "is out of reach"),
+    "missing robot": (["--robot", "nowhere.yaml"], "nowhere.yaml"),
     "robot": (["--robot", "reach.yaml"], "unknown key 'initial'"),
     "parameter name": (["-p", "plant.integrater:=rk4"], "did you mean 'integrator'?"),
-    "parameter value": (["-p", "controller.rolling_period:=-1.0"], "allowed is at least 0.001"),
+    "parameter value": (["-p", "controller.rolling_period:=-1.0"], "-1.0 s, allowed is at least 0.001"),
+    "parameter type": (["-p", "controller.rolling_period:=long"], "'long', expected a number"),
     "parameter form": (["-p", "tick=1"], "NODE.NAME:=VALUE"),
+    "parameter without a value": (["-p", "common.tick:="], "'tick' is None"),
     "node": (["-p", "plnt.integrator:=rk4"], "did you mean 'plant'?"),
+    "recorder parameter": (["-p", "recorder.drain_timeout:=-1.0"], "-1.0 s, allowed is at least 0.1"),
+    "recorder parameter name": (["-p", "recorder.drain:=1.0"], "unknown parameter 'drain'"),
+    "missing parameter file": (["--params-file", "nowhere.yaml"], "cannot read"),
+    "parameter name in a file": (["--params-file", "unknown.yaml"], "unknown parameter 'no_such'"),
+    "parameter type in a file": (["--params-file", "type.yaml"], "'often', expected a number s"),
+    "recorder parameter in a file": (["--params-file", "recorder.yaml"], "-1.0 s, allowed is at least 0.1"),
     "unstable loop": (["-p", "common.tick:=0.002", "--controller", "pid"], "joint_7"),
-    "duration": (["--duration", "-3"], "allowed is at least 0.0"),
+    "reference period": (["-p", "common.tick:=0.003"], "a multiple of the tick"),
+    "duration": (["--duration", "-3"], "-3.0 s, allowed is at least 0.0"),
+    "endless duration": (["--duration", "inf"], "expected a finite number"),
     "domain": (["--domain-id", "400"], "allowed is 0 to 101"),
-    "output that cannot be": (["-o", "/proc/nothing/here"], "cannot be made"),
+    "negative domain": (["--domain-id", "-1"], "allowed is 0 to 101"),
+    "domain that is no number": (["--domain-id", "one"], "invalid int value"),
+    "output that cannot be": (["-o", "text/run"], "cannot be made"),
+    "output that is a file": (["-o", "text"], "exists"),
     "output that exists": (["-o", "taken"], "exists"),
+    "output that no run has made": (["-o", "taken", "--overwrite"], "exists"),
+    "domain and an earlier run": (["-o", "earlier", "--overwrite", "--domain-id", "400"], "0 to 101"),
 }
 
 
+def tree(folder: Path) -> dict[str, str]:
+    """Return every file and folder, with the text of the files."""
+    return {
+        str(path.relative_to(folder)): path.read_text(encoding="utf-8") if path.is_file() else ""
+        for path in folder.rglob("*")
+    }
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with the files that the cases use, and what looks like an earlier run."""
+    for name, text in files().items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    (tmp_path / "earlier" / "log").mkdir(parents=True)
+    (tmp_path / "earlier" / "log" / "plant.log").write_text("an earlier run", encoding="utf-8")
+    return tmp_path
+
+
 @pytest.mark.parametrize("case", WRONG)
-def test_nothing_is_started(case: str, tmp_path: Path) -> None:
-    """One line names the value and what is allowed; no folder appears and no node."""
-    text = SHIPPED.read_text(encoding="utf-8")
-    (tmp_path / "frame.yaml").write_text(text.replace("{grasp_frame: end_a}", "{grasp_frame: end_x}"))
-    assert "[1.18, 0.12, 0.4]" in text
-    (tmp_path / "reach.yaml").write_text(text.replace("[1.18, 0.12, 0.4]", "[2.18, 0.12, 0.4]"))
-    (tmp_path / "taken").mkdir()
-    before = sorted(path.name for path in tmp_path.iterdir())
+def test_nothing_is_started(case: str, folder: Path) -> None:
+    """One line names the value and what is allowed; nothing is made or changed, so no node has run."""
+    before = tree(folder)
     arguments, told = WRONG[case]
-    done = sms_handover(tmp_path, "run", *arguments)
-    assert done.returncode == 2, done.stdout + done.stderr
-    errors = [line for line in done.stderr.splitlines() if "error:" in line]
-    assert len(errors) == 1 and told in errors[0], done.stderr
-    assert sorted(path.name for path in tmp_path.iterdir()) == before
-    assert not (tmp_path / "taken" / LOGS).exists()
+    done = sms_handover("run", *arguments, cwd=folder)
+    assert done.code == 2, done
+    assert len(done.errors) == 1 and told in done.errors[0], done
+    assert "Traceback" not in done.err
+    assert done.err.splitlines()[-1] == done.errors[0]
+    assert done.out == ""
+    assert tree(folder) == before
+
+
+def test_simulate_refuses_the_same(folder: Path) -> None:
+    for case in ("target out of reach", "parameter value", "unstable loop"):
+        arguments, told = WRONG[case]
+        done = sms_handover("simulate", *arguments, cwd=folder)
+        assert done.code == 2, done
+        assert len(done.errors) == 1 and told in done.errors[0], done
+
+
+def test_numbers_are_read_as_ros_reads_them(schedule: Path, tmp_path: Path) -> None:
+    """An exponent without a decimal point makes a number too."""
+    arguments = ("-p", "common.tick:=1e-3", "--duration", "0.02", "--schedule", schedule)
+    done = sms_handover("simulate", *arguments, cwd=tmp_path)
+    assert done.code == 0, done
 
 
 @pytest.mark.parametrize("command", [[], ["run"], ["simulate"], ["compare"], ["reproduce"]])
 def test_help_teaches(command: list[str], tmp_path: Path) -> None:
     """Every command tells what it does and exits with 0."""
-    done = sms_handover(tmp_path, *command, "--help")
-    assert done.returncode == 0
-    assert "usage: sms-handover" in done.stdout
+    done = sms_handover(*command, "--help", cwd=tmp_path)
+    assert done.code == 0
+    assert "usage: sms-handover" in done.out
+    assert done.err == ""
+
+
+@pytest.mark.parametrize("arguments", [[], ["fly"], ["compare"], ["reproduce"]])
+def test_a_command_must_be_whole(arguments: list[str], tmp_path: Path) -> None:
+    done = sms_handover(*arguments, cwd=tmp_path)
+    assert (done.code, len(done.errors)) == (2, 1)
