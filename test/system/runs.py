@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from select import select
 from time import monotonic
 
 from sms_handover.ros.main import LAUNCHER_PID
@@ -101,15 +102,20 @@ class Running:
 
     def wait_for_nodes(self) -> None:
         """Wait until every node that was there has ended."""
-        deadline = monotonic() + DEADLINE_S
-        while left := {name: pid for name, pid in self.nodes.items() if is_node(pid)}:
-            assert monotonic() < deadline, f"still there: {left}"
-            with_patience()
+        for name, pid in self.nodes.items():
+            assert not is_node(pid) or has_ended(pid, DEADLINE_S), f"{name} is still there"
 
 
-def with_patience() -> None:
-    """Let others run for a moment between two looks."""
-    signal.sigtimedwait([], _LOOK_S)
+def has_ended(pid: int, patience_s: float) -> bool:
+    """Wait for the end of a process that need not be a child; tell whether it has come."""
+    try:
+        handle = os.pidfd_open(pid)
+    except ProcessLookupError:
+        return True
+    try:
+        return bool(select([handle], [], [], patience_s)[0])
+    finally:
+        os.close(handle)
 
 
 @contextmanager
