@@ -1,0 +1,126 @@
+"""Two runs are the same only if every field is; what differs is told with its place."""
+
+from collections.abc import Callable
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sms_handover.analysis.equality import Difference, compare_runs
+from sms_handover.run_data import RunData
+from sms_handover.types import GraspStatus
+
+from .bag_messages import made_up_run
+
+ARRAYS = [item.name for item in fields(RunData) if isinstance(getattr(made_up_run(3), item.name), np.ndarray)]
+PER_ARM = ("target_pose", "tool_pose")
+TEXTS = ("joint_names", "arms", "phases", "grasp_events")
+
+
+@pytest.fixture
+def run() -> RunData:
+    return made_up_run()
+
+
+def changed(array: np.ndarray, row: int, change: Callable[[Any], Any]) -> np.ndarray:
+    """Return a copy of an array with the last entry of one row changed."""
+    copy = array.copy()
+    place = (row, -1) if copy.ndim == 2 else (row,)
+    copy[place] = change(copy[place])
+    return copy
+
+
+def test_every_field_is_covered() -> None:
+    assert {*ARRAYS, *PER_ARM, *TEXTS} == {item.name for item in fields(RunData)}
+
+
+def test_a_run_is_itself(run: RunData) -> None:
+    assert compare_runs(run, run) == ()
+    assert compare_runs(run, made_up_run()) == ()
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_one_bit_in_any_array_is_a_difference(run: RunData, name: str) -> None:
+    array = getattr(run, name)
+    row = array.shape[0] // 2
+    step: Callable[[Any], Any] = (
+        (lambda value: value + 1) if array.dtype == np.int64 else lambda value: np.nextafter(value, np.inf)
+    )
+    other = replace(run, **{name: changed(array, row, step)})
+    for differences in (compare_runs(run, other), compare_runs(other, run)):
+        (difference,) = differences
+        assert difference.field == name
+        assert f"1 of {array.shape[0]} rows, first row {row}, by " in difference.detail
+        assert str(difference) == f"{name}: {difference.detail}"
+
+
+@pytest.mark.parametrize("name", PER_ARM)
+@pytest.mark.parametrize("arm", ["arm_a", "arm_b"])
+def test_one_bit_in_the_poses_of_an_arm_is_a_difference(run: RunData, name: str, arm: str) -> None:
+    poses: Any = dict(getattr(run, name))
+    poses[arm] = changed(poses[arm], 1, lambda value: np.nextafter(value, -np.inf))
+    (difference,) = compare_runs(run, replace(run, **{name: poses}))
+    assert difference.field == f"{name}[{arm}]"
+    assert "first row 1" in difference.detail
+
+
+def test_an_arm_that_only_one_has_is_a_difference(run: RunData) -> None:
+    poses = {"arm_a": run.target_pose["arm_a"]}
+    expected = (Difference("target_pose[arm_b]", "only one of the runs has it"),)
+    assert compare_runs(run, replace(run, target_pose=poses)) == expected
+    assert compare_runs(replace(run, target_pose=poses), run) == expected
+
+
+def test_rows_and_size_of_a_difference_are_told(run: RunData) -> None:
+    position = run.joint_position.copy()
+    position[7, 3] += 0.5
+    position[9] += 0.25
+    (difference,) = compare_runs(run, replace(run, joint_position=position))
+    assert difference.detail == f"2 of {len(position)} rows, first row 7, by 0.5 at most"
+
+
+def test_a_run_that_is_shorter_is_a_difference(run: RunData) -> None:
+    (difference,) = compare_runs(run, replace(run, work=run.work[:-1]))
+    assert difference == Difference("work", f"shapes ({len(run.work)},) and ({len(run.work) - 1},)")
+
+
+def test_what_is_missing_in_both_is_the_same(run: RunData) -> None:
+    """NaN stands for what was not recorded; against a number it is a difference."""
+    with_nan = replace(run, joint_effort=changed(run.joint_effort, 4, lambda value: np.nan))
+    again = replace(run, joint_effort=changed(run.joint_effort, 4, lambda value: np.nan))
+    assert compare_runs(with_nan, again) == ()
+    for differences in (compare_runs(run, with_nan), compare_runs(with_nan, run)):
+        assert [difference.field for difference in differences] == ["joint_effort"]
+        assert "1 of" in differences[0].detail and "first row 4" in differences[0].detail
+
+
+def test_names_phases_and_events_count(run: RunData) -> None:
+    event = run.grasp_events[0]
+    others: dict[str, Any] = {
+        "joint_names": run.joint_names[::-1],
+        "arms": run.arms[::-1],
+        "phases": run.phases[:-1],
+        "grasp_events": (replace(event, status=GraspStatus.REJECTED), *run.grasp_events[1:]),
+    }
+    for name, value in others.items():
+        (difference,) = compare_runs(run, replace(run, **{name: value}))
+        assert difference.field == name
+    (difference,) = compare_runs(run, replace(run, phases=run.phases[:-1]))
+    assert difference.detail == f"{len(run.phases)} items and {len(run.phases) - 1} items"
+    (difference,) = compare_runs(run, replace(run, grasp_events=others["grasp_events"]))
+    assert difference.detail.startswith("item 0 is ")
+
+
+def test_events_without_errors_are_the_same_as_themselves(run: RunData) -> None:
+    event = replace(run.grasp_events[0], position_error=float("nan"))
+    one, other = (replace(run, grasp_events=(replace(event, position_error=float("nan")),)) for _ in range(2))
+    assert compare_runs(one, other) == ()
+
+
+def test_every_difference_is_told_in_the_order_of_the_fields(run: RunData) -> None:
+    differences = compare_runs(run, made_up_run(seed=1))
+    names = [item.name for item in fields(RunData)]
+    found = [names.index(difference.field.split("[")[0]) for difference in differences]
+    assert found == sorted(found)
+    assert len(found) > 10
