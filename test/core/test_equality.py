@@ -23,7 +23,7 @@ def run() -> RunData:
     return made_up_run()
 
 
-def changed(array: np.ndarray, row: int, change: Callable[[Any], Any]) -> np.ndarray:
+def changed(array: np.ndarray, row: int, change: Callable[[Any], Any]) -> Any:
     """Return a copy of an array with the last entry of one row changed."""
     copy = array.copy()
     place = (row, -1) if copy.ndim == 2 else (row,)
