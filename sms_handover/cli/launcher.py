@@ -28,7 +28,7 @@ from sms_handover.units import ns_to_seconds
 
 _POLL_S = 0.1  # [s] longest wait for a message before the processes are looked at again
 _START_PATIENCE_S = 60.0  # [s] of wall time until the run must have begun
-_BEGUN_PATIENCE_S = 2.0  # [s] of wall time for the news that the run has begun, when it is interrupted
+_BEGUN_PATIENCE_S = 10.0  # [s] of wall time for the news that the run has begun, when it is interrupted
 _STALL_PATIENCE_S = 30.0  # [s] of wall time without progress of simulated time
 _NEWS_PATIENCE_S = 20.0  # [s] of wall time for the news that the run is over, once the recorder has ended
 _DRAIN_PATIENCE_S = 60.0  # [s] of wall time for the recorder to finish
@@ -126,6 +126,7 @@ class _Watch:
         """
         self._wait_for_start()
         self._wait_for_end()
+        self._wait_for_events()
         code = self._wait_for_recorder() if self._plan.bag else EXIT_OK
         progress = self._monitor.progress
         self._show(last=True)
@@ -135,10 +136,12 @@ class _Watch:
         """Wait until every endpoint has matched and the plant has begun."""
         deadline = monotonic() + _START_PATIENCE_S
         interrupted = inf
+        asked = False
         while self._monitor.progress.state == RunState.WAITING:
             self._look()
             if self._interrupts:
                 interrupted = min(interrupted, monotonic())
+                asked = asked or self._monitor.ask_to_finish()  # it may run, and only the news be late
                 if self._interrupts > 1 or monotonic() - interrupted > _BEGUN_PATIENCE_S:
                     raise KeyboardInterrupt
             if monotonic() > deadline:
@@ -166,6 +169,12 @@ class _Watch:
                     f"no progress for {_STALL_PATIENCE_S:g} s at {ns_to_seconds(now_ns):g} s of simulated "
                     f"time: {self._monitor.waiting_for()}"
                 )
+
+    def _wait_for_events(self) -> None:
+        """Wait for the grasp events, which may come behind the news of the end."""
+        deadline = monotonic() + _NEWS_PATIENCE_S
+        while not self._monitor.heard_every_event and self._interrupts < 2 and monotonic() < deadline:
+            self._look()
 
     def _wait_for_recorder(self) -> int:
         """Wait until the recorder has everything and has closed the bag; return its exit code."""

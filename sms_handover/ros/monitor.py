@@ -11,7 +11,7 @@ from geometry_msgs.msg import PoseStamped
 from rclpy.node import Node
 from rclpy.qos import QoSHistoryPolicy, QoSProfile, QoSReliabilityPolicy
 from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
-from sms_handover_interfaces.msg import RunState, TaskPhase
+from sms_handover_interfaces.msg import PublishedCounts, RunState, TaskPhase
 from std_srvs.srv import Trigger
 
 from sms_handover.bag.decode import grasp_event, header_ns
@@ -20,6 +20,7 @@ from sms_handover.topics import (
     DIAGNOSTICS,
     GRASP_EVENT,
     PLANT,
+    RUN_PUBLISHED,
     RUN_STATE,
     TASK_PHASE,
     target_pose,
@@ -52,9 +53,11 @@ class RunMonitor:
         """Subscribe to what tells the progress of the run."""
         self.progress = Progress()
         self._targets: dict[str, PoseStamped] = {}
+        self._events_published: int | None = None
         self._finish = node.create_client(Trigger, f"{PLANT}/finish")
         node.create_subscription(RunState, RUN_STATE, self._on_state, LATCHED)
         node.create_subscription(GraspEventMessage, GRASP_EVENT, self._on_event, LATCHED)
+        node.create_subscription(PublishedCounts, RUN_PUBLISHED, self._on_counts, LATCHED)
         node.create_subscription(TaskPhase, TASK_PHASE, self._on_phase, _NEWEST)
         node.create_subscription(DiagnosticArray, DIAGNOSTICS, self._on_diagnostics, _NEWEST)
         for arm in arms:
@@ -66,6 +69,11 @@ class RunMonitor:
     def finished(self) -> bool:
         """Tell whether the plant has said that the run is over."""
         return self.progress.state in (RunState.FINISHED, RunState.FAILED)
+
+    @property
+    def heard_every_event(self) -> bool:
+        """Tell whether every grasp event has come that the plant says, at its end, it has published."""
+        return self._events_published is not None and len(self.progress.events) >= self._events_published
 
     def ask_to_finish(self) -> bool:
         """Ask the plant to end the run at the present tick; tell whether it could be asked."""
@@ -86,6 +94,11 @@ class RunMonitor:
 
     def _on_event(self, message: Any) -> None:
         self.progress.events.append(grasp_event(message))
+
+    def _on_counts(self, message: Any) -> None:
+        if message.node == PLANT:
+            counts = dict(zip(message.topics, message.counts, strict=False))
+            self._events_published = next((n for t, n in counts.items() if t.endswith(GRASP_EVENT)), 0)
 
     def _on_phase(self, message: Any) -> None:
         self.progress.phase = message.name
