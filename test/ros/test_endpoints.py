@@ -1,5 +1,6 @@
 """Endpoints count what goes out, know who is missing, and wait for readers that are behind."""
 
+from functools import partial
 from typing import Any
 
 import pytest
@@ -218,6 +219,22 @@ def test_a_stranger_does_not_stand_in_for_a_peer(bench: Bench) -> None:
         listen(node, FROM_PLANT)
         Endpoints(node, TOPICS, NODES).publisher(TO_PLANT.name)
     bench.until(lambda: plant.unmatched == [], "the peers")
+
+
+@pytest.mark.ros
+def test_a_peer_that_is_there_may_not_have_matched_yet(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only how many have matched is known, so the stranger is taken to have done so first."""
+    bench.start()
+    plant = Endpoints(bench.plain(PLANT), TOPICS, (PLANT, CONTROLLER))
+    publisher = plant.publisher(FROM_PLANT.name)
+    for name in (CONTROLLER, "stranger"):
+        listen(bench.plain(name), FROM_PLANT)
+    bench.until(lambda: publisher.subscription_count == 2 and plant.unmatched == [], "both")
+    missing = ["0 of 1 subscriptions of from_plant"]
+    for matched, expected in ((0, missing), (1, missing), (2, [])):
+        count = property(partial(lambda number, self: number, matched))
+        monkeypatch.setattr(CountedPublisher, "subscription_count", count)
+        assert plant.unmatched == expected
 
 
 @pytest.mark.ros

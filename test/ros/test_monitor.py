@@ -10,14 +10,22 @@ from geometry_msgs.msg import PoseStamped
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
-from sms_handover_interfaces.msg import RunState
+from sms_handover_interfaces.msg import PublishedCounts, RunState
 from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
 from std_srvs.srv import Trigger
 
 from sms_handover.ros.convert import event_message, header, phase_message, pose_stamped
 from sms_handover.ros.monitor import RunMonitor
 from sms_handover.ros.qos import LATCHED, LOSSLESS
-from sms_handover.topics import DIAGNOSTICS, GRASP_EVENT, RUN_STATE, TASK_PHASE, target_pose, tool_pose
+from sms_handover.topics import (
+    DIAGNOSTICS,
+    GRASP_EVENT,
+    RUN_PUBLISHED,
+    RUN_STATE,
+    TASK_PHASE,
+    target_pose,
+    tool_pose,
+)
 from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, Pose, TaskPhase
 
 from .bench import Bench
@@ -40,7 +48,7 @@ class FakeGraph:
 
     def say(self, topic: str, message: Any) -> None:
         """Publish a message, once there is somebody to hear it."""
-        profile = LATCHED if topic in (RUN_STATE, GRASP_EVENT) else LOSSLESS
+        profile = LATCHED if topic in (RUN_STATE, GRASP_EVENT, RUN_PUBLISHED) else LOSSLESS
         if topic not in self.publishers:
             self.publishers[topic] = self.node.create_publisher(type(message), topic, profile)
         publisher = self.publishers[topic]
@@ -119,6 +127,31 @@ def test_grasp_events_are_kept_in_order(graph: FakeGraph) -> None:
         graph.say(GRASP_EVENT, event_message(event))
     graph.bench.until(lambda: len(graph.monitor.progress.events) == 2, "the events")
     assert repr(graph.monitor.progress.events) == repr(events)
+
+
+def test_every_event_has_been_heard_when_the_plant_says_so(graph: FakeGraph) -> None:
+    """Messages of different topics arrive in any order: the counts of the end may come before the events."""
+    monitor = graph.monitor
+    assert not monitor.heard_every_event
+
+    def tell(node: str, count: int) -> None:
+        counts = PublishedCounts(node=node, topics=["/joint_states", f"/{GRASP_EVENT}"], counts=[7, count])
+        graph.say(RUN_PUBLISHED, counts)
+
+    tell("controller", 0)
+    graph.say(GRASP_EVENT, GraspEventMessage())
+    graph.bench.until(lambda: monitor.progress.events, "the first event")
+    assert not monitor.heard_every_event
+    tell("plant", 2)
+    graph.say(GRASP_EVENT, GraspEventMessage())
+    graph.bench.until(lambda: monitor.heard_every_event, "the second event and the counts")
+    assert len(monitor.progress.events) == 2
+
+
+def test_a_run_without_events_has_none_to_wait_for(graph: FakeGraph) -> None:
+    graph.say(RUN_PUBLISHED, PublishedCounts(node="plant", topics=["/joint_states"], counts=[7]))
+    graph.bench.until(lambda: graph.monitor.heard_every_event, "the counts")
+    assert graph.monitor.progress.events == []
 
 
 def test_tool_errors_are_distances_to_the_targets(graph: FakeGraph) -> None:
