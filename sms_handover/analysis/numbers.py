@@ -37,8 +37,21 @@ def angle_between(a: Array, b: Array) -> Array:
 
     2 atan2(|v|, |w|) of the relative quaternion (v, w): precise near zero, and the same for q and -q.
     """
+    return lengths(rotation_vectors(a, b))
+
+
+def rotation_vectors(a: Array, b: Array) -> Array:
+    """Return the rotation vectors (..., 3) in rad that turn ``a`` into ``b``, quaternions x y z w.
+
+    They are in the axes in which ``a`` and ``b`` are given, and no longer than pi: v/|v| times
+    2 atan2(|v|, |w|) of the quaternion (v, w) of b conj(a), precise near zero, and the same for q and -q.
+    """
     a_v, a_w, b_v, b_w = a[..., :3], a[..., 3:], b[..., :3], b[..., 3:]
-    vector = a_w * b_v - b_w * a_v - np.cross(a_v, b_v)
-    scalar = np.sum(a * b, axis=-1)
-    result: Array = 2.0 * np.arctan2(lengths(vector), np.abs(scalar))
+    vector = a_w * b_v - b_w * a_v + np.cross(a_v, b_v)
+    scalar = np.sum(a * b, axis=-1, keepdims=True)
+    length = lengths(vector)[..., np.newaxis]
+    angle = 2.0 * np.arctan2(length, np.abs(scalar))
+    # where |v| is too small to divide by, the angle is 2 |v|
+    factor = np.divide(angle, length, out=np.full(length.shape, 2.0), where=length > 0.0)
+    result: Array = np.where(scalar < 0.0, -factor, factor) * vector
     return result

@@ -6,6 +6,7 @@ from math import nan
 import numpy as np
 
 from sms_handover.analysis.numbers import largest, lengths
+from sms_handover.analysis.signals import energy_residual
 from sms_handover.run_data import RunData
 from sms_handover.types import IkStatus
 
@@ -38,14 +39,11 @@ class IkOutcomes:
 
 def physics_residuals(run: RunData) -> PhysicsResiduals:
     """Return how far momenta and energy were from what they must be."""
-    energy, work = run.kinetic_energy, run.work
-    known = np.flatnonzero(~np.isnan(energy) & ~np.isnan(work))
-    error = (energy - work) - (energy - work)[known[:1]] if known.size else energy
-    peak = largest(energy)
+    peak = largest(run.kinetic_energy)
     return PhysicsResiduals(
         linear_momentum=largest(lengths(run.linear_momentum)),
         angular_momentum=largest(lengths(run.angular_momentum)),
-        energy=largest(np.abs(error)) / peak if peak > 0.0 else nan,
+        energy=largest(np.abs(energy_residual(run).values)) / peak if peak > 0.0 else nan,
         peak_kinetic_energy=peak,
     )
 
