@@ -27,7 +27,7 @@ FOUNDATION_MODULES = {
     "run_data",
 }
 MIDDLE = {"plant", "trajectory", "ik", "control"}
-CORE = {"model", *MIDDLE, "simulation", "bag", "analysis"}
+CORE = {"model", *MIDDLE, "simulation", "bag", "analysis", "scene"}
 EDGE = {"ros", "nodes", "cli"}
 
 # What a layer may import besides itself and the foundation.
@@ -38,6 +38,7 @@ ALLOWED: dict[str, set[str]] = {
     "simulation": {"model", *MIDDLE},
     "bag": {"model", "simulation"},
     "analysis": {"model", "simulation"},
+    "scene": {"model", "bag"},
     "ros": CORE,
     "nodes": CORE | {"ros"},
     "cli": CORE | {"ros", "nodes"},

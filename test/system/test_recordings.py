@@ -6,6 +6,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pinocchio as pin
 import pytest
 import yaml
 from mcap.reader import make_reader
@@ -15,9 +17,13 @@ from rosbags.highlevel import AnyReader
 from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.reader import read_run
 from sms_handover.bag.writer import BagWriter
+from sms_handover.frames import WORLD
+from sms_handover.model.poses import pose_distance, pose_of
 from sms_handover.run_data import RunData
+from sms_handover.scene.read import read_scene
 from sms_handover.simulation.scenario import load_robot_model, load_scenario
 from sms_handover.topics import LOOP_NODES, NODES, Rate, graph_topics
+from sms_handover.types import Pose
 
 from .conftest import LAWS, TICKS
 from .runs import Ended, sms_handover
@@ -174,3 +180,29 @@ def test_real_time_ends_and_tells_how_it_kept_time(schedule: Path, tmp_path: Pat
     assert info.topics["/loop_timing"].message_count > 0
     assert info.topics["/joint_states"].message_count == 1501
     assert info.parameters["plant"]["mode"] == "realtime"
+
+
+def test_the_transforms_in_the_bag_put_every_link_where_the_scene_has_it(bag: Path) -> None:
+    """/tf was written while the run went on, the scene is computed anew from description and state."""
+    scene = read_scene(bag)
+    rows = {int(stamp_ns): row for row, stamp_ns in enumerate(scene.stamp_ns)}
+    seen = set()
+    with AnyReader([bag]) as reader:
+        for connection, log_ns, data in reader.messages([c for c in reader.connections if c.topic == "/tf"]):
+            if log_ns in rows:
+                in_world = chained(reader.deserialize(data, connection.msgtype))
+                for place, link in enumerate(scene.links):
+                    row = scene.link_in_world[rows[log_ns], place]
+                    assert max(pose_distance(Pose(row[:3], row[3:]), in_world[link])) < 1e-9, link
+                seen.add(log_ns)
+    assert seen == set(rows)
+
+
+def chained(message: Any) -> dict[str, Pose]:
+    """Return the pose in ``world`` of every frame of one message; parents stand before their children."""
+    in_world = {WORLD: pin.SE3.Identity()}
+    for item in message.transforms:
+        at, turn = item.transform.translation, item.transform.rotation
+        relative = pin.SE3(pin.Quaternion(turn.w, turn.x, turn.y, turn.z), np.array([at.x, at.y, at.z]))
+        in_world[item.child_frame_id] = in_world[item.header.frame_id] * relative
+    return {name: pose_of(pose) for name, pose in in_world.items()}

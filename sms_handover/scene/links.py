@@ -1,0 +1,47 @@
+"""Where every link of a described robot is, frame by frame."""
+
+import numpy as np
+import pinocchio as pin
+
+from sms_handover.errors import RobotDescriptionError, UnknownNameError
+from sms_handover.model.poses import pose_of, pose_row
+from sms_handover.model.robot_model import BASE_NQ
+from sms_handover.types import Array
+
+
+class DescribedRobot:
+    """A floating robot read from URDF text alone, as a bag carries it."""
+
+    def __init__(self, urdf: str) -> None:
+        """Read the text; raises RobotDescriptionError if it describes no robot."""
+        try:
+            self.pin = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
+        except (ValueError, RuntimeError) as error:
+            raise RobotDescriptionError(f"the robot description cannot be read: {error}") from error
+        self._frames = [i for i, f in enumerate(self.pin.frames) if f.type == pin.FrameType.BODY]
+        self.links: tuple[str, ...] = tuple(self.pin.frames[index].name for index in self._frames)
+
+    def poses(self, base_in_world: Array, joint_position: Array, joint_names: tuple[str, ...]) -> Array:
+        """Return the pose in ``world`` of every link, (T, L, 7) in the order of ``links``.
+
+        ``base_in_world`` is (T, 7) and ``joint_position`` (T, n) rad in the order of ``joint_names``.
+        Raises UnknownNameError if the description lacks one of them.
+        """
+        columns = [self._configuration_index(name) for name in joint_names]
+        q = pin.neutral(self.pin)
+        data = self.pin.createData()
+        poses = np.empty((len(base_in_world), len(self._frames), 7))
+        for row, (base, joints) in enumerate(zip(base_in_world, joint_position, strict=True)):
+            q[:BASE_NQ] = base
+            q[columns] = joints
+            pin.framesForwardKinematics(self.pin, data, q)
+            for place, index in enumerate(self._frames):
+                poses[row, place] = pose_row(pose_of(data.oMf[index]))
+        return poses
+
+    def _configuration_index(self, joint: str) -> int:
+        """Return where a joint's angle lies in the configuration."""
+        names = tuple(self.pin.names[2:])  # after Pinocchio's universe and the floating joint
+        if joint not in names:
+            raise UnknownNameError("joint", joint, names, "robot description")
+        return int(self.pin.joints[self.pin.getJointId(joint)].idx_q)

@@ -1,0 +1,53 @@
+"""The shapes that a robot description draws, each in the frame of its link."""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import pinocchio as pin
+
+from sms_handover.errors import RobotDescriptionError
+from sms_handover.model.poses import pose_of
+from sms_handover.types import Pose
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """One solid: a box with ``size`` its edges (x, y, z) m, or a cylinder along z with (radius, length) m.
+
+    Both are centred on ``pose_in_link``; ``rgba`` has red, green, blue and opacity from 0 to 1.
+    """
+
+    link: str
+    kind: Literal["box", "cylinder"]
+    size: tuple[float, ...]
+    pose_in_link: Pose
+    rgba: tuple[float, float, float, float]
+
+
+def read_shapes(model: pin.Model, urdf: str) -> tuple[Shape, ...]:
+    """Return the visual shapes of a description; ``model`` is Pinocchio's reading of the same text.
+
+    Raises RobotDescriptionError on a shape that is neither a box nor a cylinder.
+    """
+    drawn = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.VISUAL)
+    return tuple(_shape(model, item) for item in drawn.geometryObjects)
+
+
+def _shape(model: pin.Model, item: Any) -> Shape:
+    """Return one of Pinocchio's geometry objects, which it places in the joint above the link."""
+    frame = model.frames[item.parentFrame]
+    pose_in_link = pose_of(frame.placement.actInv(item.placement))
+    red, green, blue, opacity = (float(part) for part in item.meshColor)
+    rgba = (red, green, blue, opacity)
+    solid = item.geometry
+    name = type(solid).__name__
+    if name == "Box":
+        return Shape(
+            frame.name, "box", tuple(2.0 * float(half) for half in solid.halfSide), pose_in_link, rgba
+        )
+    if name == "Cylinder":
+        size = (float(solid.radius), 2.0 * float(solid.halfLength))
+        return Shape(frame.name, "cylinder", size, pose_in_link, rgba)
+    raise RobotDescriptionError(
+        f"link {frame.name!r} is drawn as a {name}, only boxes and cylinders can be shown"
+    )
