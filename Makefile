@@ -13,7 +13,7 @@ TYPED := setup.py interfaces/setup.py sms_handover test $(wildcard benchmarks/*.
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover simulate test verify measure lint install colcon clean
+.PHONY: help handover simulate test verify measure bench lint install colcon clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -40,6 +40,9 @@ verify: $(VENV)/.verify  ## measure against independent answers, break every law
 measure: $(VENV)/.verify  ## the measurements of verify alone: nothing is broken, no report is written
 	@mkdir -p $(MEASURED)
 	$(MEASURE)
+
+bench: $(VENV)/.bench  ## measure how long things take, against other engines too; write docs/performance.md
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.performance
 
 lint: $(VENV)/.test  ## check style and types
 	$(BIN)/ruff check
@@ -80,4 +83,8 @@ $(VENV)/.test: $(VENV)/.package
 
 $(VENV)/.verify: $(VENV)/.test
 	$(PIP) --editable '.[test,verify]'
+	@touch $@
+
+$(VENV)/.bench: $(VENV)/.verify
+	$(PIP) --editable '.[test,verify,bench]'
 	@touch $@

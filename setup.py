@@ -88,6 +88,11 @@ setup(
             "mink>=1.3,<2",
             "mujoco>=4.0,<5",
         ],
+        "bench": [  # what the benchmarks compare with, beyond verify
+            "drake>=1.51,<2",
+            "matplotlib>=3.10,<4",
+            "pin-pink>=4.4,<5",
+        ],
     },
     zip_safe=False,
     entry_points={"console_scripts": console_scripts()},
