@@ -1,5 +1,6 @@
 """Find the files of a bag and go through their messages in the order they were recorded."""
 
+import shlex
 import struct
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
@@ -8,13 +9,17 @@ from typing import NamedTuple
 
 import zstandard
 from mcap.exceptions import McapError
-from mcap.records import Channel, Message, Schema
-from mcap.stream_reader import StreamReader
 
+from sms_handover.bag.damage import Damage
+from sms_handover.bag.frames import MAGIC
+from sms_handover.bag.scan import FileScan, ScannedMessage
 from sms_handover.errors import BagError
 
-MAGIC = b"\x89MCAP0\r\n"  # the first and the last bytes of a complete file
-
+_CONVERSIONS = {  # by the end of a file's name, what a user can do
+    ".db3": "'rosbags-convert --src {folder} --dst NEW --dst-storage mcap' makes one of it",
+    ".bag": "'rosbags-convert --src {file} --dst NEW --dst-storage mcap' makes one of it",
+    ".zstd": "'zstd -d' makes one of each file",
+}
 _DAMAGE = (McapError, zstandard.ZstdError, struct.error, ValueError, KeyError, RuntimeError, MemoryError)
 
 
@@ -33,26 +38,52 @@ def bag_files(path: Path) -> tuple[Path, ...]:
 
     A bag that rosbag2 has split has several, ``<name>_0.mcap``, ``<name>_1.mcap`` and so on.
     """
+    files = files_of(path)
+    for file in files:
+        _check_ends(file, path)
+    return files
+
+
+def files_of(path: Path) -> tuple[Path, ...]:
+    """Return the MCAP files of a bag in the order of their numbers, whatever is in them.
+
+    Raises BagError if there are none, or those of several bags.
+    """
     if not path.exists():
         raise BagError(f"there is no bag at {path}")
-    files = (path,) if path.is_file() else tuple(sorted(path.glob("*.mcap"), key=_name_and_number))
+    try:
+        files = (path,) if path.is_file() else tuple(sorted(path.glob("*.mcap"), key=_name_and_number))
+        others = () if files or path.is_file() else tuple(sorted(path.iterdir()))
+    except OSError as error:
+        raise BagError(f"cannot read {path}: {error.strerror}") from error
     if len({_name_and_number(file)[0] for file in files}) > 1:
         raise BagError(f"{path} holds several bags, choose one: {', '.join(file.name for file in files)}")
+    for file in (*files, *others):
+        if file.suffix in _CONVERSIONS:
+            remedy = _CONVERSIONS[file.suffix].format(folder=shlex.quote(str(path)), file=file)
+            raise BagError(f"{path} is not a bag: it holds {file.name}, only .mcap files are read; {remedy}")
     if not files:
-        other = next((file.name for file in sorted(path.iterdir()) if file.suffix in {".db3", ".zstd"}), None)
-        reason = (
-            f"it holds {other}, only uncompressed .mcap files are read" if other else "no .mcap file in it"
-        )
-        raise BagError(f"{path} is not a bag: {reason}")
-    for file in files:
-        _check_ends(file)
+        raise BagError(f"{path} is not a bag: no .mcap file in it")
     return files
 
 
 def read_messages(path: Path, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
-    """Yield the messages of a bag in recorded order, of ``topics`` or of all; checks every checksum."""
+    """Yield the messages of a bag in recorded order, of ``topics`` or of all; checks every checksum.
+
+    Raises BagError at the first damage.
+    """
     for file in bag_files(path):
-        yield from _file_messages(file, topics)
+        with damage_reported(file):
+            for found in FileScan(file):
+                if isinstance(found, ScannedMessage):
+                    source = found.source
+                    if topics is None or source.topic in topics:
+                        yield RawMessage(source.topic, source.schema.name, *found[1:4])
+                elif isinstance(found, Damage) and not found.of_index:
+                    raise BagError(
+                        f"{file} is damaged: bytes {found.begin} to {found.end}: {found.reason}; "
+                        f"{recover_hint(path)}"
+                    )
 
 
 @contextmanager
@@ -67,21 +98,9 @@ def damage_reported(file: Path) -> Iterator[None]:
         raise BagError(f"{file} is damaged: {reason}") from error
 
 
-def _file_messages(file: Path, topics: Collection[str] | None) -> Iterator[RawMessage]:
-    """Yield the messages of one file."""
-    schemas: dict[int, str] = {0: ""}
-    channels: dict[int, tuple[str, str]] = {}
-    with damage_reported(file), file.open("rb") as stream:
-        size = file.stat().st_size
-        for record in StreamReader(stream, validate_crcs=True, record_size_limit=size).records:
-            if isinstance(record, Message):
-                channel = channels.get(record.channel_id)
-                if channel is not None:
-                    yield RawMessage(*channel, record.data, record.log_time, record.publish_time)
-            elif isinstance(record, Schema):
-                schemas[record.id] = record.name
-            elif isinstance(record, Channel) and (topics is None or record.topic in topics):
-                channels[record.id] = (record.topic, schemas[record.schema_id])
+def recover_hint(path: Path) -> str:
+    """Return what a user can do about a damaged bag."""
+    return f"'sms-handover bag recover {shlex.quote(str(path))}' makes a new bag of what can be read"
 
 
 def _name_and_number(file: Path) -> tuple[str, int]:
@@ -90,8 +109,8 @@ def _name_and_number(file: Path) -> tuple[str, int]:
     return (name, int(number)) if number.isdecimal() else (file.stem, -1)
 
 
-def _check_ends(file: Path) -> None:
-    """Raise BagError unless a file begins and ends as a complete MCAP file does."""
+def _check_ends(file: Path, bag: Path) -> None:
+    """Raise BagError unless a file of a bag begins and ends as a complete MCAP file does."""
     with damage_reported(file), file.open("rb") as stream:
         size = file.stat().st_size
         head = stream.read(len(MAGIC))
@@ -104,5 +123,5 @@ def _check_ends(file: Path) -> None:
     if tail != MAGIC or size == len(MAGIC):
         raise BagError(
             f"{file} was not closed: it has {size} bytes and no end, so the recorder was killed, the disk was"
-            " full or the file was cut; what was recorded so far has to be recovered first"
+            f" full or the file was cut; {recover_hint(bag)}"
         )

@@ -7,9 +7,21 @@ from dataclasses import asdict, dataclass
 from sms_handover.errors import BagError
 from sms_handover.units import NS_PER_S
 
-_HEADING = ("topic", "received", "published", "missing", "twice", "late", "rate [Hz]", "largest gap [ms]")
+_HEADING = (
+    "topic",
+    "received",
+    "published",
+    "missing",
+    "twice",
+    "late",
+    "first [s]",
+    "last [s]",
+    "rate [Hz]",
+    "largest gap [ms]",
+)
 
-LEDGER_RECORD = "sms_handover.ledger"  # name of the metadata record in the bag
+LEDGER_RECORD = "sms_handover.ledger"  # names of metadata records in the bag: the whole account, and
+PERIODS_RECORD = "sms_handover.periods"  # before any message the step of the stamps in ns by topic
 
 
 @dataclass(frozen=True)
@@ -94,9 +106,16 @@ def _row(topic: TopicLedger) -> tuple[str, ...]:
         str(topic.missing) if topic.period_ns else "-",
         str(topic.duplicates),
         str(topic.out_of_order),
+        _seconds(topic.first_ns),
+        _seconds(topic.last_ns),
         "-" if topic.rate is None else f"{topic.rate:.1f}",
         "-" if topic.rate is None else f"{topic.largest_gap_ns / 1e6:.3f}",
     )
+
+
+def _seconds(stamp_ns: int | None) -> str:
+    """Return a stamp in s."""
+    return "-" if stamp_ns is None else f"{stamp_ns / NS_PER_S:.3f}"
 
 
 def _without_name(topic: TopicLedger) -> dict[str, object]:

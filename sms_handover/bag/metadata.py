@@ -1,12 +1,10 @@
 """The description of a bag that rosbag2 keeps in ``metadata.yaml`` and inside the file, version 9."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import yaml
-
-from sms_handover.bag.qos import Qos
 
 METADATA_FILE = "metadata.yaml"
 ROSBAG2_KEY = "rosbag2_bagfile_information"
@@ -16,12 +14,13 @@ _ROS_DISTRO = "jazzy"
 
 @dataclass(frozen=True)
 class TopicCount:
-    """One topic of a bag and how many messages it holds."""
+    """One topic of a bag and how many messages it holds; ``qos`` are the profiles as rosbag2 writes them."""
 
     name: str
     type: str
+    encoding: str
     type_hash: str
-    qos: tuple[Qos, ...]
+    qos: Sequence[Mapping[str, object]]
     message_count: int
 
 
@@ -48,9 +47,9 @@ def to_yaml(value: object) -> str:
     return str(yaml.safe_dump(value, sort_keys=False, default_flow_style=False, allow_unicode=True))
 
 
-def qos_text(profiles: Sequence[Qos]) -> str:
+def qos_text(profiles: Sequence[Mapping[str, object]]) -> str:
     """Return the YAML list that a channel carries as ``offered_qos_profiles``."""
-    return to_yaml([profile.to_rosbag2() for profile in profiles]).strip() if profiles else ""
+    return to_yaml([dict(profile) for profile in profiles]).strip() if profiles else ""
 
 
 def _span(start_ns: int, end_ns: int, topics: Sequence[TopicCount]) -> dict[str, Any]:
@@ -68,8 +67,8 @@ def _topic_information(topic: TopicCount) -> dict[str, Any]:
         "topic_metadata": {
             "name": topic.name,
             "type": topic.type,
-            "serialization_format": "cdr",
-            "offered_qos_profiles": [profile.to_rosbag2() for profile in topic.qos],
+            "serialization_format": topic.encoding,
+            "offered_qos_profiles": [dict(profile) for profile in topic.qos],
             "type_description_hash": topic.type_hash,
         },
         "message_count": topic.message_count,

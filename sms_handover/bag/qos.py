@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from enum import Enum
 
+from rosbags.rosbag2.errors import ReaderError
+from rosbags.rosbag2.metadata import dump_qos_v9, parse_qos
+
 
 class Reliability(Enum):
     """Whether a lost sample is sent again."""
@@ -48,6 +51,17 @@ class Qos:
             "liveliness_lease_duration": _infinite(),
             "avoid_ros_namespace_conventions": False,
         }
+
+
+def profiles_of(text: str) -> list[dict[str, object]]:
+    """Return the profiles in the YAML text of a channel, of any version of rosbag2, as version 9 has them.
+
+    None, if the text is not readable: a profile is no reason to refuse a bag.
+    """
+    try:
+        return [dict(profile) for profile in dump_qos_v9(parse_qos(text))]
+    except (ReaderError, LookupError, TypeError, AttributeError):
+        return []
 
 
 def _infinite() -> dict[str, int]:

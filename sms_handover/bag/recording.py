@@ -7,7 +7,7 @@ from types import TracebackType
 
 from sms_handover.bag.contents import PARAMETERS_FILE, ROBOT_FILE, SCHEDULE_FILE, parameters_json
 from sms_handover.bag.counting import LedgerKeeper
-from sms_handover.bag.ledger import LEDGER_RECORD, Ledger
+from sms_handover.bag.ledger import LEDGER_RECORD, PERIODS_RECORD, Ledger
 from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.provenance import PROVENANCE_RECORD
 from sms_handover.bag.qos import Qos
@@ -35,6 +35,7 @@ class Recording:
         self._keeper = LedgerKeeper()
         self._stamped: dict[str, bool] = {}
         self._reports: set[str] = set()
+        self._periods: dict[str, str] = {}  # [ns] as texts, by topic
         self._now_ns = 0
 
     def __enter__(self) -> "Recording":
@@ -69,6 +70,7 @@ class Recording:
         self.writer.add_topic(name, type_name, qos)
         self._keeper.add_topic(name, period_ns)
         self._stamped[name] = self._types.stamped(type_name)
+        self._periods[name] = str(period_ns)
         if type_name == PUBLISHED_COUNTS:
             self._reports.add(name)
 
@@ -92,6 +94,10 @@ class Recording:
             self.writer.attach(PARAMETERS_FILE, "application/json", parameters_json(parameters).encode())
         if provenance is not None:
             self.writer.record(PROVENANCE_RECORD, provenance)
+
+    def begin(self) -> None:
+        """Tell in the bag what is to come on the topics opened so far, for a recovery to hold it against."""
+        self.writer.record(PERIODS_RECORD, self._periods)
 
     def receive(self, topic: str, data: bytes, wall_ns: int) -> None:
         """Record the CDR bytes of one message that arrived at ``wall_ns``."""

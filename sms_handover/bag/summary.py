@@ -3,9 +3,10 @@
 from pathlib import Path
 
 from mcap.reader import McapReader
-from mcap.records import Channel, Message, Schema, Statistics
-from mcap.stream_reader import StreamReader
+from mcap.records import Channel, Statistics
 from mcap.summary import Summary
+
+from sms_handover.bag.scan import FileScan, ScannedMessage, Source
 
 
 def file_summary(reader: McapReader, file: Path) -> tuple[Summary, Statistics]:
@@ -19,18 +20,27 @@ def file_summary(reader: McapReader, file: Path) -> tuple[Summary, Statistics]:
 def _scan(file: Path) -> tuple[Summary, Statistics]:
     """Return the summary of all records of a file."""
     summary = Summary()
+    numbers: dict[Source, int] = {}
     counts: dict[int, int] = {}
     start_ns, end_ns = None, 0
-    with file.open("rb") as stream:
-        for record in StreamReader(stream, record_size_limit=file.stat().st_size).records:
-            if isinstance(record, Message):
-                counts[record.channel_id] = counts.get(record.channel_id, 0) + 1
-                start_ns = record.log_time if start_ns is None else min(start_ns, record.log_time)
-                end_ns = max(end_ns, record.log_time)
-            elif isinstance(record, Schema):
-                summary.schemas[record.id] = record
-            elif isinstance(record, Channel):
-                summary.channels[record.id] = record
+
+    def number_of(source: Source) -> int:
+        if source not in numbers:
+            numbers[source] = channel = len(numbers) + 1
+            summary.schemas[channel] = source.schema
+            summary.channels[channel] = Channel(
+                channel, source.topic, source.encoding, dict(source.metadata), channel
+            )
+        return numbers[source]
+
+    for found in FileScan(file):
+        if isinstance(found, Source):
+            number_of(found)
+        elif isinstance(found, ScannedMessage):
+            channel = number_of(found.source)
+            counts[channel] = counts.get(channel, 0) + 1
+            start_ns = found.log_time_ns if start_ns is None else min(start_ns, found.log_time_ns)
+            end_ns = max(end_ns, found.log_time_ns)
     return summary, Statistics(
         attachment_count=0,
         channel_count=len(summary.channels),

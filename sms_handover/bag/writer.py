@@ -7,14 +7,16 @@
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from errno import ENOENT
 from io import BufferedWriter
 from pathlib import Path
 from types import TracebackType
 
+from mcap.records import Schema as McapSchema
 from mcap.writer import CompressionType, Writer
 
-from sms_handover.bag.message_types import MessageTypes, Schema
+from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.metadata import (
     METADATA_FILE,
     ROSBAG2_KEY,
@@ -23,7 +25,8 @@ from sms_handover.bag.metadata import (
     qos_text,
     to_yaml,
 )
-from sms_handover.bag.qos import Qos
+from sms_handover.bag.qos import Qos, profiles_of
+from sms_handover.bag.scan import Source
 from sms_handover.errors import BagError
 
 CHUNK_SIZE = 64 * 1024  # [byte] of uncompressed messages held back at most
@@ -38,8 +41,11 @@ _ROSBAG2_RECORD = "rosbag2"
 class _Topic:
     """An open channel; ``count`` grows with each message."""
 
-    schema: Schema
-    qos: tuple[Qos, ...]
+    name: str
+    type: str
+    encoding: str
+    type_hash: str
+    qos: Sequence[Mapping[str, object]]
     channel: int
     count: int = 0
 
@@ -64,11 +70,12 @@ class BagWriter:
         self._start_ns: int | None = None
         self._end_ns = 0
         self._topics: dict[str, _Topic] = {}
-        self._schemas: dict[str, int] = {}
+        self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._closed = False
         self._writable = True
         self._failure: BagError | None = None
         self._stream = _create(self.folder, self.path)
+        self._handle = os.open(self.folder, os.O_RDONLY)  # finds the folder even if it is moved
         self._mcap = Writer(self._stream, chunk_size=chunk_size, compression=CompressionType.ZSTD)
         try:
             with self._reported():
@@ -76,7 +83,7 @@ class BagWriter:
                 self._describe()  # a file that is never closed still tells how its QoS texts are to be read
                 self._stream.flush()
         except BagError:
-            self._discard()
+            self.abandon()
             raise
 
     def __enter__(self) -> "BagWriter":
@@ -112,23 +119,27 @@ class BagWriter:
         if name in self._topics:
             raise BagError(f"topic {name!r} is recorded into {self.folder} already")
         schema = self.types.schema(type_name)
-        if type_name not in self._schemas:
-            self._schemas[type_name] = self._mcap.register_schema(type_name, "ros2msg", schema.text.encode())
-        channel = self._mcap.register_channel(
-            name,
-            "cdr",
-            self._schemas[type_name],
-            {"offered_qos_profiles": qos_text(qos), "topic_type_hash": schema.type_hash},
-        )
-        self._topics[name] = _Topic(schema, tuple(qos), channel)
+        profiles = [profile.to_rosbag2() for profile in qos]
+        metadata = {"offered_qos_profiles": qos_text(profiles), "topic_type_hash": schema.type_hash}
+        content = McapSchema(id=0, name=type_name, encoding="ros2msg", data=schema.text.encode())
+        self._open(name, Source(name, "cdr", content, metadata), profiles)
 
-    def write(self, topic: str, data: bytes, log_time_ns: int, publish_time_ns: int) -> None:
+    def add_source(self, key: str, source: Source) -> None:
+        """Open a topic as it was in another bag; messages are then written to it by ``key``."""
+        self._require_open()
+        profiles = profiles_of(source.metadata.get("offered_qos_profiles", ""))
+        metadata = {**source.metadata, "offered_qos_profiles": qos_text(profiles)}
+        self._open(key, replace(source, metadata=metadata), profiles)
+
+    def write(
+        self, topic: str, data: bytes, log_time_ns: int, publish_time_ns: int, sequence: int = 0
+    ) -> None:
         """Append the CDR bytes of one message; the topic must have been added."""
         entry = self._topics.get(topic)
         if not self._writable or entry is None or log_time_ns < 0 or publish_time_ns < 0:
             raise self._refusal(topic)
         try:
-            self._mcap.add_message(entry.channel, log_time_ns, data, publish_time_ns)
+            self._mcap.add_message(entry.channel, log_time_ns, data, publish_time_ns, sequence)
         except OSError as error:
             raise self._failed(error) from error
         entry.count += 1
@@ -140,17 +151,29 @@ class BagWriter:
             self.flush()
 
     def flush(self) -> None:
-        """Hand everything written so far to the operating system; call it also when no messages come."""
+        """Hand everything written so far to the operating system; call it also when no messages come.
+
+        Raises BagError if the disk refuses, or if the file has been deleted meanwhile.
+        """
         self._require_open()
         self._flushed_ns = self._end_ns
         with self._reported():
             self._mcap.flush()  # type: ignore[no-untyped-call]
+            self._require_there()
 
-    def attach(self, name: str, media_type: str, content: bytes, wall_time_ns: int = 0) -> None:
+    def attach(
+        self,
+        name: str,
+        media_type: str,
+        content: bytes,
+        log_time_ns: int = 0,
+        create_time_ns: int | None = None,
+    ) -> None:
         """Store a whole file in the bag, e.g. ``robot.urdf``."""
         self._require_open()
+        created_ns = log_time_ns if create_time_ns is None else create_time_ns
         with self._reported():
-            self._mcap.add_attachment(wall_time_ns, wall_time_ns, name, media_type, content)
+            self._mcap.add_attachment(created_ns, log_time_ns, name, media_type, content)
 
     def record(self, name: str, values: Mapping[str, str]) -> None:
         """Store a metadata record: a name with keys and texts."""
@@ -161,6 +184,8 @@ class BagWriter:
     def close(self) -> None:
         """Complete the bag and wait until it is on the disk; a second call does nothing.
 
+        A folder that has been moved meanwhile gets its ``metadata.yaml`` where it is now.
+
         After a failure of the disk the file is left as it is, without an end that would claim
         that it is complete, and BagError is raised.
         """
@@ -170,16 +195,53 @@ class BagWriter:
         if self._failure is not None:
             with suppress(OSError):
                 self._stream.close()
+            os.close(self._handle)
             raise self._failure
-        with self._reported():
-            with self._stream as stream:
-                self._mcap.flush()  # type: ignore[no-untyped-call]
-                self._describe()
-                self._mcap.finish()  # type: ignore[no-untyped-call]
-                stream.flush()
-                os.fsync(stream.fileno())
-            _write_synced(self.folder / METADATA_FILE, to_yaml({ROSBAG2_KEY: self._information()}))
-            _sync_folder(self.folder)
+        try:
+            with self._reported():
+                with self._stream as stream:
+                    self._mcap.flush()  # type: ignore[no-untyped-call]
+                    self._require_there()
+                    self._describe()
+                    self._mcap.finish()  # type: ignore[no-untyped-call]
+                    stream.flush()
+                    os.fsync(stream.fileno())
+                _write_synced(self._handle, METADATA_FILE, to_yaml({ROSBAG2_KEY: self._information()}))
+                with suppress(OSError):  # not every file system can wait for the names in a folder
+                    os.fsync(self._handle)
+        finally:
+            os.close(self._handle)
+
+    def abandon(self) -> None:
+        """Remove a bag that is not worth keeping."""
+        if not self._closed:
+            self._closed, self._writable = True, False
+            with suppress(OSError):
+                self._stream.close()
+            os.close(self._handle)
+        for file in (self.path, self.folder / METADATA_FILE):
+            file.unlink(missing_ok=True)
+        with suppress(OSError):
+            self.folder.rmdir()
+
+    def _open(self, key: str, source: Source, profiles: Sequence[Mapping[str, object]]) -> None:
+        """Open a channel, and its schema unless another channel has the same."""
+        schema = source.schema
+        same = (schema.name, schema.encoding, schema.data)
+        if same not in self._schemas:
+            self._schemas[same] = self._mcap.register_schema(*same) if schema.name else 0
+        channel = self._mcap.register_channel(
+            source.topic, source.encoding, self._schemas[same], dict(source.metadata)
+        )
+        type_hash = source.metadata.get("topic_type_hash", "")
+        self._topics[key] = _Topic(
+            source.topic, schema.name, source.encoding, type_hash, tuple(profiles), channel
+        )
+
+    def _require_there(self) -> None:
+        """Raise OSError if the file has been deleted: what is written to it would be gone with it."""
+        if os.fstat(self._stream.fileno()).st_nlink == 0:
+            raise FileNotFoundError(ENOENT, "it was deleted while it was being written")
 
     def _describe(self) -> None:
         """Write the record from which rosbag2 reads the metadata if ``metadata.yaml`` is lost."""
@@ -188,8 +250,8 @@ class BagWriter:
     def _information(self) -> dict[str, object]:
         """Return the metadata of what has been written so far."""
         topics = [
-            TopicCount(name, topic.schema.type, topic.schema.type_hash, topic.qos, topic.count)
-            for name, topic in self._topics.items()
+            TopicCount(topic.name, topic.type, topic.encoding, topic.type_hash, topic.qos, topic.count)
+            for topic in self._topics.values()
         ]
         start_ns = 0 if self._start_ns is None else self._start_ns
         return bag_information(self.path.name, start_ns, max(start_ns, self._end_ns), topics)
@@ -221,15 +283,6 @@ class BagWriter:
         self._failure = BagError(f"cannot write the recording {self.path}: {error.strerror}")
         return self._failure
 
-    def _discard(self) -> None:
-        """Remove a bag that could not even be begun."""
-        self._closed = True
-        with suppress(OSError):
-            self._stream.close()
-        with suppress(OSError):
-            self.path.unlink()
-            self.folder.rmdir()
-
 
 def _create(folder: Path, path: Path) -> BufferedWriter:
     """Create the folder, which must not exist, and open the file in it."""
@@ -250,19 +303,10 @@ def _create(folder: Path, path: Path) -> BufferedWriter:
         raise BagError(f"cannot create the recording {path}: {error.strerror}") from error
 
 
-def _write_synced(path: Path, text: str) -> None:
-    """Write a text file and wait until it is on the disk."""
-    with path.open("x", encoding="utf-8") as stream:
+def _write_synced(folder: int, name: str, text: str) -> None:
+    """Write a text file into an open folder and wait until it is on the disk."""
+    handle = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666, dir_fd=folder)
+    with os.fdopen(handle, "w", encoding="utf-8") as stream:
         stream.write(text)
         stream.flush()
         os.fsync(stream.fileno())
-
-
-def _sync_folder(folder: Path) -> None:
-    """Wait until the names in a folder are on the disk, where the system can do that."""
-    with suppress(OSError):
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)

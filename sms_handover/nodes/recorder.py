@@ -85,6 +85,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
             self._record(topic)
         self._recording.add_topic(TF, TF_TYPE, (stored(LOSSLESS),), self.common.reference_ns)
         self._topics.add(TF)
+        self._recording.begin()
         if self.parameters.record_all:
             self.create_timer(_DISCOVERY_PERIOD_S, self._look_for_topics)
 
@@ -117,7 +118,8 @@ class RecorderNode(GraphNode[RecorderParameters]):
         try:
             while not stop.asked and not self._drained():
                 executor.spin_once(timeout_sec=_POLL_S)
-                self._taps.empty()
+                if not self._taps.empty():
+                    self._recording.writer.flush()  # nothing may wait for a message that does not come
             if stop.asked:
                 self._take_the_rest(executor)
         finally:

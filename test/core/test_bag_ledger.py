@@ -95,8 +95,8 @@ def test_ledger_survives_its_record_and_a_wrong_record_is_refused() -> None:
 def test_table_has_a_line_per_topic() -> None:
     lines = ledger_table(Ledger((account([0, 1, 3]), account([], 0)))).splitlines()
     assert lines[0].split("  ")[0] == "topic"
-    assert lines[1].split() == [TOPIC, "3", "-", "1", "0", "0", "666.7", "2.000"]
-    assert lines[2].split() == [TOPIC, "0", "-", "-", "0", "0", "-", "-"]
+    assert lines[1].split() == [TOPIC, "3", "-", "1", "0", "0", "0.000", "0.003", "666.7", "2.000"]
+    assert lines[2].split() == [TOPIC, "0", "-", "-", "0", "0", "-", "-", "-", "-"]
     assert len({len(line) for line in lines}) == 1
 
 

@@ -1,5 +1,7 @@
 """Bags are written as rosbag2 does, open in every reader, and are complete whatever ends the recording."""
 
+import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -282,3 +284,35 @@ def test_our_types_are_written_with_a_schema_that_others_read(tmp_path: Path) ->
         values: list[Any] = [reader.deserialize(data, c.msgtype) for c, _, data in reader.messages()]
     assert (values[0].status, values[0].manipulability.tolist()) == (1, [0.1, 0.2])
     assert values[1].data == "äöü"
+
+
+def test_a_folder_that_is_moved_takes_its_whole_bag_along(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bag", types=TYPES) as writer:
+        writer.add_topic(STATES, JOINT_STATE)
+        writer.write(STATES, state_bytes(0), 0, 0)
+        (tmp_path / "bag").rename(tmp_path / "moved")
+        writer.write(STATES, state_bytes(1), TICK_NS, 0)
+    with Reader(tmp_path / "moved") as reader:
+        assert reader.message_count == 2
+
+
+def test_a_folder_that_is_deleted_ends_the_recording_within_a_flush(tmp_path: Path) -> None:
+    """The system would go on taking bytes for a file that nobody can ever open again."""
+    writer = BagWriter(tmp_path / "bag", types=TYPES)
+    writer.add_topic(STATES, JOINT_STATE)
+    writer.write(STATES, state_bytes(0), 0, 0)
+    shutil.rmtree(tmp_path / "bag")
+    with pytest.raises(BagError, match=r"cannot write the recording .*: it was deleted while it was"):
+        for tick in range(1, 22):
+            writer.write(STATES, state_bytes(tick), tick * TICK_NS, 0)
+    with pytest.raises(BagError, match="it was deleted"):
+        writer.close()
+
+
+def test_only_the_folder_gone_is_told_at_the_end(tmp_path: Path) -> None:
+    writer = BagWriter(tmp_path / "bag", types=TYPES)
+    os.link(writer.path, tmp_path / "rescued.mcap")
+    shutil.rmtree(tmp_path / "bag")
+    with pytest.raises(BagError, match=r"cannot write the recording .*: No such file or directory"):
+        writer.close()
+    assert read_info(tmp_path / "rescued.mcap").message_count == 0

@@ -1,0 +1,143 @@
+"""Read MCAP records from bytes that may be damaged: a record is taken only if it fits its own length."""
+
+import struct
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from io import BytesIO
+from typing import Any
+
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    MessageIndex,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+
+RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of what follows [byte]
+MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time [ns], publish time [ns]
+
+_CHUNK_HEAD = struct.Struct("<QQQII")  # first and last log time [ns], size [byte], CRC, length of a text
+_INDEX_HEAD = struct.Struct("<HI")  # channel, length of its entries [byte]
+_LENGTH = struct.Struct("<Q")
+_CHECKSUM = struct.Struct("<I")
+_LONGEST = 2**40  # [byte] a record whose length claims more is none
+
+_READ: dict[int, Callable[[ReadDataStream], Any]] = {
+    Opcode.HEADER: Header.read,
+    Opcode.FOOTER: Footer.read,
+    Opcode.SCHEMA: Schema.read,
+    Opcode.CHANNEL: Channel.read,
+    Opcode.MESSAGE_INDEX: MessageIndex.read,
+    Opcode.CHUNK_INDEX: ChunkIndex.read,
+    Opcode.ATTACHMENT: Attachment.read,
+    Opcode.ATTACHMENT_INDEX: AttachmentIndex.read,
+    Opcode.STATISTICS: Statistics.read,
+    Opcode.METADATA: Metadata.read,
+    Opcode.METADATA_INDEX: MetadataIndex.read,
+    Opcode.SUMMARY_OFFSET: SummaryOffset.read,
+    Opcode.DATA_END: DataEnd.read,
+}
+_ERRORS = (struct.error, EndOfFile, UnicodeDecodeError, ValueError, OverflowError, MemoryError)
+
+
+class Fit(Enum):
+    """How well bytes fit the record that they are said to be."""
+
+    EXACT = "every length in it agrees"
+    LOOSE = "nothing speaks against it"
+    NONE = "it is no such record"
+
+
+@dataclass(frozen=True)
+class ChunkHead:
+    """What a chunk says of itself; its records are ``size`` bytes from ``begin`` on in its body."""
+
+    start_ns: int
+    end_ns: int
+    uncompressed_size: int
+    checksum: int
+    compression: str
+    begin: int
+    size: int
+
+
+def plausible_head(opcode: int, length: int) -> bool:
+    """Tell whether this may begin a record; opcodes of later versions of MCAP may."""
+    return opcode != 0 and length < _LONGEST
+
+
+def fit(opcode: int, body: bytes) -> Fit:
+    """Tell how well the body of a record fits its opcode."""
+    if opcode == Opcode.CHUNK:
+        head = chunk_head(body)
+        return Fit.EXACT if head is not None and head.begin + head.size == len(body) else Fit.NONE
+    if opcode == Opcode.MESSAGE:
+        return Fit.LOOSE if len(body) >= MESSAGE_HEAD.size else Fit.NONE
+    if opcode == Opcode.MESSAGE_INDEX:
+        return Fit.EXACT if _INDEX_HEAD.size + _stated(body) == len(body) else Fit.NONE
+    if opcode not in _READ:
+        return Fit.LOOSE
+    try:
+        stream = _parse(opcode, body)[1]
+    except _ERRORS:
+        return Fit.NONE
+    return Fit.EXACT if stream.count == len(body) else Fit.LOOSE
+
+
+def parse(opcode: int, body: bytes) -> Any:
+    """Return the record in a body that fits; None for chunks, messages and what is not known."""
+    return _parse(opcode, body)[0] if opcode in _READ else None
+
+
+def chunk_head(body: bytes) -> ChunkHead | None:
+    """Return what the beginning of a chunk says, None if that is not whole or no such thing."""
+    try:
+        start_ns, end_ns, size, checksum, length = _CHUNK_HEAD.unpack_from(body)
+        text_end = _CHUNK_HEAD.size + length
+        compression = body[_CHUNK_HEAD.size : text_end].decode("ascii")
+        (stored,) = _LENGTH.unpack_from(body, text_end)
+    except (struct.error, UnicodeDecodeError):
+        return None
+    return ChunkHead(start_ns, end_ns, size, checksum, compression, text_end + _LENGTH.size, stored)
+
+
+def attachment_is_sound(body: bytes) -> bool:
+    """Tell whether the checksum of an attachment holds, or there is none."""
+    (stored,) = _CHECKSUM.unpack_from(body, len(body) - _CHECKSUM.size)
+    return stored in (0, zlib.crc32(body[: -_CHECKSUM.size]))
+
+
+def _stated(body: bytes) -> int:
+    """Return the length in byte that a message index claims for its entries, -1 if it claims none."""
+    return int(_INDEX_HEAD.unpack_from(body)[1]) if len(body) >= _INDEX_HEAD.size else -1
+
+
+class _StrictStream(ReadDataStream):
+    """A stream whose reads are whole or fail."""
+
+    def read(self, length: int) -> bytes:
+        """Return exactly ``length`` bytes; raises EndOfFile if there are fewer."""
+        data = super().read(length)
+        if len(data) != length:
+            raise EndOfFile
+        return data
+
+
+def _parse(opcode: int, body: bytes) -> tuple[Any, ReadDataStream]:
+    """Return a record and the stream behind it; raises one of ``_ERRORS``."""
+    stream = _StrictStream(BytesIO(body))
+    return _READ[opcode](stream), stream
