@@ -54,7 +54,7 @@ setup(
     maintainer_email="maintainers@sms-handover.example",
     license="BSD-3-Clause",
     packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
-    package_data={PACKAGE: ["py.typed"]},
+    package_data={PACKAGE: ["py.typed", "scene/web/*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
@@ -77,6 +77,7 @@ setup(
         "test": [
             "mcap-ros2-support>=0.5.7,<1",
             "mypy>=1.15",
+            "playwright>=1.50,<2",  # drives a Chromium that the machine has
             "pytest>=8.4",
             "ruff>=0.6",
             "types-PyYAML",

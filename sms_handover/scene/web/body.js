@@ -1,0 +1,250 @@
+"use strict";
+/* One run in the picture: its solids, frames and traces, placed at any time from the recorded poses. */
+
+const COLOURS = { // [-] of arms in order, of the deputy, of edges; chosen apart for colour-blind eyes too
+  light: { arms: [0xd2601a, 0x1c74b8, 0x8a5a9e, 0x4b8b3b], deputy: 0x0f9d6b, edge: 0x1d2530, start: 0x69788c },
+  dark: { arms: [0xff9a4d, 0x58b4ff, 0xc79be0, 0x93d07f], deputy: 0x2fe0a0, edge: 0x05080f, start: 0x8ea2bd },
+};
+const GHOST_OPACITY = 0.3;
+const EDGE_ANGLE = 30; // degrees between two faces from which on their common edge is drawn
+const AXIS_LENGTH = 0.16; // m
+const TRACE_WIDTH = 2.5; // px
+
+/** Numbers that came as base64 of little-endian floats. */
+function numbers(text, Type) {
+  const raw = atob(text);
+  const bytes = new Uint8Array(raw.length);
+  for (let i = 0; i < raw.length; i += 1) bytes[i] = raw.charCodeAt(i);
+  return new Type(bytes.buffer);
+}
+
+/** The poses of named bodies over time; between two recorded instants they are interpolated. */
+class Motion {
+  constructor(data) {
+    this.bodies = data.bodies;
+    this.times = numbers(data.times, Float64Array); // s
+    this.poses = numbers(data.poses, Float32Array); // per instant and body x y z, quaternion x y z w
+    this.other = { position: new THREE.Vector3(), quaternion: new THREE.Quaternion() };
+  }
+
+  get start() { return this.times[0]; }
+
+  get end() { return this.times[this.times.length - 1]; }
+
+  /** The last recorded instant not after t. */
+  index(t) {
+    let low = 0;
+    let high = this.times.length - 1;
+    while (low < high) {
+      const middle = Math.ceil((low + high) / 2);
+      if (this.times[middle] <= t) low = middle; else high = middle - 1;
+    }
+    return low;
+  }
+
+  read(index, body, position, quaternion) {
+    const at = (index * this.bodies.length + body) * 7;
+    position.fromArray(this.poses, at);
+    quaternion.fromArray(this.poses, at + 3);
+  }
+
+  /** Put the pose of a body at time t into position and quaternion; false where it was not recorded. */
+  at(t, body, position, quaternion) {
+    const index = this.index(t);
+    this.read(index, body, position, quaternion);
+    if (index + 1 < this.times.length && t > this.times[index]) {
+      const { position: p, quaternion: q } = this.other;
+      this.read(index + 1, body, p, q);
+      const part = (t - this.times[index]) / (this.times[index + 1] - this.times[index]);
+      position.lerp(p, part);
+      quaternion.slerp(q, part);
+    }
+    return !Number.isNaN(position.x);
+  }
+
+  /** The path of a body's origin; instants that were not recorded are left out. */
+  path(body) {
+    const points = [];
+    const rows = [];
+    for (let i = 0; i < this.times.length; i += 1) {
+      const at = (i * this.bodies.length + body) * 7;
+      if (!Number.isNaN(this.poses[at])) {
+        points.push(this.poses[at], this.poses[at + 1], this.poses[at + 2]);
+        rows.push(i);
+      }
+    }
+    return { points, rows };
+  }
+}
+
+/** A line that is drawn as far as time has come, and faintly to its end. */
+class Trace {
+  constructor({ points, rows }, group, width) {
+    this.rows = rows;
+    this.drawn = points.length >= 6;
+    if (!this.drawn) return;
+    this.past = this.line(points, width, 0.95);
+    this.whole = this.line(points, width * 0.5, 0.28);
+    group.add(this.whole, this.past);
+  }
+
+  line(points, width, opacity) {
+    const geometry = new THREE.LineGeometry();
+    geometry.setPositions(points);
+    const material = new THREE.LineMaterial({ linewidth: width, transparent: true, opacity, depthWrite: false });
+    const line = new THREE.Line2(geometry, material);
+    line.frustumCulled = false;
+    return line;
+  }
+
+  show(index) {
+    if (!this.drawn) return;
+    let count = 0;
+    while (count < this.rows.length && this.rows[count] <= index) count += 1;
+    this.past.geometry.instanceCount = Math.max(0, count - 1);
+  }
+
+  colour(value) {
+    if (!this.drawn) return;
+    this.past.material.color.set(value);
+    this.whole.material.color.set(value);
+  }
+}
+
+/** Everything that is drawn of one run, as a group that moves with time. */
+class RunBody {
+  constructor(data) {
+    this.name = data.name;
+    this.data = data;
+    this.motion = new Motion(data);
+    this.group = new THREE.Group();
+    this.traceGroup = new THREE.Group();
+    this.targetGroup = new THREE.Group();
+    this.startGroup = new THREE.Group();
+    this.group.add(this.traceGroup, this.targetGroup, this.startGroup);
+    this.painted = []; // { material, role, arm } to colour again when the theme changes
+    this.bodies = this.motion.bodies.map(() => new THREE.Group());
+    this.bodies.forEach((body) => this.group.add(body));
+    data.shapes.forEach((shape) => this.addShape(shape));
+    this.addDeputy(data.deputy_size);
+    this.traces = data.arms.map((arm, index) => this.addArm(arm, index));
+    this.basePath = new Trace(this.motion.path(0), this.traceGroup, TRACE_WIDTH);
+    this.drawStart();
+  }
+
+  body(name) { return this.motion.bodies.indexOf(name); }
+
+  armOf(link) { return this.data.arms.findIndex((arm) => link.startsWith(`${arm}_`)); }
+
+  addShape(shape) {
+    const geometry = shape.kind === "box"
+      ? new THREE.BoxGeometry(...shape.size)
+      : new THREE.CylinderGeometry(shape.size[0], shape.size[0], shape.size[1], 48).rotateX(Math.PI / 2);
+    const colour = new THREE.Color().setRGB(...shape.rgba.slice(0, 3), THREE.SRGBColorSpace);
+    const arm = this.armOf(shape.link);
+    const role = arm >= 0 && colour.getHSL({}, THREE.SRGBColorSpace).l > 0.5 ? "arm" : "own"; // dark parts keep their colour
+    const mesh = this.solid(geometry, { role, arm, own: colour });
+    mesh.position.fromArray(shape.pose, 0);
+    mesh.quaternion.fromArray(shape.pose, 3);
+    this.bodies[this.body(shape.link)].add(mesh);
+    if (shape.kind === "cylinder") this.addJoint(shape, mesh);
+  }
+
+  /** Round the end of a cylinder that begins at its link's joint, so that the arm has no open corners. */
+  addJoint(shape, mesh) {
+    const [radius, length] = shape.size;
+    if (Math.abs(mesh.position.length() - length / 2) > 1e-6) return;
+    const ball = new THREE.Mesh(new THREE.SphereGeometry(radius, 32, 20), mesh.material);
+    ball.castShadow = true;
+    ball.receiveShadow = true;
+    this.bodies[this.body(shape.link)].add(ball);
+  }
+
+  solid(geometry, paint) {
+    const material = new THREE.MeshStandardMaterial({ roughness: 0.55, metalness: 0.1 });
+    const mesh = new THREE.Mesh(geometry, material);
+    mesh.castShadow = true;
+    mesh.receiveShadow = true;
+    const lines = new THREE.LineSegments(
+      new THREE.EdgesGeometry(geometry, EDGE_ANGLE),
+      new THREE.LineBasicMaterial({ transparent: true, opacity: 0.55 }),
+    );
+    mesh.add(lines);
+    this.painted.push({ ...paint, material, lines: lines.material, mesh });
+    return mesh;
+  }
+
+  addDeputy(size) {
+    const mesh = this.solid(new THREE.BoxGeometry(...size), { role: "deputy", arm: -1 });
+    this.bodies[this.body("deputy")].add(mesh);
+  }
+
+  addArm(arm, index) {
+    const frame = this.bodies[this.body(`${arm}/target`)];
+    this.targetGroup.add(frame);
+    [[1, 0, 0, 0xe0433a], [0, 1, 0, 0x3aa83f], [0, 0, 1, 0x3a6fe0]].forEach(([x, y, z, colour]) => {
+      const geometry = new THREE.LineGeometry();
+      geometry.setPositions([0, 0, 0, x * AXIS_LENGTH, y * AXIS_LENGTH, z * AXIS_LENGTH]);
+      frame.add(new THREE.Line2(geometry, new THREE.LineMaterial({ linewidth: 3, color: colour })));
+    });
+    const ball = new THREE.Mesh(new THREE.SphereGeometry(0.014, 20, 14), new THREE.MeshStandardMaterial({ roughness: 0.6 }));
+    frame.add(ball);
+    this.painted.push({ role: "target", arm: index, material: ball.material, mesh: ball });
+    return new Trace(this.motion.path(this.body(`${arm}_tool`)), this.traceGroup, TRACE_WIDTH);
+  }
+
+  /** The outline of the spacecraft where it was at the start: what it has moved by since. */
+  drawStart() {
+    const outline = new THREE.LineBasicMaterial({ transparent: true, opacity: 0.7, depthWrite: false });
+    this.bodies[0].children.forEach((mesh) => { // the base is the first body
+      const lines = new THREE.LineSegments(mesh.children[0].geometry, outline);
+      lines.position.copy(mesh.position);
+      lines.quaternion.copy(mesh.quaternion);
+      this.startGroup.add(lines);
+    });
+    this.motion.read(0, 0, this.startGroup.position, this.startGroup.quaternion);
+    this.startLines = outline;
+  }
+
+  /** Take the colours of a theme; a ghost is translucent and casts no shadow. */
+  paint(theme, ghost) {
+    const colours = COLOURS[theme];
+    this.painted.forEach(({ role, arm, own, material, lines, mesh }) => {
+      const colour = { arm: colours.arms[arm % 4], target: colours.arms[arm % 4], deputy: colours.deputy }[role];
+      material.color.set(role === "own" ? own : colour);
+      material.emissive.set(role === "deputy" ? colour : 0x000000);
+      material.emissiveIntensity = 0.25;
+      material.transparent = ghost;
+      material.opacity = ghost ? GHOST_OPACITY : 1;
+      material.depthWrite = !ghost;
+      material.needsUpdate = true;
+      mesh.castShadow = !ghost && role !== "target";
+      if (lines) {
+        lines.color.set(ghost ? colours.start : colours.edge);
+        lines.opacity = ghost ? 0.35 : 0.6;
+      }
+    });
+    this.traces.forEach((trace, arm) => trace.colour(colours.arms[arm % 4]));
+    this.basePath.colour(colours.start);
+    this.startLines.color.set(colours.start);
+    this.startGroup.visible = !ghost;
+    [...this.traces, this.basePath].forEach((trace) => {
+      if (trace.drawn) trace.past.material.linewidth = ghost ? TRACE_WIDTH * 0.6 : TRACE_WIDTH;
+    });
+  }
+
+  /** Put everything where it was at time t (s). */
+  place(t) {
+    this.bodies.forEach((body, index) => {
+      body.visible = this.motion.at(t, index, body.position, body.quaternion);
+    });
+    const index = this.motion.index(t);
+    [...this.traces, this.basePath].forEach((trace) => trace.show(index));
+  }
+
+  /** The position of a body at the time it is placed at, in m. */
+  position(name) { return this.bodies[this.body(name)].position; }
+
+  /** The phase in force at time t. */
+  phase(t) { return this.data.phases.filter((phase) => phase.start <= t + 1e-9).pop(); }
+}

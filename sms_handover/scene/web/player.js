@@ -1,0 +1,258 @@
+"use strict";
+/* Plays the runs of the page: time, buttons, labels, and the time shared with the page around this one. */
+
+const EVENT_SHOWN = 4; // s of simulation time for which what came of a grasp is shown
+const element = (id) => document.getElementById(id);
+
+class Player {
+  constructor(data) {
+    this.runs = data.runs.map((run) => new RunBody(run));
+    this.start = Math.min(...this.runs.map((run) => run.motion.start));
+    this.end = Math.max(...this.runs.map((run) => run.motion.end));
+    this.t = this.start;
+    this.playing = false;
+    this.runs.forEach((run) => run.place(this.t));
+    this.picture = new Picture(element("picture"), this.runs);
+    this.picture.drawn = () => this.placeLabels();
+    this.arrangements = this.listArrangements();
+    this.connect();
+    this.arrange(0);
+    this.takeTheme();
+    this.seek(Math.min(Math.max(data.start, this.start), this.end));
+  }
+
+  /** One over the other, side by side, each alone. */
+  listArrangements() {
+    const alone = this.runs.map((run) => ({ name: run.name, tiles: [[run]] }));
+    if (this.runs.length === 1) return alone;
+    const rest = this.runs.slice(1).map((run) => run.name).join(", ");
+    return [
+      { name: `${this.runs[0].name} over ${rest}`, tiles: [this.runs] },
+      { name: "side by side", tiles: this.runs.map((run) => [run]) },
+      ...alone,
+    ];
+  }
+
+  connect() {
+    const time = element("time");
+    time.min = this.start;
+    time.max = this.end;
+    time.addEventListener("input", () => { this.pause(); this.seek(Number(time.value)); });
+    time.addEventListener("keydown", (event) => this.step(event));
+    element("play").addEventListener("click", () => this.toggle());
+    element("view").addEventListener("change", (event) => this.picture.look(event.target.value));
+    this.arrangements.forEach(({ name }, index) => element("runs").add(new Option(name, index)));
+    element("arrange").hidden = this.runs.length === 1;
+    element("runs").addEventListener("change", (event) => this.arrange(Number(event.target.value)));
+    ["traces", "targets"].forEach((id) => element(id).addEventListener("change", () => this.showParts()));
+    document.addEventListener("keydown", (event) => {
+      if (event.key === " " && !["BUTTON", "SELECT"].includes(event.target.tagName)) { event.preventDefault(); this.toggle(); }
+    });
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.takeTheme());
+    window.addEventListener("message", (event) => this.receive(event));
+    this.drawBar();
+  }
+
+  /** The phases of the first run, to jump to, and marks where a grasp was tried. */
+  drawBar() {
+    const { phases, events } = this.runs[0].data;
+    const length = this.end - this.start || 1;
+    this.phaseButtons = phases.map((phase, index) => {
+      const end = index + 1 < phases.length ? phases[index + 1].start : this.end;
+      const button = document.createElement("button");
+      Object.assign(button, { type: "button", textContent: phase.name, tabIndex: -1, title: `${phase.name}, from ${phase.start} s` });
+      button.style.flex = `${(end - phase.start) / length} 1 0`;
+      button.addEventListener("click", () => this.seek(phase.start));
+      element("phases").append(button);
+      return button;
+    });
+    events.forEach((event) => {
+      const mark = document.createElement("i");
+      mark.style.left = `${(100 * (event.time - this.start)) / length}%`;
+      element("marks").append(mark);
+    });
+  }
+
+  arrange(index) {
+    this.tiles = this.arrangements[index].tiles;
+    this.picture.arrange(this.tiles);
+    this.picture.look(element("view").value);
+    this.makeLabels();
+    this.show();
+  }
+
+  showParts() {
+    this.runs.forEach((run) => {
+      run.traceGroup.visible = element("traces").checked;
+      run.targetGroup.visible = element("targets").checked;
+    });
+    this.picture.ask();
+  }
+
+  get theme() {
+    const wanted = document.documentElement.dataset.theme;
+    return wanted || (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+  }
+
+  takeTheme() {
+    this.picture.paint(this.theme);
+    this.makeLabels();
+    this.show();
+  }
+
+  toggle() { if (this.playing) this.pause(); else this.play(); }
+
+  play() {
+    if (this.t >= this.end) this.seek(this.start);
+    this.playing = true;
+    this.button();
+    let before = performance.now();
+    const tick = (now) => {
+      if (!this.playing) return;
+      const passed = Math.min(now - before, 250) / 1000; // s; a page that was hidden does not jump
+      before = now;
+      this.seek(Math.min(this.end, this.t + passed * Number(element("speed").value)));
+      if (this.t >= this.end) this.pause(); else requestAnimationFrame(tick);
+    };
+    requestAnimationFrame(tick);
+  }
+
+  pause() {
+    this.playing = false;
+    this.button();
+  }
+
+  button() {
+    element("play").classList.toggle("playing", this.playing);
+    element("play").setAttribute("aria-label", this.playing ? "Pause" : "Play");
+  }
+
+  /** The arrow keys of the time bar go by a tenth of a second, with shift by one second. */
+  step(event) {
+    const sign = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
+    if (!sign) return;
+    event.preventDefault();
+    this.seek(this.t + sign * (event.shiftKey ? 1 : 0.1));
+  }
+
+  /** Go to time t (s); ``tell`` says whether the page around this one shall hear of it. */
+  seek(t, tell = true) {
+    if (!Number.isFinite(t)) return;
+    this.t = Math.min(Math.max(t, this.start), this.end);
+    this.runs.forEach((run) => run.place(this.t));
+    this.show();
+    this.picture.ask();
+    if (tell && window.parent !== window) window.parent.postMessage({ type: "time", t: this.t }, "*");
+  }
+
+  receive(event) {
+    if (event.source !== window.parent || typeof event.data !== "object" || event.data === null) return;
+    if (event.data.type === "time") this.seek(Number(event.data.t), false);
+    if (event.data.type === "theme") {
+      document.documentElement.dataset.theme = event.data.theme === "dark" ? "dark" : "light";
+      this.takeTheme();
+    }
+  }
+
+  show() {
+    element("time").value = this.t;
+    element("clock").textContent = `${this.t.toFixed(2)} / ${this.end.toFixed(0)} s`;
+    const phase = this.runs[0].phase(this.t);
+    this.phaseButtons.forEach((button, index) => button.classList.toggle("now", this.runs[0].data.phases[index] === phase));
+    this.readOut(phase);
+    this.tellEvent();
+  }
+
+  /** How far each tool is from its target, and the spacecraft from where it was. */
+  readOut(phase) {
+    const runs = this.tiles.flat();
+    const mm = (a, b) => (a && b ? `${(1000 * a.distanceTo(b)).toFixed(1)} mm` : "–");
+    const degrees = (a, b) => `${((180 / Math.PI) * a.angleTo(b)).toFixed(2)}°`;
+    const at = (run, name) => (run.bodies[run.body(name)].visible ? run.position(name) : null);
+    const rows = runs[0].data.arms.map((arm, index) => ({
+      colour: COLOURS[this.theme].arms[index % 4],
+      text: `${label(arm)}: tool to target`,
+      values: runs.map((run) => mm(at(run, `${arm}_tool`), at(run, `${arm}/target`))),
+    }));
+    const { start } = COLOURS[this.theme];
+    rows.push(
+      { colour: start, text: "Base moved by", values: runs.map((run) => mm(run.bodies[0].position, run.startGroup.position)) },
+      { colour: start, text: "Base turned by", values: runs.map((run) => degrees(run.bodies[0].quaternion, run.startGroup.quaternion)) },
+    );
+    const table = document.createElement("table");
+    if (runs.length > 1) {
+      const head = table.createTHead().insertRow();
+      ["", ...runs.map((run) => run.name)].forEach((text) => {
+        head.append(Object.assign(document.createElement("th"), { textContent: text }));
+      });
+    }
+    const content = table.createTBody();
+    rows.forEach(({ colour, text, values }) => {
+      const row = content.insertRow();
+      const name = document.createElement("th");
+      const dot = Object.assign(document.createElement("span"), { className: "dot" });
+      dot.style.background = `#${colour.toString(16).padStart(6, "0")}`;
+      name.append(dot, text);
+      row.append(name);
+      values.forEach((value) => { row.insertCell().textContent = value; });
+    });
+    const title = document.createElement("h1");
+    title.textContent = phase ? phase.name : "";
+    if (runs.length === 1) title.append(" ", Object.assign(document.createElement("small"), { textContent: runs[0].name }));
+    element("readout").replaceChildren(title, table);
+  }
+
+  /** Show what came of the last grasp, for a while. */
+  tellEvent() {
+    const runs = this.tiles.flat();
+    const lines = runs.flatMap((run) => run.data.events
+      .filter((event) => event.time <= this.t && this.t < event.time + EVENT_SHOWN)
+      .map((event) => (runs.length > 1 ? `${run.name}: ${event.text}` : event.text)));
+    const place = element("event");
+    place.classList.toggle("shown", lines.length > 0);
+    const text = lines.join("\n");
+    if (lines.length && place.innerText !== text) place.innerText = text;
+  }
+
+  /** Names of arms and deputy beside them, once per tile. */
+  makeLabels() {
+    const css = (colour) => `#${colour.toString(16).padStart(6, "0")}`;
+    this.labels = this.tiles.flatMap(([run], place) => [
+      ...run.data.arms.map((arm, index) => ({ run, place, body: `${arm}_gripper`, text: label(arm), colour: COLOURS.light.arms[index % 4] })),
+      { run, place, body: "deputy", text: "Deputy", colour: 0x0b7a53, below: true },
+      ...(this.tiles.length > 1 ? [{ run, place, body: null, text: run.name, colour: 0x4a5666 }] : []),
+    ]);
+    element("labels").replaceChildren(...this.labels.map((item) => {
+      item.node = Object.assign(document.createElement("span"), { textContent: item.text });
+      item.node.style.background = css(item.colour);
+      return item.node;
+    }));
+  }
+
+  placeLabels() {
+    this.labels.forEach(({ run, place, body, node, below }) => {
+      if (body === null) { // the name of the run, at the top of its tile
+        const { width, right, down } = this.picture.tile();
+        node.style.transform = `translate(${(right * place + width / 2).toFixed(1)}px, ${(down * place + 8).toFixed(1)}px)`;
+        return;
+      }
+      const index = run.body(body);
+      const seen = index >= 0 && run.bodies[index].visible ? this.picture.project(run.bodies[index].position, place) : null;
+      node.hidden = !seen;
+      if (seen) node.style.transform = `translate(${(seen.x + 14).toFixed(1)}px, ${(seen.y + (below ? 30 : -34)).toFixed(1)}px)`;
+    });
+  }
+}
+
+/** A name as people say it: arm_a is Arm A. */
+function label(name) {
+  return name.replace(/_/g, " ").replace(/^./, (first) => first.toUpperCase()).replace(/ (\w)$/, (_, last) => ` ${last.toUpperCase()}`);
+}
+
+try {
+  window.player = new Player(JSON.parse(element("data").textContent));
+} catch (error) {
+  element("trouble").hidden = false;
+  element("trouble").textContent = `This browser cannot draw the 3D view: ${error.message}`;
+  throw error;
+}

@@ -1,0 +1,43 @@
+"""The page of a scene before any browser has seen it: complete, of modest weight, and refused where empty."""
+
+import re
+
+import pytest
+
+from sms_handover.errors import ConfigurationError
+from sms_handover.scene.page import animation_html
+from sms_handover.scene.scene import Scene, make_scene
+from sms_handover.simulation.simulate import simulate
+
+from .conftest import MakeScenario
+
+LIBRARY = 700_000  # [B] of scripts, styles and the library that draws
+
+
+@pytest.fixture
+def scene(make_scenario: MakeScenario) -> Scene:
+    scenario = make_scenario()
+    return make_scene(simulate(scenario), scenario.robot.urdf, scenario.schedule.deputy.size)
+
+
+def test_it_names_nothing_to_load(scene: Scene) -> None:
+    page = animation_html({"nmpc": scene})
+    assert re.findall(r"<(?:script|link|img|iframe)[^>]*(?:src|href)=\"(?!data:)", page) == []
+    assert "{{" not in re.sub(r"<script>.*?</script>", "", page, flags=re.DOTALL)
+
+
+def test_it_weighs_little_more_than_its_poses(scene: Scene) -> None:
+    frames, links, _ = scene.link_in_world.shape
+    bodies = links + 1 + len(scene.arms)  # the deputy, and a target per arm
+    poses = frames * bodies * 7 * 4 * 4 / 3  # [B] single precision as base64
+    assert len(animation_html({"nmpc": scene})) < LIBRARY + 1.05 * poses
+
+
+def test_the_licence_of_the_library_goes_with_it(scene: Scene) -> None:
+    page = animation_html({"nmpc": scene})
+    assert "three.js authors" in page and "MIT" in page
+
+
+def test_a_page_without_a_run_is_refused() -> None:
+    with pytest.raises(ConfigurationError, match="there is no run to show"):
+        animation_html({})
