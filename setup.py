@@ -17,6 +17,8 @@ ROS_EXECUTABLES = [
     "ik = sms_handover.nodes.ik:main",
     "controller = sms_handover.nodes.controller:main",
     "recorder = sms_handover.nodes.recorder:main",
+    "player = sms_handover.nodes.player:main",
+    "topic_recorder = sms_handover.nodes.topic_recorder:main",
 ]
 
 

@@ -14,6 +14,8 @@ TRAJECTORY = "trajectory"
 IK = "ik"
 CONTROLLER = "controller"
 RECORDER = "recorder"
+PLAYER = "player"  # stands outside the graph: it plays what was recorded
+TOPIC_RECORDER = "topic_recorder"  # stands outside the graph: it records any topics
 LOOP_NODES = (PLANT, TRAJECTORY, IK, CONTROLLER)
 NODES = (*LOOP_NODES, RECORDER)
 

@@ -27,7 +27,7 @@ FOUNDATION_MODULES = {
     "run_data",
 }
 MIDDLE = {"plant", "trajectory", "ik", "control"}
-CORE = {"model", *MIDDLE, "simulation", "bag", "analysis", "scene"}
+CORE = {"model", *MIDDLE, "simulation", "bag", "analysis", "scene", "playback"}
 EDGE = {"ros", "nodes", "cli"}
 
 # What a layer may import besides itself and the foundation.
@@ -39,6 +39,7 @@ ALLOWED: dict[str, set[str]] = {
     "bag": {"model", "simulation"},
     "analysis": {"model", "simulation"},
     "scene": {"model", "bag"},
+    "playback": {"bag"},
     "ros": CORE,
     "nodes": CORE | {"ros"},
     "cli": CORE | {"ros", "nodes"},

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from sms_handover.bag.topic_choice import TopicChoice
 from sms_handover.parameters import parameter
 
 
@@ -19,3 +20,20 @@ class RecorderParameters:
     drain_timeout: float = parameter(
         "wall time without any message after which the end is not waited for", unit="s", minimum=0.1
     )
+
+
+@dataclass(frozen=True)
+class TopicRecorderParameters:
+    """What to record of any graph; the values are in ``config/topic_recorder.yaml``."""
+
+    folder: str = parameter("new folder for the bag; empty: rosbag2_<date>-<time> in the current folder")
+    topics: tuple[str, ...] = parameter("topics to record; empty: all")
+    regex: str = parameter("regular expression; topics that match it are recorded too")
+    exclude_topics: tuple[str, ...] = parameter("topics not to record")
+    exclude_regex: str = parameter("regular expression; topics that match it are not recorded")
+    duration: float = parameter("wall time to record; 0: until interrupted", unit="s", minimum=0.0)
+
+    @property
+    def choice(self) -> TopicChoice:
+        """Return which topics are wanted."""
+        return TopicChoice(self.topics, self.regex, self.exclude_topics, self.exclude_regex)

@@ -13,6 +13,8 @@ _COMMANDS = {
     "simulate": "run it in one process, without ROS",
     "compare": "print recorded runs side by side, with the paper's claims",
     "reproduce": "run a bag's scenario again in one process and compare bit by bit",
+    "play": "publish the messages of any MCAP bag again, with keys to control it",
+    "record": "record any topics of any graph to an MCAP bag",
 }
 _EXIT_FAILED, _EXIT_USAGE, _EXIT_INTERRUPTED = 1, 2, 130
 

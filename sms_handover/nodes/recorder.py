@@ -8,7 +8,7 @@ from time import monotonic, time_ns
 
 from geometry_msgs.msg import PoseStamped
 from rclpy.executors import Executor
-from rclpy.qos import QoSDurabilityPolicy, QoSProfile, QoSReliabilityPolicy
+from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from sms_handover_interfaces.msg import PublishedCounts
 
@@ -26,7 +26,7 @@ from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, Stop, run_node
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.peer_parameters import PeerParameters
-from sms_handover.ros.qos import LOSSLESS, profile_of, stored
+from sms_handover.ros.qos import LOSSLESS, profile_of, stored, weakest
 from sms_handover.ros.stamp_sync import StampSync
 from sms_handover.ros.taps import Receive, Taps
 from sms_handover.ros.wire import StateWire
@@ -221,18 +221,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
                 self.get_logger().warning(f"{name} is not recorded: {error}")
                 continue
             receive = partial(self._receive_now, name)
-            self.create_subscription(kind, name, receive, _weakest(offers), raw=True)
-
-
-def _weakest(offers: Sequence[QoSProfile]) -> QoSProfile:
-    """Return a profile that every one of the offered ones can serve."""
-    reliable = all(offer.reliability == QoSReliabilityPolicy.RELIABLE for offer in offers)
-    latched = all(offer.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
-    return QoSProfile(
-        history=LOSSLESS.history,
-        reliability=LOSSLESS.reliability if reliable else QoSReliabilityPolicy.BEST_EFFORT,
-        durability=QoSDurabilityPolicy.TRANSIENT_LOCAL if latched else QoSDurabilityPolicy.VOLATILE,
-    )
+            self.create_subscription(kind, name, receive, weakest(offers), raw=True)
 
 
 def _pose(data: bytes) -> Pose:

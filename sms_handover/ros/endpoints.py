@@ -7,13 +7,12 @@ from typing import Any
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from sms_handover.errors import GraphError
 from sms_handover.ros.message_types import message_class
-from sms_handover.ros.qos import profile_of
+from sms_handover.ros.qos import profile_of, serves
 from sms_handover.topics import RECORDER, Topic
 
 _RclError = rclpy_implementation.RCLError
@@ -58,7 +57,7 @@ class Endpoints:
             readers = self._peers & ({*self._topics[name].subscribers} - {me} | {RECORDER})
             there = node.get_subscriptions_info_by_topic(publisher.topic_name)
             profile = profile_of(self._topics[name])
-            served = [reader for reader in there if _serves(profile, reader.qos_profile)]
+            served = [reader for reader in there if serves(profile, reader.qos_profile)]
             found = _found(publisher.subscription_count, served, readers)
             if found < len(readers):
                 missing.append(f"{found} of {len(readers)} subscriptions of {name}")
@@ -66,7 +65,7 @@ class Endpoints:
             writers = (self._peers & set(self._topics[name].publishers)) - {me}
             there = node.get_publishers_info_by_topic(subscription.topic_name)
             profile = profile_of(self._topics[name])
-            serving = [writer for writer in there if _serves(writer.qos_profile, profile)]
+            serving = [writer for writer in there if serves(writer.qos_profile, profile)]
             found = _found(subscription.get_publisher_count(), serving, writers)
             if found < len(writers):
                 missing.append(f"{found} of {len(writers)} publishers of {name}")
@@ -81,11 +80,6 @@ class Endpoints:
     def topics(self) -> tuple[Topic, ...]:
         """Return every topic of the graph."""
         return tuple(self._topics.values())
-
-
-def _serves(offered: QoSProfile, asked: QoSProfile) -> bool:
-    """Tell whether a publisher's profile and a subscription's can match."""
-    return bool(qos_check_compatible(offered, asked)[0] != QoSCompatibility.ERROR)
 
 
 def _found(matched: int, there: Collection[TopicEndpointInfo], wanted: Collection[str]) -> int:

@@ -57,14 +57,17 @@ class RunnableNode(Node, ABC):
         """Work until asked to stop; return the exit code."""
 
 
-def run_node(make: Callable[[], RunnableNode], args: Sequence[str] | None = None) -> int:
+def run_node(
+    make: Callable[[], RunnableNode], args: Sequence[str] | None = None, *, name: str = "node"
+) -> int:
     """Run the node that ``make`` returns until a signal ends it; return the exit code.
+
+    ``name`` stands before an error as long as there is no node.
 
     The executor is only ever used with a timeout: without one, EventsExecutor does not return in
     the wheels of rclpy 7.1.
     """
     stop = Stop()
-    name = "node"
     node = None
     try:
         _init(list(sys.argv if args is None else args))

@@ -8,8 +8,8 @@ from sms_handover.errors import GraphError
 
 def message_class(type_name: str) -> Any:
     """Return the class of a type such as ``sensor_msgs/msg/JointState``; raises GraphError if it lacks."""
-    package, kind, name = type_name.split("/")
     try:
+        package, kind, name = type_name.split("/")
         return getattr(import_module(f"{package}.{kind}"), name)
-    except (ImportError, AttributeError) as error:
+    except (ImportError, AttributeError, ValueError) as error:
         raise GraphError(f"message type {type_name} is not installed: {error}") from error

@@ -1,14 +1,17 @@
 """Quality of service of the graph: nothing may be lost, and what is latched reaches late comers."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from rclpy.duration import Infinite
 from rclpy.qos import (
+    QoSCompatibility,
     QoSDurabilityPolicy,
     QoSHistoryPolicy,
     QoSLivelinessPolicy,
     QoSProfile,
     QoSReliabilityPolicy,
+    qos_check_compatible,
 )
 
 from sms_handover.bag.qos import Durability, History, Qos, Reliability
@@ -47,4 +50,20 @@ def stored(profile: QoSProfile) -> Qos:
         durability=Durability(profile.durability.name.lower()),
         history=History(profile.history.name.lower()),
         depth=profile.depth,
+    )
+
+
+def serves(offered: QoSProfile, asked: QoSProfile) -> bool:
+    """Tell whether a publisher's profile and a subscription's can match."""
+    return bool(qos_check_compatible(offered, asked)[0] != QoSCompatibility.ERROR)
+
+
+def weakest(offers: Sequence[QoSProfile]) -> QoSProfile:
+    """Return a profile that every one of the offered ones can serve, with a queue that drops nothing."""
+    reliable = all(offer.reliability == QoSReliabilityPolicy.RELIABLE for offer in offers)
+    latched = all(offer.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
+    return QoSProfile(
+        history=LOSSLESS.history,
+        reliability=LOSSLESS.reliability if reliable else QoSReliabilityPolicy.BEST_EFFORT,
+        durability=QoSDurabilityPolicy.TRANSIENT_LOCAL if latched else QoSDurabilityPolicy.VOLATILE,
     )

@@ -1,0 +1,54 @@
+"""Options of a command that runs one node in this process: they become the node's parameters."""
+
+import os
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Mapping, Sequence
+
+from sms_handover.cli.domain import LAST_DOMAIN
+from sms_handover.errors import ConfigurationError
+from sms_handover.ros.parameters import as_arguments
+
+
+def add_topic_options(parser: ArgumentParser, verb: str) -> None:
+    """Add the options that choose topics."""
+    group = parser.add_argument_group("topics")
+    group.add_argument("--topics", nargs="+", default=[], metavar="TOPIC", help=f"topics to {verb}")
+    group.add_argument("-e", "--regex", metavar="REGEX", help=f"{verb} the topics that match, too")
+    group.add_argument(
+        "--exclude-topics", nargs="+", default=[], metavar="TOPIC", help=f"topics not to {verb}"
+    )
+    group.add_argument("-x", "--exclude-regex", metavar="REGEX", help=f"do not {verb} the topics that match")
+
+
+def add_graph_options(parser: ArgumentParser) -> None:
+    """Add the option that chooses the graph."""
+    parser.add_argument(
+        "--domain-id",
+        type=int,
+        metavar="N",
+        help="ROS domain (default: ROS_DOMAIN_ID, as for other ROS tools)",
+    )
+
+
+def given(options: Namespace, names: Mapping[str, str]) -> dict[str, object]:
+    """Return the parameters that the options set; ``names`` maps options to parameters."""
+    values = {name: getattr(options, option) for option, name in names.items()}
+    unset = (name for name, value in values.items() if value is None or value is False or value == [])
+    for name in list(unset):
+        del values[name]
+    return values
+
+
+def run_in_process(
+    main: Callable[[Sequence[str]], int],
+    options: Namespace,
+    parameters: Mapping[str, object],
+    remap: Sequence[str] = (),
+) -> int:
+    """Run a node in this process; raises ConfigurationError on a domain that does not exist."""
+    if options.domain_id is not None:
+        if not 0 <= options.domain_id <= LAST_DOMAIN:
+            raise ConfigurationError(f"domain id is {options.domain_id}, allowed is 0 to {LAST_DOMAIN}")
+        os.environ["ROS_DOMAIN_ID"] = str(options.domain_id)
+    rules = [part for rule in remap for part in ("--remap", rule)]
+    return main(["sms-handover", "--ros-args", *rules, *as_arguments(parameters)])

@@ -1,0 +1,125 @@
+"""The node that records any topics, of any graph."""
+
+import sys
+from collections.abc import Sequence
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+from time import monotonic
+
+from rclpy.executors import Executor
+
+from sms_handover.bag.parameters import TopicRecorderParameters
+from sms_handover.bag.writer import BagWriter
+from sms_handover.errors import BagError, ConfigurationError, SmsHandoverError
+from sms_handover.playback.status_line import StatusLine
+from sms_handover.ros.main import EXIT_FAILED, EXIT_OK, RunnableNode, Stop, run_node
+from sms_handover.ros.message_types import message_class
+from sms_handover.ros.parameters import declare, refuse_unknown
+from sms_handover.ros.qos import stored, weakest
+from sms_handover.ros.taps import Taps
+from sms_handover.topics import TOPIC_RECORDER
+
+_POLL_S = 0.005  # [s] of wall time between two batches
+_LOOK_S = 0.1  # [s] of wall time between two looks for new topics
+_QUIET_S = 0.2  # [s] of wall time without a message after which nothing is on the way any more
+_REST_S = 5.0  # [s] of wall time at most to wait for that
+
+
+class TopicRecorderNode(RunnableNode):
+    """Writes the messages of any topics, as they come, to a rosbag2 MCAP bag.
+
+    The log time of a message is the wall time at which it was sent, so that topics keep their order
+    among each other, whichever is taken from the middleware first.
+    """
+
+    def __init__(self) -> None:
+        """Create the bag; raises ConfigurationError if it cannot, or on a bad parameter."""
+        super().__init__(TOPIC_RECORDER, automatically_declare_parameters_from_overrides=True)
+        self.parameters: TopicRecorderParameters = declare(
+            self, TopicRecorderParameters, "topic_recorder.yaml", TOPIC_RECORDER
+        )
+        refuse_unknown(self, TopicRecorderParameters)
+        self._choice = self.parameters.choice
+        folder = self.parameters.folder or datetime.now().strftime("rosbag2_%Y_%m_%d-%H_%M_%S")
+        try:
+            self._writer = BagWriter(Path(folder))
+        except BagError as error:
+            raise ConfigurationError(str(error)) from error
+        self._seen: set[str] = set()
+        self._taps = Taps(self)
+        self._line = StatusLine()
+        self.create_timer(_LOOK_S, self.look_for_topics)
+
+    @property
+    def recorded(self) -> dict[str, int]:
+        """Return how many messages have been recorded, by topic."""
+        return self._writer.message_counts
+
+    def run(self, executor: Executor, stop: Stop) -> int:
+        """Record until asked to stop, or for the time asked for; close the bag."""
+        begin = monotonic()
+        duration_s = self.parameters.duration
+        print(f"recording to {self._writer.folder}; interrupt to end", file=sys.stderr)
+        try:
+            while not stop.asked and not (duration_s and monotonic() - begin > duration_s):
+                executor.spin_once(timeout_sec=_POLL_S)
+                self._take()
+            self._take_the_rest(executor)
+        finally:
+            self._writer.close()
+            self._taps.destroy()
+            self._line.clear()
+        for topic, count in self.recorded.items():
+            print(f"{count:10d}  {topic}")
+        print(f"{sum(self.recorded.values()):10d}  messages in {self._writer.folder}")
+        return EXIT_OK if self.recorded else EXIT_FAILED
+
+    def look_for_topics(self) -> None:
+        """Record the chosen topics that have appeared, with the quality of service that is offered."""
+        for name, type_names in self.get_topic_names_and_types():
+            if name in self._seen or not self._choice.wants(name):
+                continue
+            publishers = self.get_publishers_info_by_topic(name)
+            if not publishers:
+                continue
+            self._seen.add(name)
+            offers = [publisher.qos_profile for publisher in publishers]
+            try:
+                kind = message_class(type_names[0])
+                self._writer.add_topic(name, type_names[0], list(dict.fromkeys(map(stored, offers))))
+            except SmsHandoverError as error:
+                self._line.clear()
+                print(f"not recorded: {name}: {error}", file=sys.stderr)
+                continue
+            subscription = self.create_subscription(kind, name, lambda data: None, weakest(offers), raw=True)
+            self._taps.take_over(subscription, partial(self._receive, name))
+
+    def _receive(self, name: str, data: bytes, sent_ns: int) -> None:
+        """Record one message that was sent at a wall-clock time."""
+        self._writer.write(name, data, sent_ns, sent_ns)
+
+    def _take(self) -> int:
+        """Take every message that has come, and show how many there are; return how many came."""
+        taken = self._taps.empty()
+        if self._line.due:
+            counts = self.recorded
+            self._line.show(f"{sum(counts.values())} messages of {len(counts)} topics")
+        return taken
+
+    def _take_the_rest(self, executor: Executor) -> None:
+        """Take what is on the way; a graph that goes on is left alone."""
+        begin = last = monotonic()
+        while monotonic() - last < _QUIET_S and monotonic() - begin < _REST_S:
+            if self._take():
+                last = monotonic()
+            executor.spin_once(timeout_sec=_POLL_S)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node."""
+    return run_node(TopicRecorderNode, args, name=TOPIC_RECORDER)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

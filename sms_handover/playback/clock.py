@@ -1,0 +1,74 @@
+"""The clock of a playback: bag time as a function of wall time."""
+
+from math import isfinite
+
+from sms_handover.errors import ConfigurationError
+
+
+class PlaybackClock:
+    """Bag time that runs at a rate, may stand still, and may be set.
+
+    It reads no clock itself: every method is given the wall time ``now_ns``, any monotonic count of ns.
+    """
+
+    def __init__(self, bag_ns: int, now_ns: int, *, rate: float = 1.0, paused: bool = False) -> None:
+        """Begin at a bag time; raises ConfigurationError on a rate that is not positive."""
+        self._rate = _checked(rate)
+        self._paused = paused
+        self._bag_ns, self._at_ns = bag_ns, now_ns  # bag time at a wall time
+        self._ran_ns = 0
+
+    @property
+    def rate(self) -> float:
+        """Return seconds of the bag per second of wall time."""
+        return self._rate
+
+    @property
+    def paused(self) -> bool:
+        """Tell whether bag time stands still."""
+        return self._paused
+
+    def bag_ns(self, now_ns: int) -> int:
+        """Return the bag time."""
+        if self._paused:
+            return self._bag_ns
+        return self._bag_ns + round((now_ns - self._at_ns) * self._rate)
+
+    def wait_ns(self, bag_ns: int, now_ns: int) -> int | None:
+        """Return the wall time until a bag time comes, 0 if it has, None while the clock is paused."""
+        left_ns = bag_ns - self.bag_ns(now_ns)
+        if left_ns <= 0:
+            return 0
+        return None if self._paused else max(1, round(left_ns / self._rate))
+
+    def ran_ns(self, now_ns: int) -> int:
+        """Return the wall time that the clock has run in all."""
+        return self._ran_ns + (0 if self._paused else now_ns - self._at_ns)
+
+    def pause(self, now_ns: int) -> None:
+        """Stand still."""
+        self.jump(self.bag_ns(now_ns), now_ns)
+        self._paused = True
+
+    def resume(self, now_ns: int) -> None:
+        """Go on."""
+        self.jump(self.bag_ns(now_ns), now_ns)
+        self._paused = False
+
+    def set_rate(self, rate: float, now_ns: int) -> None:
+        """Run at another rate from now on; raises ConfigurationError if it is not positive."""
+        checked = _checked(rate)
+        self.jump(self.bag_ns(now_ns), now_ns)
+        self._rate = checked
+
+    def jump(self, bag_ns: int, now_ns: int) -> None:
+        """Set the bag time."""
+        self._ran_ns = self.ran_ns(now_ns)
+        self._bag_ns, self._at_ns = bag_ns, now_ns
+
+
+def _checked(rate: float) -> float:
+    """Return a rate that can be played at."""
+    if not (isfinite(rate) and rate > 0.0):
+        raise ConfigurationError(f"the rate is {rate:g}, allowed is a finite number above 0")
+    return rate

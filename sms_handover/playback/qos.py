@@ -1,0 +1,151 @@
+"""The quality of service that the publishers of a recorded topic offered, as a bag tells it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import Enum
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+
+from sms_handover.bag.qos import Durability, History, Reliability
+from sms_handover.errors import ConfigurationError, UnknownNameError
+from sms_handover.parameters import read_yaml
+from sms_handover.units import NS_PER_S
+
+E = TypeVar("E", bound=Enum)
+
+
+class Liveliness(Enum):
+    """Who says that a publisher is alive."""
+
+    AUTOMATIC = "automatic"
+    MANUAL_BY_TOPIC = "manual_by_topic"
+
+
+@dataclass(frozen=True)
+class Offer:
+    """A profile to publish with; durations are in ns, None is infinite."""
+
+    reliability: Reliability = Reliability.RELIABLE
+    durability: Durability = Durability.VOLATILE
+    history: History = History.UNKNOWN
+    depth: int = 0
+    deadline_ns: int | None = None
+    lifespan_ns: int | None = None
+    liveliness: Liveliness = Liveliness.AUTOMATIC
+    lease_ns: int | None = None
+
+    @property
+    def latched(self) -> bool:
+        """Tell whether a late subscriber still gets the last messages."""
+        return self.durability is Durability.TRANSIENT_LOCAL
+
+
+# Policies as rosbag2 numbers them below version 9, the numbers of the rmw enumerations.
+_NUMBERED: dict[type[Enum], dict[int, Enum]] = {
+    History: {1: History.KEEP_LAST, 2: History.KEEP_ALL},
+    Reliability: {1: Reliability.RELIABLE, 2: Reliability.BEST_EFFORT},
+    Durability: {1: Durability.TRANSIENT_LOCAL, 2: Durability.VOLATILE},
+    Liveliness: {1: Liveliness.AUTOMATIC, 3: Liveliness.MANUAL_BY_TOPIC},
+}
+_POLICIES: dict[str, type[Enum]] = {
+    "history": History,
+    "reliability": Reliability,
+    "durability": Durability,
+    "liveliness": Liveliness,
+}
+_DURATIONS = {"deadline": "deadline_ns", "lifespan": "lifespan_ns", "liveliness_lease_duration": "lease_ns"}
+_IGNORED = ("avoid_ros_namespace_conventions",)
+_INFINITE_FROM_S = 2**31 - 1  # [s] the middlewares of ROS 2 Foxy wrote infinity as this, later ones larger
+
+
+def read_offer(text: str) -> Offer:
+    """Return one profile to play a topic with, from the ``offered_qos_profiles`` of its channel.
+
+    Both forms are read: names (version 9) and numbers (before). Where publishers offered different
+    profiles, the stronger reliability and durability count, for these serve every subscriber. Raises
+    ConfigurationError on a text that is no list of profiles.
+    """
+    try:
+        profiles = yaml.safe_load(text) or []
+    except yaml.YAMLError as error:
+        raise ConfigurationError(
+            f"offered_qos_profiles is not YAML: {' '.join(str(error).split())}"
+        ) from error
+    if not isinstance(profiles, list) or not all(isinstance(item, dict) for item in profiles):
+        raise ConfigurationError("offered_qos_profiles is not a list of profiles")
+    if not profiles:
+        return Offer()
+    offers = [with_policies(Offer(), profile, "offered_qos_profiles") for profile in profiles]
+    first = offers[0]
+    return replace(
+        first if all(offer == first for offer in offers) else Offer(),
+        reliability=_strongest(Reliability.RELIABLE, [offer.reliability for offer in offers]),
+        durability=_strongest(Durability.TRANSIENT_LOCAL, [offer.durability for offer in offers]),
+        history=first.history,
+        depth=max(offer.depth for offer in offers),
+    )
+
+
+def read_overrides(path: Path) -> Mapping[str, Mapping[str, Any]]:
+    """Return the policies to change by topic, from a file as ``ros2 bag play`` takes it; checks them."""
+    overrides = read_yaml(path)
+    for topic, policies in overrides.items():
+        if not isinstance(policies, dict):
+            raise ConfigurationError(f"{path}: the policies of {topic} are not a mapping")
+        with_policies(Offer(), policies, f"{path}: {topic}")
+    return overrides
+
+
+def with_policies(offer: Offer, policies: Mapping[str, Any], where: str) -> Offer:
+    """Return a profile with some policies changed; raises ConfigurationError on what it does not know."""
+    changes: dict[str, Any] = {}
+    for name, value in policies.items():
+        if name in _POLICIES:
+            policy = _policy(_POLICIES[name], value, f"{where}: {name}")
+            if policy is not None:
+                changes[name] = policy
+        elif name in _DURATIONS:
+            changes[_DURATIONS[name]] = _duration_ns(value, f"{where}: {name}")
+        elif name == "depth":
+            changes[name] = _whole(value, f"{where}: depth")
+        elif name not in _IGNORED:
+            raise UnknownNameError("policy", str(name), (*_POLICIES, *_DURATIONS, "depth"), where)
+    return replace(offer, **changes)
+
+
+def _policy(kind: type[E], value: object, where: str) -> E | None:
+    """Return the value of a policy, None where the middleware was to choose or it is not known."""
+    if isinstance(value, int):
+        found: Any = _NUMBERED[kind].get(value)
+        return found if isinstance(found, kind) else None
+    if value in ("system_default", "unknown", "best_available"):
+        return None
+    try:
+        return kind(value)
+    except ValueError:
+        known = [str(item.value) for item in kind]
+        raise UnknownNameError("value", str(value), known, where) from None
+
+
+def _duration_ns(value: object, where: str) -> int | None:
+    """Return a duration of ``sec`` and ``nsec`` in ns, None where it is infinite or not set."""
+    if not isinstance(value, dict) or not {"sec", "nsec"} <= value.keys():
+        raise ConfigurationError(f"{where} is {value!r}, expected a mapping with sec and nsec")
+    seconds, nanoseconds = (_whole(value[key], f"{where}.{key}") for key in ("sec", "nsec"))
+    if seconds >= _INFINITE_FROM_S or (seconds, nanoseconds) == (0, 0):
+        return None
+    return seconds * NS_PER_S + nanoseconds
+
+
+def _whole(value: object, where: str) -> int:
+    """Return a whole number that is not negative."""
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise ConfigurationError(f"{where} is {value!r}, expected a whole number of at least 0")
+    return value
+
+
+def _strongest(strong: E, found: list[E]) -> E:
+    """Return the strong policy if it is among the found ones, which are alike otherwise."""
+    return strong if strong in found else found[0]

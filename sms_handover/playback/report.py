@@ -1,0 +1,31 @@
+"""What a playback tells about itself, in words."""
+
+from sms_handover.bag.time_order import TimeSpan
+from sms_handover.playback.schedule import PlaybackSchedule
+from sms_handover.units import ns_to_seconds
+
+_PROMPT_NS = 100_000_000  # [ns] of wall time that a message may be late without being spoken of
+
+
+def progress_line(schedule: PlaybackSchedule, span: TimeSpan, now_ns: int) -> str:
+    """Return how far the playback is, at which rate, and how much has been sent."""
+    position_s = ns_to_seconds(schedule.position_ns(now_ns) - int(span.start_ns))
+    length_s = ns_to_seconds(int(span.end_ns) - int(span.start_ns))
+    state = "paused" if schedule.clock.paused else f"{schedule.achieved_rate(now_ns):.2f} achieved"
+    return (
+        f"{position_s:8.2f} of {length_s:g} s  rate {schedule.clock.rate:.2f}, {state}  "
+        f"{schedule.sent_count} messages"
+    )
+
+
+def closing_line(schedule: PlaybackSchedule, now_ns: int) -> str:
+    """Return what has been played, and whether the rate was kept."""
+    text = f"{schedule.sent_count} messages sent in {ns_to_seconds(schedule.clock.ran_ns(now_ns)):.2f} s"
+    lag_ns = schedule.largest_lag_ns
+    if lag_ns <= _PROMPT_NS:
+        return f"{text}, none later than {ns_to_seconds(lag_ns) * 1000:.0f} ms"
+    return (
+        f"{text}: the rate of {schedule.clock.rate:g} could not be kept, achieved was "
+        f"{schedule.achieved_rate(now_ns):.2f}; messages were up to {ns_to_seconds(lag_ns):.2f} s late, none"
+        " was left out"
+    )

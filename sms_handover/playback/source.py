@@ -1,0 +1,50 @@
+"""What is played of a bag: topics, times, and how the messages are opened."""
+
+from collections import deque
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+
+from sms_handover.bag.files import RawMessage
+from sms_handover.bag.info import BagInfo
+from sms_handover.bag.time_order import TimeSpan, messages_by_time
+from sms_handover.errors import ConfigurationError
+from sms_handover.units import ns_to_seconds, seconds_to_ns
+
+
+@dataclass(frozen=True)
+class PlaybackSource:
+    """Some topics of a bag over some time; ``latched`` tells how many messages of a topic stay in force."""
+
+    path: Path
+    topics: frozenset[str]
+    latched: Mapping[str, int]
+    bag_start_ns: int
+    span: TimeSpan
+
+    def read(self, from_ns: int) -> Iterator[RawMessage]:
+        """Open the messages from a bag time on, behind those latched ones that are in force at that time."""
+        messages = messages_by_time(self.path, self.topics, TimeSpan(from_ns, self.span.end_ns))
+        return chain(self._in_force_at(from_ns), messages)
+
+    def _in_force_at(self, from_ns: int) -> Iterator[RawMessage]:
+        """Yield the latched messages that a subscriber would have got which came at a time."""
+        if from_ns <= self.bag_start_ns or not self.latched:
+            return
+        kept = {topic: deque[RawMessage](maxlen=depth) for topic, depth in self.latched.items()}
+        for message in messages_by_time(self.path, kept, TimeSpan(self.bag_start_ns, from_ns - 1)):
+            kept[message.topic].append(message)
+        yield from sorted(chain.from_iterable(kept.values()), key=lambda message: message.log_time_ns)
+
+
+def span_of(info: BagInfo, start_offset_s: float, duration_s: float) -> TimeSpan:
+    """Return the times to play, ``duration_s`` 0 being all; raises ConfigurationError behind the end."""
+    if start_offset_s > ns_to_seconds(info.duration_ns):
+        raise ConfigurationError(
+            f"start offset is {start_offset_s:g} s, allowed is up to "
+            f"{ns_to_seconds(info.duration_ns):g} s, the length of {info.path}"
+        )
+    start_ns = info.start_ns + seconds_to_ns(start_offset_s)
+    end_ns = min(info.end_ns, start_ns + seconds_to_ns(duration_s)) if duration_s else info.end_ns
+    return TimeSpan(start_ns, end_ns)
