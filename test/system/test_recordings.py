@@ -17,14 +17,22 @@ from rosbags.highlevel import AnyReader
 from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.reader import read_run
 from sms_handover.bag.writer import BagWriter
-from sms_handover.frames import WORLD
+from sms_handover.frames import DEPUTY, WORLD
 from sms_handover.model.poses import pose_distance, pose_of
 from sms_handover.run_data import RunData
+from sms_handover.scene.links import DescribedRobot
 from sms_handover.scene.read import read_scene
 from sms_handover.simulation.scenario import load_robot_model, load_scenario
 from sms_handover.topics import LOOP_NODES, NODES, Rate, graph_topics
 from sms_handover.types import Pose
 
+from ..core.layout_paths import (
+    foxglove_paths,
+    foxglove_value,
+    last_messages,
+    plotjuggler_curves,
+    plotjuggler_value,
+)
 from .conftest import LAWS, TICKS
 from .runs import Ended, sms_handover
 
@@ -196,6 +204,25 @@ def test_the_transforms_in_the_bag_put_every_link_where_the_scene_has_it(bag: Pa
                     assert max(pose_distance(Pose(row[:3], row[3:]), in_world[link])) < 1e-9, link
                 seen.add(log_ns)
     assert seen == set(rows)
+
+
+def test_the_robot_is_latched_and_every_link_has_a_transform(bag: Path) -> None:
+    info = read_info(bag)
+    (profile,) = yaml.safe_load(info.topics["/robot_description"].qos)
+    assert (profile["durability"], profile["reliability"]) == ("transient_local", "reliable")
+    messages = last_messages(bag)
+    urdf = messages["/robot_description"][1].data
+    assert urdf == info.urdf_text
+    children = [item.child_frame_id for item in messages["/tf"][1].transforms]
+    assert sorted(children) == sorted([*DescribedRobot(urdf).links, DEPUTY])
+
+
+def test_the_layouts_for_other_tools_find_everything_they_name(bag: Path) -> None:
+    messages = last_messages(bag)
+    for path, _ in foxglove_paths():
+        assert foxglove_value(path, messages) is not None, path
+    for name in plotjuggler_curves():
+        assert isinstance(plotjuggler_value(name, messages), float), name
 
 
 def chained(message: Any) -> dict[str, Pose]:

@@ -75,7 +75,7 @@ class Picture {
       if (view !== "arms") run.bodies[0].children.forEach((mesh) => box.expandByObject(mesh));
     });
     const ball = box.getBoundingSphere(new THREE.Sphere());
-    return { middle: ball.center, radius: ball.radius * (view === "arms" ? 0.88 : 0.72) };
+    return { middle: ball.center, radius: ball.radius * (view === "arms" ? 0.92 : 0.72) };
   }
 
   /** Take one of the ready views. */

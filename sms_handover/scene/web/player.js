@@ -204,14 +204,16 @@ class Player {
 
   /** Show what came of the last grasp, for a while. */
   tellEvent() {
-    const runs = this.tiles.flat();
-    const lines = runs.flatMap((run) => run.data.events
-      .filter((event) => event.time <= this.t && this.t < event.time + EVENT_SHOWN)
-      .map((event) => (runs.length > 1 ? `${run.name}: ${event.text}` : event.text)));
+    const told = new Map(); // what was told, and by which runs
+    this.tiles.flat().forEach((run) => run.data.events.forEach((event) => {
+      if (event.time <= this.t && this.t < event.time + EVENT_SHOWN) {
+        told.set(event.text, [...(told.get(event.text) || []), run.name]);
+      }
+    }));
+    const text = [...told].map(([what, runs]) => `${what} (${runs.join(", ")})`).join("\n");
     const place = element("event");
-    place.classList.toggle("shown", lines.length > 0);
-    const text = lines.join("\n");
-    if (lines.length && place.innerText !== text) place.innerText = text;
+    place.classList.toggle("shown", text !== "");
+    if (text && place.textContent !== text) place.textContent = text;
   }
 
   /** Names of arms and deputy beside them, once per tile. */
@@ -231,9 +233,9 @@ class Player {
 
   placeLabels() {
     this.labels.forEach(({ run, place, body, node, below }) => {
-      if (body === null) { // the name of the run, at the top of its tile
-        const { width, right, down } = this.picture.tile();
-        node.style.transform = `translate(${(right * place + width / 2).toFixed(1)}px, ${(down * place + 8).toFixed(1)}px)`;
+      if (body === null) { // the name of the run, at the foot of its tile
+        const { width, height, right, down } = this.picture.tile();
+        node.style.transform = `translate(${(right * place + width / 2).toFixed(1)}px, ${(down * place + height - 28).toFixed(1)}px)`;
         return;
       }
       const index = run.body(body);
