@@ -6,9 +6,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, TypeVar
 
-import yaml
-
-from sms_handover.bag.qos import Durability, History, Reliability
+from sms_handover.bag.qos import Durability, History, Reliability, profiles_of
 from sms_handover.errors import ConfigurationError, UnknownNameError
 from sms_handover.parameters import read_yaml
 from sms_handover.units import NS_PER_S
@@ -42,13 +40,6 @@ class Offer:
         return self.durability is Durability.TRANSIENT_LOCAL
 
 
-# Policies as rosbag2 numbers them below version 9, the numbers of the rmw enumerations.
-_NUMBERED: dict[type[Enum], dict[int, Enum]] = {
-    History: {1: History.KEEP_LAST, 2: History.KEEP_ALL},
-    Reliability: {1: Reliability.RELIABLE, 2: Reliability.BEST_EFFORT},
-    Durability: {1: Durability.TRANSIENT_LOCAL, 2: Durability.VOLATILE},
-    Liveliness: {1: Liveliness.AUTOMATIC, 3: Liveliness.MANUAL_BY_TOPIC},
-}
 _POLICIES: dict[str, type[Enum]] = {
     "history": History,
     "reliability": Reliability,
@@ -63,21 +54,12 @@ _INFINITE_FROM_S = 2**31 - 1  # [s] the middlewares of ROS 2 Foxy wrote infinity
 def read_offer(text: str) -> Offer:
     """Return one profile to play a topic with, from the ``offered_qos_profiles`` of its channel.
 
-    Both forms are read: names (version 9) and numbers (before). Where publishers offered different
-    profiles, the stronger reliability and durability count, for these serve every subscriber. Raises
-    ConfigurationError on a text that is no list of profiles.
+    Where publishers offered different profiles, the stronger reliability and durability count, for these
+    serve every subscriber. A text that is not readable is as good as none.
     """
-    try:
-        profiles = yaml.safe_load(text) or []
-    except yaml.YAMLError as error:
-        raise ConfigurationError(
-            f"offered_qos_profiles is not YAML: {' '.join(str(error).split())}"
-        ) from error
-    if not isinstance(profiles, list) or not all(isinstance(item, dict) for item in profiles):
-        raise ConfigurationError("offered_qos_profiles is not a list of profiles")
-    if not profiles:
+    offers = [with_policies(Offer(), profile, "offered_qos_profiles") for profile in profiles_of(text)]
+    if not offers:
         return Offer()
-    offers = [with_policies(Offer(), profile, "offered_qos_profiles") for profile in profiles]
     first = offers[0]
     return replace(
         first if all(offer == first for offer in offers) else Offer(),
@@ -117,9 +99,6 @@ def with_policies(offer: Offer, policies: Mapping[str, Any], where: str) -> Offe
 
 def _policy(kind: type[E], value: object, where: str) -> E | None:
     """Return the value of a policy, None where the middleware was to choose or it is not known."""
-    if isinstance(value, int):
-        found: Any = _NUMBERED[kind].get(value)
-        return found if isinstance(found, kind) else None
     if value in ("system_default", "unknown", "best_available"):
         return None
     try:

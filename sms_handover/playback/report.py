@@ -5,13 +5,19 @@ from sms_handover.playback.schedule import PlaybackSchedule
 from sms_handover.units import ns_to_seconds
 
 _PROMPT_NS = 100_000_000  # [ns] of wall time that a message may be late without being spoken of
+_SETTLED_NS = 500_000_000  # [ns] of wall time before an achieved rate means something
 
 
 def progress_line(schedule: PlaybackSchedule, span: TimeSpan, now_ns: int) -> str:
     """Return how far the playback is, at which rate, and how much has been sent."""
     position_s = ns_to_seconds(schedule.position_ns(now_ns) - int(span.start_ns))
     length_s = ns_to_seconds(int(span.end_ns) - int(span.start_ns))
-    state = "paused" if schedule.clock.paused else f"{schedule.achieved_rate(now_ns):.2f} achieved"
+    if schedule.clock.paused:
+        state = "paused"
+    elif schedule.clock.ran_ns(now_ns) < _SETTLED_NS:
+        state = "playing"
+    else:
+        state = f"achieved {schedule.achieved_rate(now_ns):.2f}"
     return (
         f"{position_s:8.2f} of {length_s:g} s  rate {schedule.clock.rate:.2f}, {state}  "
         f"{schedule.sent_count} messages"

@@ -256,7 +256,7 @@ def test_progress_is_in_words() -> None:
     play = Play(TIMES, rate=2.0)
     play.run(1 * S)
     assert progress_line(play.schedule, TimeSpan(TIMES[0], TIMES[-1]), play.now) == (
-        "    2.00 of 5 s  rate 2.00, 2.00 achieved  21 messages"
+        "    2.00 of 5 s  rate 2.00, achieved 2.00  21 messages"
     )
     play.schedule.pause(play.now)
     assert "rate 2.00, paused" in progress_line(play.schedule, TimeSpan(TIMES[0], TIMES[-1]), play.now)
