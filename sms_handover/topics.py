@@ -79,6 +79,7 @@ LOOP_TIMING = "loop_timing"
 CLOCK = "/clock"
 DIAGNOSTICS = "/diagnostics"
 TF = "/tf"  # written into the bag by the recorder; tf2_msgs cannot be imported everywhere
+DEPUTY_MARKER = "deputy/marker"  # written into the bag too, once, for viewers that have no live graph
 
 SOLVE_IK = "solve_ik"  # service of the ik node
 

@@ -3,8 +3,10 @@
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 
+from sms_handover.bag.marker import MARKER_TYPE, deputy_marker_cdr
 from sms_handover.bag.recording import Recording
 from sms_handover.frames import DEPUTY, WORLD
 from sms_handover.model.robot_model import RobotModel
@@ -22,6 +24,9 @@ from .layout_paths import (
     plotjuggler_value,
 )
 
+CUBE, ADD = 1, 0  # [-] of visualization_msgs/msg/Marker
+SIZE = (0.1, 0.34, 0.2)  # m
+
 
 @pytest.fixture(scope="module")
 def messages(tmp_path_factory: pytest.TempPathFactory) -> Messages:
@@ -34,6 +39,8 @@ def messages(tmp_path_factory: pytest.TempPathFactory) -> Messages:
         recording.receive("/sampled_joint_states", TYPES.serialize(state), WALL_NS)
         base = odometry(0, run.base_pose[0], run.base_twist[0])
         recording.receive("/sampled_base_odometry", TYPES.serialize(base), WALL_NS)
+        recording.add_topic("/deputy/marker", MARKER_TYPE)
+        recording.receive("/deputy/marker", deputy_marker_cdr(TYPES, np.array(SIZE)), WALL_NS)
     return last_messages(folder)
 
 
@@ -82,6 +89,16 @@ def test_what_the_3d_panel_shows_is_there(messages: Messages, robot: RobotModel)
     assert messages[layer["topic"]][0] == "std_msgs/msg/String"
     frames = {name.removeprefix("frame:") for name in panel["transforms"]}
     assert frames == {*DescribedRobot(robot.urdf).links, WORLD, DEPUTY}
+
+
+def test_the_deputy_is_a_box_that_stays_with_its_frame(messages: Messages) -> None:
+    kind, marker = messages["/deputy/marker"]
+    assert kind == "visualization_msgs/msg/Marker"
+    assert (marker.type, marker.action, marker.frame_locked) == (CUBE, ADD, True)
+    assert marker.header.frame_id == DEPUTY
+    assert (marker.scale.x, marker.scale.y, marker.scale.z) == SIZE
+    assert marker.color.a == 1.0 and marker.pose.orientation.w == 1.0
+    assert (marker.lifetime.sec, marker.lifetime.nanosec) == (0, 0)
 
 
 def test_every_panel_has_one_place() -> None:

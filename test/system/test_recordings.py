@@ -215,6 +215,8 @@ def test_the_robot_is_latched_and_every_link_has_a_transform(bag: Path) -> None:
     assert urdf == info.urdf_text
     children = [item.child_frame_id for item in messages["/tf"][1].transforms]
     assert sorted(children) == sorted([*DescribedRobot(urdf).links, DEPUTY])
+    scale = messages["/deputy/marker"][1].scale
+    assert (scale.x, scale.y, scale.z) == tuple(yaml.safe_load(info.schedule_text or "")["deputy"]["size"])
 
 
 def test_the_layouts_for_other_tools_find_everything_they_name(bag: Path) -> None:
