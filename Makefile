@@ -2,6 +2,7 @@
 PYTHON ?= $(shell python3.11 -c 'import sys; print(sys.executable)' 2>/dev/null || echo python3)
 VENV ?= .venv
 RUNS ?= runs
+FIGURES ?= figures
 MEASURED := build/verification
 
 BIN := $(VENV)/bin
@@ -13,7 +14,7 @@ TYPED := setup.py interfaces/setup.py sms_handover test $(wildcard benchmarks/*.
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover simulate test verify measure bench lint install colcon clean
+.PHONY: help handover figures simulate test verify measure bench lint install colcon clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -22,6 +23,9 @@ handover: install  ## hand the deputy over under NMPC, then PID, over DDS in loc
 	$(BIN)/sms-handover run --controller nmpc --output $(RUNS)/nmpc --overwrite
 	$(BIN)/sms-handover run --controller pid --output $(RUNS)/pid --overwrite
 	$(BIN)/sms-handover compare $(RUNS)/nmpc $(RUNS)/pid
+
+figures: install  ## draw the paper's figures from the runs of `make handover`
+	$(BIN)/sms-handover figures $(RUNS)/nmpc $(RUNS)/pid --output $(FIGURES) --format pdf,png,svg
 
 simulate: install  ## the same handover in one process, without DDS or a recording
 	$(BIN)/sms-handover simulate
@@ -74,17 +78,17 @@ $(VENV)/.interfaces: $(VENV)/.environment $(INTERFACES) .ci/constraints.txt
 	@touch $@
 
 $(VENV)/.package: $(METADATA) | $(VENV)/.interfaces
-	$(PIP) --editable .
+	$(PIP) --editable '.[analysis]'
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.package
-	$(PIP) --editable '.[test]'
+	$(PIP) --editable '.[analysis,test]'
 	@touch $@
 
 $(VENV)/.verify: $(VENV)/.test
-	$(PIP) --editable '.[test,verify]'
+	$(PIP) --editable '.[analysis,test,verify]'
 	@touch $@
 
 $(VENV)/.bench: $(VENV)/.verify
-	$(PIP) --editable '.[test,verify,bench]'
+	$(PIP) --editable '.[analysis,test,verify,bench]'
 	@touch $@

@@ -76,6 +76,7 @@ setup(
         "zstandard>=0.22,<1",
     ],
     extras_require={
+        "analysis": ["matplotlib>=3.10,<4"],
         "test": [
             "mcap-ros2-support>=0.5.7,<1",
             "mypy>=1.15",

@@ -45,3 +45,13 @@ class BagError(SmsHandoverError):
 
 class GraphError(SmsHandoverError):
     """The running graph broke its protocol: a node died, went silent or never appeared."""
+
+
+class MissingDependencyError(SmsHandoverError, ImportError):
+    """A package that only an extra needs is not installed."""
+
+    def __init__(self, what: str, package: str, extra: str) -> None:
+        """Compose the message, e.g. ``figures need matplotlib: pip install 'sms_handover[analysis]'``."""
+        super().__init__(
+            f"{what} need {package}, which is not installed: pip install 'sms_handover[{extra}]'"
+        )

@@ -37,13 +37,15 @@ ALLOWED: dict[str, set[str]] = {
     **{layer: {"model"} for layer in MIDDLE},
     "simulation": {"model", *MIDDLE},
     "bag": {"model", "simulation"},
-    "analysis": {"model", "simulation"},
+    "analysis": {"model", "simulation", "bag", "scene"},
     "scene": {"model", "bag"},
     "playback": {"bag"},
     "ros": CORE,
     "nodes": CORE | {"ros"},
     "cli": CORE | {"ros", "nodes"},
 }
+DRAWING = {"matplotlib", "mpl_toolkits"}  # optional, so one package alone may need them
+FIGURES = "sms_handover.analysis.figures"
 ROS = re.compile(r"rclpy|ament_index_python|launch(_ros)?|tf2_\w+|rosidl_\w+|\w+_(msgs|srvs|interfaces)")
 
 
@@ -84,6 +86,8 @@ def violations(source: str, module: str) -> list[str]:
         head, *rest = name.split(".")
         if ROS.fullmatch(head) and layer not in EDGE:
             found.append(f"{module}:{line} imports {name}: only {sorted(EDGE)} may know ROS")
+        if head in DRAWING and not module.startswith(f"{FIGURES}."):
+            found.append(f"{module}:{line} imports {name}: only {FIGURES} may")
         if head != PACKAGE or not rest or rest[0].startswith("__"):
             continue
         target = layer_of(name)
@@ -115,6 +119,8 @@ def test_imports_point_one_way(file: Path) -> None:
         ("sms_handover.bag.writer", "from sensor_msgs.msg import JointState"),
         ("sms_handover.topics", "from std_srvs.srv import Trigger"),
         ("sms_handover.ik.residual", "import sms_handover_interfaces.srv"),
+        ("sms_handover.analysis.metrics", "from matplotlib.figure import Figure"),
+        ("sms_handover.cli.figures", "def draw():\n    import mpl_toolkits.mplot3d"),
     ],
 )
 def test_a_wrong_import_is_caught(module: str, source: str) -> None:
@@ -130,6 +136,7 @@ def test_a_wrong_import_is_caught(module: str, source: str) -> None:
         ("sms_handover.simulation.loop", "from sms_handover.plant import deputy"),
         ("sms_handover.nodes.plant", "import rclpy\nfrom sms_handover_interfaces.msg import RunState"),
         ("sms_handover.bag.reader", "import rosbags.rosbag2"),
+        ("sms_handover.analysis.figures.base", "from matplotlib.figure import Figure"),
     ],
 )
 def test_a_right_import_passes(module: str, source: str) -> None:

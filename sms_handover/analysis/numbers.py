@@ -51,7 +51,6 @@ def rotation_vectors(a: Array, b: Array) -> Array:
     scalar = np.sum(a * b, axis=-1, keepdims=True)
     length = lengths(vector)[..., np.newaxis]
     angle = 2.0 * np.arctan2(length, np.abs(scalar))
-    # where |v| is too small to divide by, the angle is 2 |v|
-    factor = np.divide(angle, length, out=np.full(length.shape, 2.0), where=length > 0.0)
+    factor = np.divide(angle, length, out=np.zeros(length.shape), where=length > 0.0)
     result: Array = np.where(scalar < 0.0, -factor, factor) * vector
     return result

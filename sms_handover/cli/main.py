@@ -12,6 +12,7 @@ _COMMANDS = {
     "run": "run the handover as a graph of ROS 2 nodes and record it",
     "simulate": "run it in one process, without ROS",
     "compare": "print recorded runs side by side, with the paper's claims",
+    "figures": "draw the paper's figures from recorded runs",
     "reproduce": "run a bag's scenario again in one process and compare bit by bit",
     "play": "publish the messages of any MCAP bag again, with keys to control it",
     "record": "record any topics of any graph to an MCAP bag",

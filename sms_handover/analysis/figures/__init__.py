@@ -1,0 +1,8 @@
+"""Figures of runs for print, drawn with matplotlib; the only part of the package that imports it."""
+
+from importlib.util import find_spec
+
+from sms_handover.errors import MissingDependencyError
+
+if find_spec("matplotlib") is None:
+    raise MissingDependencyError("figures", "matplotlib", "analysis")

@@ -1,0 +1,90 @@
+"""``sms-handover figures``: the paper's figures, and some more, from recorded runs."""
+
+import sys
+from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from pathlib import Path
+
+from sms_handover.analysis.figure_catalogue import FIGURES, chosen_figures, chosen_formats
+from sms_handover.bag.info import BagInfo, read_info
+from sms_handover.bag.reader import read_run
+from sms_handover.cli.folders import bag_of
+from sms_handover.control.parameters import LAWS
+from sms_handover.errors import ConfigurationError
+from sms_handover.run_data import RunData
+from sms_handover.scene.read import deputy_size_in
+from sms_handover.scene.scene import Scene, make_scene
+
+_FRAME_RATE = 10.0  # [1/s] of the scene that snapshots are taken from
+_DEFAULT_FORMATS = "pdf,png"
+_DPI = (50, 1200)  # [1/in] allowed
+
+
+def add_parser(parser: ArgumentParser) -> None:
+    """Describe the command."""
+    listed = [
+        f"  {kind.name:<12} {kind.text}" + (f" (paper: figure {kind.paper})" if kind.paper else "")
+        for kind in FIGURES
+    ]
+    parser.formatter_class = RawDescriptionHelpFormatter
+    parser.description = (
+        "Draw figures for print from bags. The runs are laid over each other: the first is solid, the\n"
+        "second dashed. docs/figures.md shows each figure and tells what to see in it."
+    )
+    parser.epilog = "figures:\n" + "\n".join(listed) + "\n\nFiles that are there already are replaced."
+    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="output folder of a run, or a bag")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path("figures"),
+        metavar="DIR",
+        help="where to (default: figures)",
+    )
+    parser.add_argument(
+        "--format",
+        default=_DEFAULT_FORMATS,
+        metavar="LIST",
+        help=f"pdf, png, svg, or several (default: {_DEFAULT_FORMATS})",
+    )
+    parser.add_argument(
+        "--only",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="this figure alone, see below; may be given again",
+    )
+    parser.add_argument("--dpi", type=int, default=300, help="dots per inch of a png (default: 300)")
+
+
+def command(options: Namespace) -> int:
+    """Carry out the command; return the exit code."""
+    formats = chosen_formats([name.strip() for name in options.format.split(",")])
+    chosen_figures(options.only)
+    if not _DPI[0] <= options.dpi <= _DPI[1]:
+        raise ConfigurationError(f"--dpi is {options.dpi} dots per inch, allowed is {_DPI[0]} to {_DPI[1]}")
+    # here, because matplotlib is optional and slow to import: help and wrong input need none of it
+    from sms_handover.analysis.figures.draw import draw_figures, write_figure  # noqa: PLC0415
+    from sms_handover.analysis.figures.drawn_run import DrawnRun  # noqa: PLC0415
+
+    runs = []
+    for path in options.runs:
+        name, data, info = path.resolve().name, read_run(bag_of(path)), read_info(bag_of(path))
+        runs.append(DrawnRun(name.upper() if name in LAWS else name, data, _scene(data, info)))
+    try:
+        options.output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigurationError(f"{options.output} cannot be made: {error.strerror}") from error
+    for name, figure in draw_figures(runs, options.only):
+        for suffix in formats:
+            path = options.output / f"{name}.{suffix}"
+            write_figure(figure, path, options.dpi)
+            print(path, flush=True)
+    return 0
+
+
+def _scene(run: RunData, info: BagInfo) -> Scene | None:
+    """Return the moving scene of a run, None if its bag does not describe the robot or the deputy."""
+    if info.urdf_text is None or info.schedule_text is None:
+        print(f"no snapshots of {info.path}: it describes no robot or no deputy", file=sys.stderr)
+        return None
+    return make_scene(run, info.urdf_text, deputy_size_in(info), _FRAME_RATE)

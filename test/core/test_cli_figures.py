@@ -1,0 +1,69 @@
+"""``sms-handover figures`` as a user meets it: files, notes, help and wrong input."""
+
+from pathlib import Path
+
+import pytest
+
+from sms_handover.analysis.figure_catalogue import FIGURES
+from sms_handover.cli.main import main
+
+from .bag_messages import made_up_run, write_run
+
+
+@pytest.fixture(scope="module")
+def bags(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
+    """Two bags without a robot description, as other tools may have cut them."""
+    folder = tmp_path_factory.mktemp("runs")
+    return str(write_run(folder / "nmpc", made_up_run())), str(
+        write_run(folder / "mine", made_up_run(seed=1))
+    )
+
+
+def test_the_files_are_named_as_they_are_written(
+    bags: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "a" / "b"
+    arguments = ["figures", *bags, "-o", str(out), "--format", "svg,png", "--only", "torque", "--dpi", "50"]
+    assert main([*arguments, "--only", "momentum"]) == 0
+    expected = [f"{name}.{suffix}" for name in _TORQUE_AND_MOMENTUM for suffix in ("svg", "png")]
+    printed, notes = capsys.readouterr()
+    assert printed.splitlines() == [str(out / name) for name in expected]
+    assert sorted(path.name for path in out.iterdir()) == sorted(expected)
+    assert [line.split(":")[-1] for line in notes.splitlines()] == [" it describes no robot or no deputy"] * 2
+    assert main([*arguments, "--only", "momentum"]) == 0, "figures are drawn again over those that are there"
+
+
+_TORQUE_AND_MOMENTUM = ("torque_arm_a", "torque_arm_b", "momentum")
+
+
+def test_help_lists_every_figure(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["figures", "--help"])
+    printed = capsys.readouterr().out
+    assert all(f"  {kind.name} " in printed and kind.text in printed for kind in FIGURES)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--only", "torq"], "unknown figure 'torq' (did you mean 'torque'?): known are 'tool_error', "),
+        (["--format", "png,jpeg"], "unknown figure format 'jpeg'"),
+        (["--format", ""], "unknown figure format ''"),
+        (["--dpi", "10"], "--dpi is 10 dots per inch, allowed is 50 to 1200"),
+    ],
+)
+def test_wrong_input_ends_in_one_line_before_anything_is_read(
+    options: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["figures", str(tmp_path / "nowhere"), "-o", str(tmp_path / "out"), *options]) == 2
+    errors = capsys.readouterr().err
+    assert message in errors and len(errors.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_output_that_is_a_file_is_told(
+    bags: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "out").write_text("")
+    assert main(["figures", bags[0], "-o", str(tmp_path / "out"), "--only", "momentum"]) == 2
+    assert "out cannot be made: File exists" in capsys.readouterr().err
