@@ -8,6 +8,7 @@ value that went over DDS and one that did not are equal bit for bit.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -15,22 +16,35 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
+BASE_NQ = 7  # position and quaternion of the base at the head of a configuration
+BASE_NV = 6  # its twist, linear then angular, in base_link axes, at the head of a velocity
+
+_FLOAT64 = np.dtype(np.float64)
+
 
 def read_only(values: npt.ArrayLike) -> Array:
     """Return ``values`` as a float64 array that cannot be written to, copied unless it is one already."""
-    if type(values) is np.ndarray and values.dtype == np.float64 and _is_frozen(values):
+    if type(values) is np.ndarray and values.dtype == _FLOAT64 and _is_frozen(values):
         return values
     array = np.array(values, dtype=np.float64)
     array.setflags(write=False)
     return array
 
 
+def frozen(array: Array) -> Array:
+    """Make an array that nobody else holds read-only, so that it can be passed on without a copy."""
+    array.setflags(write=False)
+    return array
+
+
 def _is_frozen(array: Array) -> bool:
     """Tell whether nobody can write to the memory of an array: neither through it nor through its base."""
-    base = array.base
-    if isinstance(base, np.ndarray) and base.flags.writeable:
+    if array.flags.writeable:
         return False
-    return not array.flags.writeable and (base is None or isinstance(base, np.ndarray | bytes))
+    base = array.base
+    if base is None or type(base) is bytes:
+        return True
+    return isinstance(base, np.ndarray) and not base.flags.writeable
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,21 +77,56 @@ class Twist:
 class RobotState:
     """The whole state of the robot at one tick.
 
-    ``base_in_world`` is the pose of ``base_link``, ``twist_base_in_base`` its twist in its own
-    axes. ``joint_effort`` (n,) N m is what the plant applied over the tick that ended at ``stamp_ns``.
+    ``q`` (7 + n,) is position and quaternion x y z w of ``base_link`` in ``world``, then the joint
+    angles; ``v`` (6 + n,) is the twist of ``base_link`` in its own axes, then the joint rates.
+    ``joint_effort`` (n,) N m is what the plant applied over the tick that ended at ``stamp_ns``.
     """
 
     stamp_ns: int
-    base_in_world: Pose
-    twist_base_in_base: Twist
-    joint_position: Array
-    joint_velocity: Array
+    q: Array
+    v: Array
     joint_effort: Array
 
     def __post_init__(self) -> None:
         """Copy the arrays and make them read-only."""
-        for name in ("joint_position", "joint_velocity", "joint_effort"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        object.__setattr__(self, "q", read_only(self.q))
+        object.__setattr__(self, "v", read_only(self.v))
+        object.__setattr__(self, "joint_effort", read_only(self.joint_effort))
+
+    @classmethod
+    def of(
+        cls,
+        stamp_ns: int,
+        base_in_world: Pose,
+        twist_base_in_base: Twist,
+        joint_position: Array,
+        joint_velocity: Array,
+        joint_effort: Array,
+    ) -> "RobotState":
+        """Return the state that is given part by part."""
+        q = np.concatenate([base_in_world.position, base_in_world.quaternion_xyzw, joint_position])
+        v = np.concatenate([twist_base_in_base.linear, twist_base_in_base.angular, joint_velocity])
+        return cls(stamp_ns, q, v, joint_effort)
+
+    @cached_property
+    def base_in_world(self) -> Pose:
+        """The pose of ``base_link``."""
+        return Pose(self.q[:3], self.q[3:BASE_NQ])
+
+    @cached_property
+    def twist_base_in_base(self) -> Twist:
+        """The twist of ``base_link`` in its own axes."""
+        return Twist(self.v[:3], self.v[3:BASE_NV])
+
+    @property
+    def joint_position(self) -> Array:
+        """The joint angles (n,) in rad."""
+        return self.q[BASE_NQ:]
+
+    @property
+    def joint_velocity(self) -> Array:
+        """The joint rates (n,) in rad/s."""
+        return self.v[BASE_NV:]
 
 
 @dataclass(frozen=True, eq=False)

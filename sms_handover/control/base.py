@@ -19,8 +19,9 @@ class DesiredMotion:
 
     def __post_init__(self) -> None:
         """Copy the arrays and make them read-only."""
-        for name in ("position", "velocity", "acceleration"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        object.__setattr__(self, "position", read_only(self.position))
+        object.__setattr__(self, "velocity", read_only(self.velocity))
+        object.__setattr__(self, "acceleration", read_only(self.acceleration))
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from sms_handover.control.stability import LoopStability, loop_stability
 from sms_handover.errors import UnstableLoopError
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.types import Array, JointCommand, JointReference, RobotState, TaskPhase
+from sms_handover.types import Array, JointCommand, JointReference, RobotState, TaskPhase, frozen
 from sms_handover.units import ns_to_seconds
 
 Gains = NmpcGains | PidGains
@@ -60,7 +60,7 @@ class JointController:
         if not self._track.ready:
             return JointCommand(state.stamp_ns, np.zeros(self._robot.n_joints))
         effort = self._law.step(state, self._track.at(state.stamp_ns), self._dt)
-        return JointCommand(state.stamp_ns, effort)
+        return JointCommand(state.stamp_ns, frozen(effort))
 
 
 def make_law(robot: RobotModel, gains: Gains) -> ControlLaw[Any]:

@@ -45,7 +45,8 @@ class NmpcLaw(ControlLaw[NmpcGains]):
     def __init__(self, robot: RobotModel, gains: NmpcGains) -> None:
         """Set up the law for a robot."""
         self._robot = robot
-        self._gains = gains
+        self._errors = np.zeros((2, robot.n_joints))  # rows e, e'
+        self.use(gains)
 
     def reset(self) -> None:
         """Do nothing: the law has no memory."""
@@ -53,15 +54,15 @@ class NmpcLaw(ControlLaw[NmpcGains]):
     def use(self, gains: NmpcGains) -> None:
         """Go on with other gains."""
         self._gains = gains
+        self._feedback = np.array([gains.position_gain, gains.velocity_gain])
 
     def step(self, state: RobotState, desired: DesiredMotion, dt: float) -> Array:
         """Return the joint efforts (n,) N m, limited to what the joints can give; ``dt`` plays no part."""
-        robot, gains = self._robot, self._gains
-        error = state.joint_position - desired.position
-        error_rate = state.joint_velocity - desired.velocity
-        acceleration = desired.acceleration - gains.position_gain * error - gains.velocity_gain * error_rate
-        effort = reduced_inverse_dynamics(robot, robot.q_of(state), robot.v_of(state), acceleration)
-        return np.minimum(np.maximum(effort, -robot.effort_limit), robot.effort_limit)
+        robot, errors = self._robot, self._errors
+        np.subtract(state.joint_position, desired.position, out=errors[0])
+        np.subtract(state.joint_velocity, desired.velocity, out=errors[1])
+        acceleration = desired.acceleration - self._feedback.dot(errors)
+        return robot.limited(reduced_inverse_dynamics(robot, state.q, state.v, acceleration))
 
     def linearised(self, inertia: Array) -> LinearFeedback:
         """Return K_e = A_1 H*, K_v = A_2 H*, K_z = 0."""

@@ -44,13 +44,13 @@ class PidLaw(ControlLaw[PidGains]):
 
     def step(self, state: RobotState, desired: DesiredMotion, dt: float) -> Array:
         """Return the joint efforts (n,) N m, limited to what the joints can give."""
-        gains, limit = self._gains, self._robot.effort_limit
+        gains = self._gains
         error = state.joint_position - desired.position
         error_rate = state.joint_velocity - desired.velocity
         wanted = -(
             gains.proportional * error + gains.integral * self._integral + gains.derivative * error_rate
         )
-        effort: Array = np.minimum(np.maximum(wanted, -limit), limit)
+        effort = self._robot.limited(wanted)
         winds_up = (wanted != effort) & (np.sign(wanted) == -np.sign(error))
         self._integral += np.where(winds_up, 0.0, error * dt)
         return effort

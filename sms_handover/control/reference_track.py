@@ -3,7 +3,7 @@
 import numpy as np
 
 from sms_handover.control.base import DesiredMotion
-from sms_handover.types import Array, JointReference
+from sms_handover.types import Array, JointReference, frozen
 from sms_handover.units import ns_to_seconds
 
 
@@ -26,7 +26,8 @@ class ReferenceTrack:
     def reset(self) -> None:
         """Forget every reference."""
         self._last: JointReference | None = None
-        self._acceleration: Array = np.zeros(0)
+        self._motion: Array = np.zeros((3, 0))  # rows q_d, q_d', q_d'' at the last reference
+        self._forward = np.eye(3)  # takes these rows to a later time
         self._broken = False
 
     def restart(self) -> None:
@@ -36,19 +37,21 @@ class ReferenceTrack:
     def update(self, reference: JointReference) -> None:
         """Take the next reference."""
         previous = self._last
-        self._acceleration = np.zeros_like(reference.velocity)
+        acceleration = np.zeros_like(reference.velocity)
         if previous is not None and not self._broken:
             period = ns_to_seconds(reference.stamp_ns - previous.stamp_ns)
-            self._acceleration = (reference.velocity - previous.velocity) / period
+            acceleration = (reference.velocity - previous.velocity) / period
+        self._motion = np.array([reference.position, reference.velocity, acceleration])
         self._last = reference
         self._broken = False
 
     def at(self, stamp_ns: int) -> DesiredMotion:
         """Return the desired motion at a time not before the last reference."""
-        reference = self._last
-        if reference is None:
+        if self._last is None:
             raise RuntimeError("no reference has come yet")
-        s = ns_to_seconds(stamp_ns - reference.stamp_ns)
-        velocity = reference.velocity + self._acceleration * s
-        position = reference.position + reference.velocity * s + self._acceleration * (0.5 * s * s)
-        return DesiredMotion(position, velocity, self._acceleration)
+        s = ns_to_seconds(stamp_ns - self._last.stamp_ns)
+        forward = self._forward
+        forward[0, 1] = forward[1, 2] = s
+        forward[0, 2] = 0.5 * s * s
+        motion = frozen(forward.dot(self._motion))
+        return DesiredMotion(motion[0], motion[1], motion[2])

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import eigenpy
 import numpy as np
 import pinocchio as pin
 
@@ -40,14 +41,16 @@ def reduced_dynamics(robot: RobotModel, q: Array, v: Array) -> ReducedDynamics:
 def reduced_inverse_dynamics(robot: RobotModel, q: Array, v: Array, joint_acceleration: Array) -> Array:
     """Return the joint efforts u (n,) N m that bring about joint accelerations (n,) rad/s^2 on a free base.
 
-    The same as H* q_m'' + c*, but without forming H*: the base accelerates by
-    a_b = -H_b^-1 (H_bm q_m'' + c_b), and u = H_bm^T a_b + H_m q_m'' + c_m.
+    The same as H* q_m'' + c*, but without forming H*: a base that did not accelerate would need the
+    wrench f_b = H_bm q_m'' + c_b; it has none, so it accelerates by a_b = -H_b^-1 f_b, and
+    u = H_m q_m'' + c_m + H_mb a_b.
     """
+    accelerations = np.zeros(v.size)
+    accelerations[BASE_NV:] = joint_acceleration
+    forces = pin.rnea(robot.pin, robot.data, q, v, accelerations)
     inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.WORLD)
-    bias = pin.nonLinearEffects(robot.pin, robot.data, q, v)
-    pull = inertia[:, BASE_NV:] @ joint_acceleration + bias
-    base_acceleration = np.linalg.solve(inertia[:BASE_NV, :BASE_NV], -pull[:BASE_NV])
-    efforts: Array = pull[BASE_NV:] + inertia[BASE_NV:, :BASE_NV] @ base_acceleration
+    base_acceleration = -eigenpy.LLT(inertia[:BASE_NV, :BASE_NV]).solve(forces[:BASE_NV])
+    efforts: Array = forces[BASE_NV:] + inertia[BASE_NV:, :BASE_NV].dot(base_acceleration)
     return efforts
 
 

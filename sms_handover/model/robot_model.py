@@ -12,10 +12,9 @@ from sms_handover.frames import tool_frame
 from sms_handover.model.description import RobotDescription, load_robot
 from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.model.urdf import to_urdf
-from sms_handover.types import Array, Pose, RobotState, Twist, read_only
+from sms_handover.types import BASE_NQ, BASE_NV, Array, Pose, Twist, read_only
 
-BASE_NQ = 7  # position and quaternion of the free-flyer joint
-BASE_NV = 6  # its twist, linear then angular, in base_link axes
+__all__ = ["BASE_NQ", "BASE_NV", "RobotModel"]
 
 
 class RobotModel:
@@ -40,6 +39,7 @@ class RobotModel:
         self.lower = read_only(self.pin.lowerPositionLimit[BASE_NQ:])
         self.upper = read_only(self.pin.upperPositionLimit[BASE_NQ:])
         self.effort_limit = read_only(self.pin.effortLimit[BASE_NV:])
+        self._least_effort = read_only(-self.effort_limit)
         self.arms = tuple(arm.name for arm in description.arms)
         self.arm_joints: Mapping[str, slice] = MappingProxyType(self._arm_slices())
         self.tool_frame_id: Mapping[str, int] = MappingProxyType(
@@ -73,17 +73,9 @@ class RobotModel:
         """Return q (7 + n,) from the pose of the base and the joint angles."""
         return np.concatenate([base_in_world.position, base_in_world.quaternion_xyzw, joint_position])
 
-    def velocity(self, twist_base_in_base: Twist, joint_velocity: Array) -> Array:
-        """Return v (6 + n,) from the twist of the base in its own axes and the joint rates."""
-        return np.concatenate([twist_base_in_base.linear, twist_base_in_base.angular, joint_velocity])
-
-    def q_of(self, state: RobotState) -> Array:
-        """Return the configuration (7 + n,) of a state."""
-        return self.configuration(state.base_in_world, state.joint_position)
-
-    def v_of(self, state: RobotState) -> Array:
-        """Return the velocity (6 + n,) of a state."""
-        return self.velocity(state.twist_base_in_base, state.joint_velocity)
+    def limited(self, effort: Array) -> Array:
+        """Return joint efforts (n,) N m, each limited to what its joint can give."""
+        return np.minimum(np.maximum(effort, self._least_effort), self.effort_limit)
 
     def tools_in_world(self, base_in_world: Pose, joint_position: Array) -> dict[str, Pose]:
         """Return the pose of every tool frame in ``world``, by forward kinematics."""

@@ -10,7 +10,7 @@ from sms_handover.model.conserved import PhysicsReceipt, physics_receipt
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.deputy import MasslessDeputy
 from sms_handover.plant.grasping import answer
-from sms_handover.plant.integrators import TABLEAUS, rkmk_step
+from sms_handover.plant.integrators import TABLEAUS, LieGroupIntegrator
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.types import (
     Array,
@@ -20,7 +20,8 @@ from sms_handover.types import (
     JointCommand,
     Pose,
     RobotState,
-    Twist,
+    frozen,
+    read_only,
 )
 from sms_handover.units import ns_to_seconds
 
@@ -46,23 +47,25 @@ class FreeFloatingPlant:
     ) -> None:
         """Place robot and deputy at rest; raises ConfigurationError on a joint outside its limits."""
         self._robot = robot
-        self._tableau = TABLEAUS[parameters.integrator]
         self._tolerance = parameters.grasp_tolerance
         self._initial = initial
         self._tick_ns = tick_ns
         self._tick_s = ns_to_seconds(tick_ns)
+        self._integrator = LieGroupIntegrator(robot.pin, TABLEAUS[parameters.integrator], self._tick_s)
+        self._generalized = np.zeros(robot.pin.nv)  # (0, u): no wrench on the base
         self._check_start()
         self.reset()
 
     def reset(self) -> None:
         """Go back to the initial state at time zero."""
         self._tick = 0
-        self._q = self._robot.configuration(self._initial.base_in_world, self._initial.joint_position)
-        self._v = np.zeros(self._robot.pin.nv)
-        self._effort = np.zeros(self._robot.n_joints)
+        robot, initial = self._robot, self._initial
+        self._q = read_only(robot.configuration(initial.base_in_world, initial.joint_position))
+        self._v = read_only(np.zeros(robot.pin.nv))
+        self._effort = read_only(np.zeros(robot.n_joints))
         self._work = 0.0
-        self._saturated_ticks = np.zeros(self._robot.n_joints, dtype=np.int64)
-        self._deputy = MasslessDeputy(self._initial.deputy_in_world, self._initial.deputy_grasp_frames)
+        self._saturated_ticks = np.zeros(robot.n_joints, dtype=np.int64)
+        self._deputy = MasslessDeputy(initial.deputy_in_world, initial.deputy_grasp_frames)
 
     @property
     def tick(self) -> int:
@@ -77,15 +80,7 @@ class FreeFloatingPlant:
     @property
     def state(self) -> RobotState:
         """Return the state at this tick."""
-        q, v = self._q, self._v
-        return RobotState(
-            stamp_ns=self.stamp_ns,
-            base_in_world=Pose(q[:3], q[3:BASE_NQ]),
-            twist_base_in_base=Twist(v[:3], v[3:BASE_NV]),
-            joint_position=q[BASE_NQ:],
-            joint_velocity=v[BASE_NV:],
-            joint_effort=self._effort,
-        )
+        return RobotState(self.stamp_ns, self._q, self._v, self._effort)
 
     @property
     def deputy(self) -> DeputyState:
@@ -134,23 +129,30 @@ class FreeFloatingPlant:
 
         The work is u . (q_m(t + h) - q_m(t)), exact because u is constant over the tick.
         """
-        limit = self._robot.effort_limit
-        effort = np.minimum(np.maximum(command.effort, -limit), limit)
-        self._saturated_ticks += np.abs(command.effort) >= limit
-        generalized = np.concatenate([np.zeros(BASE_NV), effort])
-        model, data = self._robot.pin, self._robot.data
-
-        def acceleration(q: Array, v: Array) -> Array:
-            joint_and_base: Array = pin.aba(model, data, q, v, generalized)
-            return joint_and_base
-
+        effort = self._limited(command.effort)
         before = self._q
-        self._q, self._v = rkmk_step(model, self._tableau, acceleration, before, self._v, self._tick_s)
-        self._work += float(effort @ (self._q[BASE_NQ:] - before[BASE_NQ:]))
-        self._effort = effort
+        q, v = self._integrator.step(self._acceleration, before, self._v)
+        self._q, self._v, self._effort = frozen(q), frozen(v), effort
+        self._work += float(effort.dot(q[BASE_NQ:] - before[BASE_NQ:]))
         self._tick += 1
         if not self._deputy.holder:
             self._deputy.drift(self._tick_s)
+
+    def _limited(self, asked: Array) -> Array:
+        """Return the efforts that the joints give, and count those at their limit or beyond."""
+        effort = asked
+        at_limit = np.abs(asked) >= self._robot.effort_limit
+        if np.count_nonzero(at_limit):
+            self._saturated_ticks += at_limit
+            effort = frozen(self._robot.limited(asked))
+        self._generalized[BASE_NV:] = effort
+        return effort
+
+    def _acceleration(self, q: Array, v: Array) -> Array:
+        """Return v' (6 + n,) under the efforts of this tick."""
+        robot = self._robot
+        acceleration: Array = pin.aba(robot.pin, robot.data, q, v, self._generalized, pin.Convention.WORLD)
+        return acceleration
 
     def _deputy_follow(self) -> None:
         """Bring a held deputy to where its tool is now."""

@@ -1,4 +1,4 @@
-"""Explicit Runge-Kutta-Munthe-Kaas integrators on SE(3) x R^n [MuntheKaas1999]."""
+"""Explicit commutator-free Runge-Kutta integrators on SE(3) x R^n [Celledoni2003]."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -7,7 +7,6 @@ from types import MappingProxyType
 import numpy as np
 import pinocchio as pin
 
-from sms_handover.model.robot_model import BASE_NV
 from sms_handover.types import Array
 
 Acceleration = Callable[[Array, Array], Array]
@@ -15,71 +14,103 @@ Acceleration = Callable[[Array, Array], Array]
 
 @dataclass(frozen=True)
 class Tableau:
-    """Butcher tableau of an explicit Runge-Kutta scheme: strictly lower rows ``a``, weights ``b``."""
+    """Butcher tableau of an explicit scheme, with the motions that its configurations are composed of.
+
+    ``a`` has strictly lower rows. The configuration of stage i sets out from that of stage ``origins[i]``.
+    A step is a sequence of motions, whose weights are the rows of ``b``; they add up to the weights
+    of the scheme.
+    """
 
     order: int
     a: tuple[tuple[float, ...], ...]
-    b: tuple[float, ...]
+    origins: tuple[int, ...]
+    b: tuple[tuple[float, ...], ...]
 
 
 TABLEAUS: Mapping[str, Tableau] = MappingProxyType(
     {
-        "midpoint": Tableau(2, ((), (1 / 2,)), (0.0, 1.0)),
-        "rk4": Tableau(4, ((), (1 / 2,), (0.0, 1 / 2), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
+        "midpoint": Tableau(2, ((), (1 / 2,)), (0, 0), ((0.0, 1.0),)),
+        "rk4": Tableau(
+            4,
+            ((), (1 / 2,), (0.0, 1 / 2), (0.0, 0.0, 1.0)),
+            (0, 0, 0, 1),
+            ((1 / 4, 1 / 6, 1 / 6, -1 / 12), (-1 / 12, 1 / 6, 1 / 6, 1 / 4)),
+        ),
     }
 )
 
 
-def rkmk_step(
-    model: pin.Model, tableau: Tableau, acceleration: Acceleration, q: Array, v: Array, h: float
-) -> tuple[Array, Array]:
-    """Return configuration and velocity after one step of ``h`` s.
+@dataclass(frozen=True, eq=False)
+class _Stage:
+    """One stage: ``weights`` (2, i + 1) take the rows ``known`` to its motion and its velocity."""
 
-    With q(t) = q0 (+) u(t), the base part of u lives in se(3) and obeys
-    u' = dexpinv_{-u}(v); each stage evaluates v' = ``acceleration(q, v)`` at q0 (+) u_i.
-    Shapes: ``q`` (7 + n,), ``v`` (6 + n,). The order is the tableau's, up to 4.
+    weights: Array
+    known: Array
+    combined: Array
+    motion: Array
+    velocity: Array
+    origin: int
+    acceleration: Array
+
+
+class LieGroupIntegrator:
+    """Steps of ``h`` s of q' = v, v' = a(q, v), with q in SE(3) x R^n and v in body axes.
+
+    With v_i and a_i the velocity and the acceleration at stage i, and (+) the exponential map of SE(3) x R^n:
+
+        q_i = q_o (+) h sum_j (a_ij - a_oj) v_j,    v_i = v + h sum_j a_ij a_j,    o the origin of stage i
+        q_next = q (+) h sum_j b_1j v_j (+) h sum_j b_2j v_j ...,    v_next = v + h sum_rj b_rj a_j
+
+    Every sum is a combination of v and the a_j, so its weights are worked out once and a stage costs one
+    product of a small matrix with the rows (v, a_1, a_2, ...). The joints, for which (+) is a sum, follow the
+    classical scheme. An instance owns work space, so it is not to be shared between threads.
     """
-    tangents = np.empty((len(tableau.a), v.size))  # rows u'_i
-    slopes = np.empty_like(tangents)  # rows v'_i
-    for stage, row in enumerate(tableau.a):
-        if row:
-            weights = h * np.array(row)
-            u = weights @ tangents[:stage]
-            v_stage = v + weights @ slopes[:stage]
-            q_stage = pin.integrate(model, q, u)
-            tangents[stage] = v_stage
-            tangents[stage, :BASE_NV] = _inverse_differential(
-                u[:BASE_NV].tolist(), v_stage[:BASE_NV].tolist()
-            )
-        else:
-            q_stage, v_stage = q, v
-            tangents[stage] = v
-        slopes[stage] = acceleration(q_stage, v_stage)
-    weights = h * np.array(tableau.b)
-    q_next: Array = pin.integrate(model, q, weights @ tangents)
-    return q_next, v + weights @ slopes
+
+    def __init__(self, model: pin.Model, tableau: Tableau, h: float) -> None:
+        """Work out the weights of a step of ``h`` s."""
+        self._model = model
+        count = len(tableau.a)
+        a = np.array([[*row, *[0.0] * (count - len(row))] for row in tableau.a])
+        b = np.array(tableau.b)
+        self._rows = np.zeros((count + 1, model.nv))  # v, then a_1, a_2, ...
+        self._stages = tuple(
+            self._stage(i, origin, a[i] - a[origin], a, h)
+            for i, origin in enumerate(tableau.origins)
+            if i > 0
+        )
+        ends = [_of_velocities(weights, a, h) for weights in b]
+        self._end_weights = np.array([*ends, np.concatenate([[1.0], h * b.sum(axis=0)])])
+        self._ends = np.zeros((len(self._end_weights), model.nv))
+
+    def step(self, acceleration: Acceleration, q: Array, v: Array) -> tuple[Array, Array]:
+        """Return configuration (7 + n,) and velocity (6 + n,) after one step, as new arrays."""
+        model, rows = self._model, self._rows
+        rows[0] = v
+        rows[1] = acceleration(q, v)
+        configurations = [q]
+        for stage in self._stages:
+            stage.weights.dot(stage.known, stage.combined)
+            q_stage = pin.integrate(model, configurations[stage.origin], stage.motion)
+            configurations.append(q_stage)
+            stage.acceleration[:] = acceleration(q_stage, stage.velocity)
+        self._end_weights.dot(rows, self._ends)
+        *motions, v_next = self._ends
+        for motion in motions:
+            q = pin.integrate(model, q, motion)
+        return q, v_next.copy()
+
+    def _stage(self, index: int, origin: int, motion_weights: Array, a: Array, h: float) -> _Stage:
+        """Return a stage with its weights and its places in the work space."""
+        used = index + 1
+        weights = np.array(
+            [_of_velocities(motion_weights, a, h)[:used], np.concatenate([[1.0], h * a[index]])[:used]]
+        )
+        combined = np.zeros((2, self._rows.shape[1]))
+        return _Stage(
+            weights, self._rows[:used], combined, combined[0], combined[1], origin, self._rows[used]
+        )
 
 
-def _inverse_differential(u: list[float], v: list[float]) -> list[float]:
-    """Return dexpinv_{-u}(v) = v + [u, v]/2 + [u, [u, v]]/12 for two twists, linear part first.
-
-    The next term is of fourth order in u, so a step keeps order 4. Plain floats: for six numbers
-    they are several times faster than arrays.
-    """
-    first = _bracket(u, v)
-    second = _bracket(u, first)
-    return [x + 0.5 * y + z / 12.0 for x, y, z in zip(v, first, second, strict=True)]
-
-
-def _bracket(a: list[float], b: list[float]) -> list[float]:
-    """Return the Lie bracket of two twists: (w_a x v_b - w_b x v_a, w_a x w_b)."""
-    ax, ay, az, ap, aq, ar = a
-    bx, by, bz, bp, bq, br = b
-    return [
-        aq * bz - ar * by - bq * az + br * ay,
-        ar * bx - ap * bz - br * ax + bp * az,
-        ap * by - aq * bx - bp * ay + bq * ax,
-        aq * br - ar * bq,
-        ar * bp - ap * br,
-        ap * bq - aq * bp,
-    ]
+def _of_velocities(weights: Array, a: Array, h: float) -> Array:
+    """Return h sum_j w_j v_j as weights of (v, a_1, a_2, ...), with v_j = v + h sum_l a_jl a_l."""
+    return np.concatenate([[h * weights.sum()], h**2 * (weights @ a)])

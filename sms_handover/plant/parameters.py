@@ -11,7 +11,7 @@ from sms_handover.plant.integrators import TABLEAUS
 class PlantParameters:
     """How the plant integrates and when a grasp holds; the numbers are in ``config/plant.yaml``."""
 
-    integrator: str = parameter("Runge-Kutta-Munthe-Kaas scheme between ticks", choices=tuple(TABLEAUS))
+    integrator: str = parameter("commutator-free Runge-Kutta scheme between ticks", choices=tuple(TABLEAUS))
     grasp_position_tolerance: float = parameter(
         "largest distance of the tool to the grasp frame at which a grasp holds", unit="m", minimum=0.0
     )

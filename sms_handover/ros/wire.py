@@ -160,7 +160,7 @@ class StateWire:
         """Return the state that two messages of equal stamp carry."""
         blocks = self._joints.read(joints)
         base_in_world, twist = self._odometry.read(odometry)
-        return RobotState(
+        return RobotState.of(
             stamp_ns(joints), base_in_world, twist, blocks["position"], blocks["velocity"], blocks["effort"]
         )
 

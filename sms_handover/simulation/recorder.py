@@ -8,6 +8,8 @@ from sms_handover.model.conserved import PhysicsReceipt
 from sms_handover.model.poses import pose_row
 from sms_handover.run_data import RunData
 from sms_handover.types import (
+    BASE_NQ,
+    BASE_NV,
     Array,
     GraspEvent,
     IkResult,
@@ -30,8 +32,10 @@ class RunRecorder:
         n = len(joint_names)
         self._joint_names, self._arms = joint_names, arms
         self._tick_ns = np.zeros(ticks, dtype=np.int64)
-        self._joints = np.full((4, ticks, n), np.nan)  # position, velocity, effort, command
-        self._base = np.full((ticks, 13), np.nan)  # position, quaternion, twist
+        self._q = np.full((ticks, BASE_NQ + n), np.nan)
+        self._v = np.full((ticks, BASE_NV + n), np.nan)
+        self._effort = np.full((ticks, n), np.nan)
+        self._command = np.full((ticks, n), np.nan)
         self._reference_ns = np.zeros(periods, dtype=np.int64)
         self._reference = np.full((2, periods, n), np.nan)  # position, velocity
         self._poses = np.full((2, len(arms), periods, 7), np.nan)  # target, tool
@@ -47,14 +51,10 @@ class RunRecorder:
         """Add the row of one tick."""
         k = self._tick
         self._tick_ns[k] = state.stamp_ns
-        self._joints[0, k] = state.joint_position
-        self._joints[1, k] = state.joint_velocity
-        self._joints[2, k] = state.joint_effort
-        self._joints[3, k] = command.effort
-        self._base[k, :3] = state.base_in_world.position
-        self._base[k, 3:7] = state.base_in_world.quaternion_xyzw
-        self._base[k, 7:10] = state.twist_base_in_base.linear
-        self._base[k, 10:] = state.twist_base_in_base.angular
+        self._q[k] = state.q
+        self._v[k] = state.v
+        self._effort[k] = state.joint_effort
+        self._command[k] = command.effort
         self._tick += 1
 
     def reference(
@@ -103,12 +103,12 @@ class RunRecorder:
             joint_names=self._joint_names,
             arms=self._arms,
             tick_ns=self._tick_ns[ticks].copy(),
-            joint_position=self._joints[0, ticks].copy(),
-            joint_velocity=self._joints[1, ticks].copy(),
-            joint_effort=self._joints[2, ticks].copy(),
-            joint_command=self._joints[3, ticks].copy(),
-            base_pose=self._base[ticks, :7].copy(),
-            base_twist=self._base[ticks, 7:].copy(),
+            joint_position=self._q[ticks, BASE_NQ:].copy(),
+            joint_velocity=self._v[ticks, BASE_NV:].copy(),
+            joint_effort=self._effort[ticks].copy(),
+            joint_command=self._command[ticks].copy(),
+            base_pose=self._q[ticks, :BASE_NQ].copy(),
+            base_twist=self._v[ticks, :BASE_NV].copy(),
             reference_ns=self._reference_ns[periods].copy(),
             reference_position=self._reference[0, periods].copy(),
             reference_velocity=self._reference[1, periods].copy(),

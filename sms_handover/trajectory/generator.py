@@ -134,7 +134,7 @@ class TrajectoryGenerator:
     def _resolve_rates(self, state: RobotState, targets: Targets, velocity: Array) -> Array:
         """Return the joint rates with those of tool-led arms solved for from the desired twists."""
         robot = self._robot
-        q = robot.q_of(state)
+        q = state.q
         led = [arm for arm in robot.arms if arm in targets.tool_twist_in_world]
         jacobian = np.vstack([generalized_jacobian(robot, q, arm) for arm in led])
         twists = [targets.tool_twist_in_world[arm] for arm in led]

@@ -69,7 +69,7 @@ class Draw:
         """Return a state."""
         v = self.v(speed)
         twist = Twist(v[:3], v[3:BASE_NV])
-        return RobotState(0, self.pose(), twist, self.joints(), v[BASE_NV:], np.zeros(v.size - BASE_NV))
+        return RobotState.of(0, self.pose(), twist, self.joints(), v[BASE_NV:], np.zeros(v.size - BASE_NV))
 
 
 def slope(steps: list[float], errors: list[float]) -> float:
@@ -86,7 +86,7 @@ def distance(robot: RobotModel, a: tuple[Array, Array], b: tuple[Array, Array]) 
 def state_of(robot: RobotModel, q: Array, v: Array, stamp_ns: int = 0) -> RobotState:
     """Return a state from configuration and velocity."""
     pose, twist = Pose(q[:3], q[3:BASE_NQ]), Twist(v[:3], v[3:BASE_NV])
-    return RobotState(stamp_ns, pose, twist, q[BASE_NQ:], v[BASE_NV:], np.zeros(robot.n_joints))
+    return RobotState.of(stamp_ns, pose, twist, q[BASE_NQ:], v[BASE_NV:], np.zeros(robot.n_joints))
 
 
 def row_distance(a: Array, b: Array) -> tuple[float, float]:

@@ -212,7 +212,7 @@ def test_reference_rates_bring_about_the_tool_twist(smooth: Bench, time: float) 
     request = smooth.generator.ik_request(state, targets)
     solution = solve_ik(robot, request, smooth.scenario.parameters.ik)
     reference, _ = smooth.generator.reference(state, targets, solution.joint_position)
-    q = robot.q_of(state)
+    q = state.q
     led = [arm for arm in robot.arms if arm in targets.tool_twist_in_world]
     assert led
     twists = [targets.tool_twist_in_world[arm] for arm in led]

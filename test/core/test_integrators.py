@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 from sms_handover.model.robot_model import BASE_NV, RobotModel
-from sms_handover.plant.integrators import TABLEAUS, Acceleration, Tableau, rkmk_step
+from sms_handover.plant.integrators import TABLEAUS, Acceleration, LieGroupIntegrator, Tableau
 from sms_handover.types import Array
 
 from .conftest import Draw, distance, slope
@@ -21,8 +21,9 @@ def _advance(
 ) -> State:
     """Return the state after ``time`` s in ``n`` steps."""
     q, v = start
+    integrator = LieGroupIntegrator(model, tableau, time / n)
     for _ in range(n):
-        q, v = rkmk_step(model, tableau, rate, q, v, time / n)
+        q, v = integrator.step(rate, q, v)
     return q, v
 
 
@@ -43,9 +44,12 @@ def tableau(request: pytest.FixtureRequest) -> Tableau:
 
 
 def test_tableau_is_consistent(tableau: Tableau) -> None:
-    """An explicit scheme: row i has i entries, and the weights sum to one."""
-    assert [len(row) for row in tableau.a] == list(range(len(tableau.b)))
-    assert sum(tableau.b) == pytest.approx(1.0, abs=_EPS)
+    """An explicit scheme: row i has i entries, its origin comes before it, and the weights sum to one."""
+    count = len(tableau.a)
+    assert [len(row) for row in tableau.a] == list(range(count))
+    assert all(origin < max(stage, 1) for stage, origin in enumerate(tableau.origins))
+    assert len(tableau.origins) == count and {len(row) for row in tableau.b} == {count}
+    assert sum(map(sum, tableau.b)) == pytest.approx(1.0, abs=_EPS)
 
 
 def test_measured_order_is_the_declared_one(robot: RobotModel, draw: Draw, tableau: Tableau) -> None:
@@ -62,7 +66,7 @@ def test_measured_order_is_the_declared_one(robot: RobotModel, draw: Draw, table
 def test_a_constant_twist_is_integrated_exactly(robot: RobotModel, draw: Draw, tableau: Tableau) -> None:
     """Without acceleration the base follows one screw and the joints run evenly, in a single step."""
     q, v = draw.q(), draw.v()
-    q_next, v_next = rkmk_step(robot.pin, tableau, lambda q, v: np.zeros(20), q, v, 0.5)
+    q_next, v_next = LieGroupIntegrator(robot.pin, tableau, 0.5).step(lambda q, v: np.zeros(20), q, v)
     np.testing.assert_allclose(v_next, v, atol=4 * _EPS)
     assert distance(robot, (q_next, v), (pin.integrate(robot.pin, q, 0.5 * v), v)) <= 32 * _EPS
 
@@ -74,26 +78,30 @@ def test_quaternion_stays_normalised(robot: RobotModel, draw: Draw, tableau: Tab
 
 
 class Top:
-    """A free symmetric top: its motion is known in closed form."""
+    """A symmetric top, free or falling: its motion is known in closed form.
 
-    def __init__(self, draw: Draw) -> None:
-        """Spin it about a random axis while it flies along."""
+    Where it falls, its acceleration in its own axes depends on its attitude too.
+    """
+
+    def __init__(self, draw: Draw, gravity: float = 0.0) -> None:
+        """Spin it about a random axis while it flies along; ``gravity`` in m/s^2 pulls it along -z."""
+        self.pull = np.array([0.0, 0.0, -gravity])
         self.across, self.along = 2.0, 3.0  # [kg m^2]
         self.model = pin.Model()
         joint = self.model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "free")
         moments = np.diag([self.across, self.across, self.along])
         self.model.appendBodyToJoint(joint, pin.Inertia(5.0, np.zeros(3), moments), pin.SE3.Identity())
-        self.model.gravity.setZero()
+        self.model.gravity.linear = self.pull
         self.data = self.model.createData()
         self.q = np.concatenate([draw.vector(3), pin.Quaternion(pin.exp3(draw.vector(3))).coeffs()])
         self.v = np.concatenate([draw.vector(3), [1.0, -0.7, 1.5]])
 
     def acceleration(self, q: Array, v: Array) -> Array:
-        """Return the free acceleration."""
+        """Return the acceleration without any effort."""
         return np.array(pin.aba(self.model, self.data, q, v, np.zeros(6)))
 
     def at(self, time: float) -> State:
-        """Return the exact state: R = exp(t L / I1) R0 exp(t w3 (1 - I3 / I1) e3), the centre on a line."""
+        """Return the exact state: R = exp(t L / I1) R0 exp(t w3 (1 - I3 / I1) e3), the centre a parabola."""
         rotation = pin.Quaternion(self.q[3:]).matrix()
         spin = self.v[3:]
         momentum = rotation @ np.array([self.across * spin[0], self.across * spin[1], self.along * spin[2]])
@@ -102,8 +110,9 @@ class Top:
             pin.exp3(time * momentum / self.across) @ rotation @ pin.exp3(np.array([0.0, 0.0, time * own]))
         )
         spin_now = turned.T @ momentum / [self.across, self.across, self.along]
-        speed = rotation @ self.v[:3]
-        place = self.q[:3] + time * speed
+        start = rotation @ self.v[:3]
+        speed = start + time * self.pull
+        place = self.q[:3] + time * start + 0.5 * time**2 * self.pull
         q = np.concatenate([place, pin.Quaternion(turned).coeffs()])
         return q, np.concatenate([turned.T @ speed, spin_now])
 
@@ -115,9 +124,10 @@ class Top:
         return float(np.max(np.abs(apart)))
 
 
-def test_closed_form_of_the_top_obeys_euler(draw: Draw) -> None:
+@pytest.mark.parametrize("gravity", [0.0, 3.0])
+def test_closed_form_of_the_top_obeys_euler(draw: Draw, gravity: float) -> None:
     """The closed form that the next test trusts fulfils v' = aba(q, v) and q' = v, by differences."""
-    top = Top(draw)
+    top = Top(draw, gravity)
     step = 1e-5  # [s]
     (q0, v0), (q, v), (q1, v1) = (top.at(0.3 + k * step) for k in (-1, 0, 1))
     # Central differences of functions that oscillate at w < 4 rad/s: w^3 h^2 / 6 w + eps / h.
@@ -126,9 +136,10 @@ def test_closed_form_of_the_top_obeys_euler(draw: Draw) -> None:
     np.testing.assert_allclose(pin.difference(top.model, q0, q1) / (2 * step), v, atol=bound)
 
 
-def test_free_top_follows_its_closed_form(draw: Draw, tableau: Tableau) -> None:
+@pytest.mark.parametrize("gravity", [0.0, 3.0])
+def test_top_follows_its_closed_form(draw: Draw, tableau: Tableau, gravity: float) -> None:
     """A spinning symmetric body precesses as Euler found; the error has the declared order and no floor."""
-    top, time = Top(draw), 2.0
+    top, time = Top(draw, gravity), 2.0
     counts = [100, 200, 400]
     errors = [top.error(tableau, time, n) for n in counts]
     assert slope([time / n for n in counts], errors) == pytest.approx(tableau.order, abs=_ORDER_TOLERANCE)

@@ -11,7 +11,7 @@ from sms_handover.control.base import DesiredMotion
 from sms_handover.control.nmpc import MAX_CONTROL_ORDER, NmpcGains, NmpcLaw
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
-from sms_handover.plant.integrators import TABLEAUS, rkmk_step
+from sms_handover.plant.integrators import TABLEAUS, LieGroupIntegrator
 from sms_handover.types import Array
 
 from .conftest import Draw, slope, state_of
@@ -127,6 +127,7 @@ def test_closed_loop_follows_its_closed_form(robot: RobotModel, draw: Draw, orde
     time, ticks, departures = 1.0, [0.002, 0.004, 0.008], []
     for tick in ticks:
         q, v = q0, np.zeros(20)
+        integrator = LieGroupIntegrator(robot.pin, TABLEAUS["rk4"], tick)
         worst = 0.0
         for index in range(round(time / tick)):
             effort = law.step(state_of(robot, q, v), desired, tick)
@@ -136,7 +137,7 @@ def test_closed_loop_follows_its_closed_form(robot: RobotModel, draw: Draw, orde
             def acceleration(q: Array, v: Array, u: Array = generalized) -> Array:
                 return np.array(pin.aba(robot.pin, robot.data, q, v, u))
 
-            q, v = rkmk_step(robot.pin, TABLEAUS["rk4"], acceleration, q, v, tick)
+            q, v = integrator.step(acceleration, q, v)
             e, rate = _response(gains, (index + 1) * tick)
             worst = max(
                 worst,

@@ -8,7 +8,7 @@ from sms_handover.control.base import DesiredMotion
 from sms_handover.control.pid import PidGains, PidLaw
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
-from sms_handover.plant.integrators import TABLEAUS, rkmk_step
+from sms_handover.plant.integrators import TABLEAUS, LieGroupIntegrator
 from sms_handover.types import Array
 
 from .conftest import Draw, slope, state_of
@@ -75,6 +75,7 @@ def test_small_motions_of_the_robot_are_those_of_the_frozen_one(robot: RobotMode
         desired = DesiredMotion(_BENT - error, np.zeros(14), np.zeros(14))
         expected, _ = _linear(inertia, _GAINS, error, count)
         q, v, worst = q0, np.zeros(20), 0.0
+        integrator = LieGroupIntegrator(robot.pin, TABLEAUS["rk4"], _DT)
         for tick in range(count):
             effort = law.step(state_of(robot, q, v), desired, _DT)
             generalized = np.concatenate([np.zeros(BASE_NV), effort])
@@ -82,7 +83,7 @@ def test_small_motions_of_the_robot_are_those_of_the_frozen_one(robot: RobotMode
             def acceleration(q: Array, v: Array, u: Array = generalized) -> Array:
                 return np.array(pin.aba(robot.pin, robot.data, q, v, u))
 
-            q, v = rkmk_step(robot.pin, TABLEAUS["rk4"], acceleration, q, v, _DT)
+            q, v = integrator.step(acceleration, q, v)
             worst = max(worst, float(np.max(np.abs(q[BASE_NQ:] - desired.position - expected[tick]))))
         departures.append(worst)
     assert slope(sizes, departures) == pytest.approx(2.0, abs=0.1)

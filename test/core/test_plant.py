@@ -88,17 +88,17 @@ def test_conservation_at_the_shipped_tick(robot: RobotModel) -> None:
 def test_a_robot_at_rest_without_efforts_stays_as_it_is(robot: RobotModel, draw: Draw) -> None:
     """Nothing moves, but for the rounding of a quaternion that is normalised again and again."""
     plant = _plant(robot, draw.joints(), draw.pose())
-    q = robot.q_of(plant.state)
+    q = plant.state.q
     for _ in range(10):
         plant.step(JointCommand(plant.stamp_ns, np.zeros(14)))
-    np.testing.assert_allclose(robot.q_of(plant.state), q, atol=4 * _EPS)
+    np.testing.assert_allclose(plant.state.q, q, atol=4 * _EPS)
     assert plant.work == 0.0
 
 
 def test_work_is_effort_times_way(robot: RobotModel, draw: Draw) -> None:
     """The work of a tick is the effort times the way of its joint, summed over the joints."""
     plant = _plant(robot, draw.joints(margin=0.5), draw.pose())
-    effort = draw.effort(robot.q_of(plant.state))
+    effort = draw.effort(plant.state.q)
     before = plant.state.joint_position
     plant.step(JointCommand(0, effort))
     assert plant.work == pytest.approx(effort @ (plant.state.joint_position - before), rel=16 * _EPS)
@@ -126,7 +126,7 @@ def test_effort_is_limited_and_the_ticks_are_counted(robot: RobotModel, draw: Dr
         limited.step(JointCommand(limited.stamp_ns, asked))
         exact.step(JointCommand(exact.stamp_ns, given))
     np.testing.assert_array_equal(limited.state.joint_effort, given)
-    np.testing.assert_array_equal(robot.v_of(limited.state), robot.v_of(exact.state))
+    np.testing.assert_array_equal(limited.state.v, exact.state.v)
     assert limited.work == exact.work
     at_limit = {robot.joint_names[joint]: 3 for joint in (1, 3, 8)}
     assert limited.saturated_ticks == dict.fromkeys(robot.joint_names, 0) | at_limit
@@ -146,7 +146,7 @@ def test_effort_in_a_state_acted_over_the_tick_before(robot: RobotModel, draw: D
 def test_reset_repeats_the_run_bit_for_bit(robot: RobotModel, draw: Draw) -> None:
     """After a reset the same commands give the same states, work and deputy as at first."""
     plant = _plant(robot, draw.joints(margin=0.5), draw.pose())
-    effort = draw.effort(robot.q_of(plant.state))
+    effort = draw.effort(plant.state.q)
     ends = []
     for _ in range(2):
         plant.reset()
@@ -156,7 +156,7 @@ def test_reset_repeats_the_run_bit_for_bit(robot: RobotModel, draw: Draw) -> Non
         for _ in range(20):
             plant.step(JointCommand(plant.stamp_ns, effort))
         state, deputy = plant.state, plant.deputy.deputy_in_world
-        ends.append([robot.q_of(state), robot.v_of(state), [plant.work], deputy.position])
+        ends.append([state.q, state.v, [plant.work], deputy.position])
     for first, second in zip(*ends, strict=True):
         np.testing.assert_array_equal(first, second)
     plant.reset()
@@ -167,11 +167,11 @@ def test_a_state_does_not_change_afterwards(robot: RobotModel, draw: Draw) -> No
     """A state that was handed out is a value: integration goes on without touching it."""
     plant = _plant(robot, draw.joints(margin=0.5), draw.pose())
     state = plant.state
-    kept = robot.q_of(state).copy(), robot.v_of(state).copy()
+    kept = state.q.copy(), state.v.copy()
     for _ in range(5):
         plant.step(JointCommand(plant.stamp_ns, draw.effort(kept[0])))
-    np.testing.assert_array_equal(robot.q_of(state), kept[0])
-    np.testing.assert_array_equal(robot.v_of(state), kept[1])
+    np.testing.assert_array_equal(state.q, kept[0])
+    np.testing.assert_array_equal(state.v, kept[1])
     with pytest.raises(ValueError, match="read-only"):
         state.joint_position[0] = 1.0
 
@@ -190,7 +190,7 @@ def test_a_held_deputy_moves_with_its_tool(robot: RobotModel, draw: Draw) -> Non
     (event,) = plant.execute((GraspCommand(GraspAction.GRASP, "arm_a", _FRAME),))
     assert event.status is GraspStatus.SUCCEEDED
     assert plant.deputy.holder == "arm_a"
-    effort = draw.effort(robot.q_of(plant.state))
+    effort = draw.effort(plant.state.q)
     rows = []
     for _ in range(60):
         deputy, tool = plant.deputy, plant.tools_in_world["arm_a"]
@@ -216,7 +216,7 @@ def test_a_deputy_let_go_flies_straight_on(robot: RobotModel, draw: Draw) -> Non
     """Released in motion, its origin keeps the velocity it had, whatever the robot does then."""
     plant = _plant(robot, draw.joints(margin=0.5), draw.pose())
     plant.execute((GraspCommand(GraspAction.GRASP, "arm_a", _FRAME),))
-    effort = draw.effort(robot.q_of(plant.state))
+    effort = draw.effort(plant.state.q)
     for _ in range(50):
         plant.step(JointCommand(plant.stamp_ns, effort))
     plant.execute((GraspCommand(GraspAction.RELEASE, "arm_a"),))
@@ -256,8 +256,8 @@ def test_a_deputy_without_mass_does_not_disturb_the_robot(robot: RobotModel, dra
     for _ in range(20):
         for plant in (free, holding):
             plant.step(JointCommand(plant.stamp_ns, effort))
-    np.testing.assert_array_equal(robot.q_of(free.state), robot.q_of(holding.state))
-    np.testing.assert_array_equal(robot.v_of(free.state), robot.v_of(holding.state))
+    np.testing.assert_array_equal(free.state.q, holding.state.q)
+    np.testing.assert_array_equal(free.state.v, holding.state.v)
 
 
 def test_no_commands_no_events(robot: RobotModel, draw: Draw) -> None:

@@ -111,7 +111,7 @@ def inputs(rest: Rest, stamp: int, seed: int) -> tuple[RobotState, JointReferenc
     noise = random.normal(scale=0.01, size=(5, 14))
     base = Pose(0.1 * noise[0, :3], np.array([0.0, 0.0, 0.0, 1.0]))
     twist = Twist(noise[1, :3], noise[1, 3:6])
-    state = RobotState(stamp, base, twist, start + noise[2], noise[3], np.zeros(14))
+    state = RobotState.of(stamp, base, twist, start + noise[2], noise[3], np.zeros(14))
     reference = JointReference(stamp, start + noise[4], 0.1 * noise[0])
     index = min(stamp // (8 * REFERENCE_NS), 2)
     return state, reference, TaskPhase(stamp, index, rest.scenario.schedule.phases[index].name)

@@ -370,7 +370,7 @@ def test_numbers_that_do_not_fill_a_message_are_refused(size: int) -> None:
 
 def test_a_state_comes_back_bit_for_bit() -> None:
     pose, twist, joints = numbers(7, 1), numbers(6, 2), [numbers(14, seed) for seed in range(3)]
-    state = RobotState(61_234_567_890, Pose(pose[:3], pose[3:]), Twist(twist[:3], twist[3:]), *joints)
+    state = RobotState.of(61_234_567_890, Pose(pose[:3], pose[3:]), Twist(twist[:3], twist[3:]), *joints)
     wire = StateWire(JOINTS, "world", "base_link")
     read = wire.read(*wire.pack(state))
     assert read.stamp_ns == state.stamp_ns

@@ -87,7 +87,7 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "angular part of a twist first",
-        "model/robot_model",
+        "types",
         "[twist_base_in_base.linear, twist_base_in_base.angular, joint_velocity]",
         "[twist_base_in_base.angular, twist_base_in_base.linear, joint_velocity]",
         "robot_model",
@@ -116,8 +116,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "Coriolis term of the inverse dynamics dropped",
         "model/reduced",
-        "pull = inertia[:, BASE_NV:] @ joint_acceleration + bias",
-        "pull = inertia[:, BASE_NV:] @ joint_acceleration",
+        "pin.rnea(robot.pin, robot.data, q, v, accelerations)",
+        "pin.rnea(robot.pin, robot.data, q, 0.0 * v, accelerations)",
         "nmpc",
     ),
     _core(
@@ -130,8 +130,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "reaction of the base left out of the efforts",
         "model/reduced",
-        "pull[BASE_NV:] + inertia[BASE_NV:, :BASE_NV] @ base_acceleration",
-        "pull[BASE_NV:]",
+        "forces[BASE_NV:] + inertia[BASE_NV:, :BASE_NV].dot(base_acceleration)",
+        "forces[BASE_NV:]",
         "nmpc",
     ),
     _core(
@@ -144,8 +144,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "block of the mass matrix transposed",
         "model/reduced",
-        "inertia[BASE_NV:, :BASE_NV] @ base_acceleration",
-        "inertia[BASE_NV:, :BASE_NV].T.reshape(-1, BASE_NV) @ base_acceleration",
+        "inertia[BASE_NV:, :BASE_NV].dot(base_acceleration)",
+        "inertia[BASE_NV:, :BASE_NV].T.reshape(-1, BASE_NV).dot(base_acceleration)",
         "nmpc",
     ),
     _core(
@@ -194,22 +194,22 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "joint damping of 0.04 N m s/rad",
         "plant/free_floating",
-        "pin.aba(model, data, q, v, generalized)",
-        "pin.aba(model, data, q, v, generalized - 0.04 * np.r_[np.zeros(BASE_NV), v[BASE_NV:]])",
+        "q, v, self._generalized, pin",
+        "q, v, self._generalized - 0.04 * np.r_[np.zeros(BASE_NV), v[BASE_NV:]], pin",
         "plant",
     ),
     _core(
         "effort limits inverted",
-        "plant/free_floating",
-        "np.minimum(np.maximum(command.effort, -limit), limit)",
-        "np.maximum(np.minimum(command.effort, -limit), limit)",
+        "model/robot_model",
+        "np.minimum(np.maximum(effort, self._least_effort), self.effort_limit)",
+        "np.maximum(np.minimum(effort, self._least_effort), self.effort_limit)",
         "plant",
     ),
     _core(
         "work counted against the motion",
         "plant/free_floating",
-        "self._work += float(effort @",
-        "self._work -= float(effort @",
+        "self._work += float(effort.dot",
+        "self._work -= float(effort.dot",
         "plant",
     ),
     _core(
@@ -222,36 +222,36 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "state reports the effort asked for, not the one given",
         "plant/free_floating",
-        "self._effort = effort",
-        "self._effort = np.array(command.effort)",
+        "frozen(q), frozen(v), effort",
+        "frozen(q), frozen(v), command.effort",
         "plant",
     ),
     _core(
         "two weights of the fourth-order scheme swapped",
         "plant/integrators",
-        "(1 / 6, 1 / 3, 1 / 3, 1 / 6)",
-        "(1 / 6, 1 / 3, 1 / 6, 1 / 3)",
+        "(1 / 4, 1 / 6, 1 / 6, -1 / 12)",
+        "(1 / 4, 1 / 6, -1 / 12, 1 / 6)",
         "integrators",
     ),
     _core(
-        "second bracket dropped from the integrator",
+        "a step of the fourth-order scheme as one motion instead of two",
         "plant/integrators",
-        "x + 0.5 * y + z / 12.0",
-        "x + 0.5 * y + 0.0 * z",
+        "((1 / 4, 1 / 6, 1 / 6, -1 / 12), (-1 / 12, 1 / 6, 1 / 6, 1 / 4))",
+        "((1 / 6, 1 / 3, 1 / 3, 1 / 6),)",
         "integrators",
     ),
     _core(
-        "first bracket of the integrator with the wrong sign",
+        "the two motions of a step in the wrong order",
         "plant/integrators",
-        "x + 0.5 * y + z / 12.0",
-        "x - 0.5 * y + z / 12.0",
+        "for motion in motions:",
+        "for motion in reversed(motions):",
         "integrators",
     ),
     _core(
-        "bracket of two twists with a wrong sign",
+        "the last stage of the fourth-order scheme set out from the start",
         "plant/integrators",
-        "aq * bz - ar * by - bq * az + br * ay",
-        "aq * bz - ar * by + bq * az - br * ay",
+        "(0, 0, 0, 1)",
+        "(0, 0, 0, 0)",
         "integrators",
     ),
     _core(
@@ -321,22 +321,22 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "NMPC error q_d - q",
         "control/nmpc",
-        "error = state.joint_position - desired.position",
-        "error = desired.position - state.joint_position",
+        "np.subtract(state.joint_position, desired.position, out",
+        "np.subtract(desired.position, state.joint_position, out",
         "nmpc",
     ),
     _core(
         "desired acceleration left out",
         "control/nmpc",
-        "acceleration = desired.acceleration - gains",
-        "acceleration = 0.0 * desired.acceleration - gains",
+        "acceleration = desired.acceleration - self",
+        "acceleration = 0.0 * desired.acceleration - self",
         "nmpc",
     ),
     _core(
         "NMPC efforts not limited",
         "control/nmpc",
-        "return np.minimum(np.maximum(effort, -robot.effort_limit), robot.effort_limit)",
-        "return effort",
+        "return robot.limited(reduced_inverse_dynamics(robot, state.q, state.v, acceleration))",
+        "return reduced_inverse_dynamics(robot, state.q, state.v, acceleration)",
         "nmpc",
     ),
     _core(
@@ -370,8 +370,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "half of the acceleration term of the reference missing",
         "control/reference_track",
-        "self._acceleration * (0.5 * s * s)",
-        "self._acceleration * (0.25 * s * s)",
+        "forward[0, 2] = 0.5 * s * s",
+        "forward[0, 2] = 0.25 * s * s",
         "reference_track",
     ),
     _core(
@@ -541,8 +541,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "command recorded as the effort that acted",
         "simulation/recorder",
-        "self._joints[2, k] = state.joint_effort",
-        "self._joints[2, k] = command.effort",
+        "self._effort[k] = state.joint_effort",
+        "self._effort[k] = command.effort",
         "analysis_runs",
     ),
 )

@@ -16,7 +16,7 @@ from sms_handover.control.pid import PidGains, PidLaw
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
-from sms_handover.plant.integrators import TABLEAUS, rkmk_step
+from sms_handover.plant.integrators import TABLEAUS, LieGroupIntegrator
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.types import Array, JointCommand, Pose
 from test.core.conftest import Draw, slope, state_of
@@ -97,6 +97,7 @@ def _closed_loop(
         assert np.all(np.abs(effort) < robot.effort_limit)
         return np.concatenate([np.zeros(BASE_NV), effort])
 
+    integrator = LieGroupIntegrator(robot.pin, TABLEAUS["rk4"], _TICK)
     errors = [q[BASE_NQ:] - desired.position]
     for _ in range(count):
         command = effort_at(q, v)
@@ -104,7 +105,7 @@ def _closed_loop(
         def acceleration(q: Array, v: Array, command: Array = command) -> Array:
             return np.array(pin.aba(robot.pin, robot.data, q, v, command if held else effort_at(q, v)))
 
-        q, v = rkmk_step(robot.pin, TABLEAUS["rk4"], acceleration, q, v, _TICK)
+        q, v = integrator.step(acceleration, q, v)
         errors.append(q[BASE_NQ:] - desired.position)
     return np.array(errors)
 
@@ -183,7 +184,7 @@ def test_static_error(robot: RobotModel, draw: Draw, period: float, record: Reco
         plant.step(JointCommand(plant.stamp_ns, effort))
     state = plant.state
     assert not any(plant.saturated_ticks.values())
-    inertia = reduced_dynamics(robot, robot.q_of(state), np.zeros(20)).inertia
+    inertia = reduced_dynamics(robot, state.q, np.zeros(20)).inertia
     expected = 0.3 * period**2 * np.linalg.solve(inertia, disturbance)
     found = state.joint_position - _BENT
     off = float(np.linalg.norm(found - expected) / np.linalg.norm(expected))

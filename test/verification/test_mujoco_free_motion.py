@@ -16,7 +16,7 @@ import pytest
 from sms_handover.model.conserved import physics_receipt
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.plant.integrators import TABLEAUS, rkmk_step
+from sms_handover.plant.integrators import TABLEAUS, LieGroupIntegrator
 from sms_handover.types import Array
 from test.verification.conftest import Record, Table
 from test.verification.mujoco_model import MujocoRobot, State, apart, order
@@ -50,8 +50,9 @@ def _ours(robot: RobotModel) -> Advance:
             return np.asarray(pin.aba(robot.pin, robot.data, q, v, generalized))
 
         q, v = start
+        integrator = LieGroupIntegrator(robot.pin, TABLEAUS["rk4"], _TIME / count)
         for _ in range(count):
-            q, v = rkmk_step(robot.pin, TABLEAUS["rk4"], acceleration, q, v, _TIME / count)
+            q, v = integrator.step(acceleration, q, v)
         return q, v
 
     return advance

@@ -71,7 +71,7 @@ def _our_plant(scenario: Scenario, hold: int, step: int) -> Callable[[Array], St
         for _ in range(hold // step):
             plant.step(JointCommand(plant.stamp_ns, effort))
         state = plant.state
-        return scenario.robot.q_of(state), scenario.robot.v_of(state)
+        return state.q, state.v
 
     return apply
 
