@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import subprocess
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -225,6 +226,19 @@ def test_the_layouts_for_other_tools_find_everything_they_name(bag: Path) -> Non
         assert foxglove_value(path, messages) is not None, path
     for name in plotjuggler_curves():
         assert isinstance(plotjuggler_value(name, messages), float), name
+
+
+def test_rerun_opens_a_bag_with_robot_and_transforms(bag: Path, tmp_path: Path) -> None:
+    rerun = shutil.which("rerun")
+    if rerun is None:
+        pytest.skip("rerun is not installed: pip install rerun-sdk")
+    convert = [rerun, "mcap", "convert", str(bag / "bag_0.mcap"), "-o", str(tmp_path / "run.rrd")]
+    done = subprocess.run(convert, capture_output=True, text=True, check=True)
+    listed = done.stdout + done.stderr
+    assert "/tf," in listed
+    for shape in read_scene(bag).shapes:
+        assert f"/visual_geometries/{shape.link}/visual_0" in listed
+    subprocess.run([rerun, "rrd", "verify", str(tmp_path / "run.rrd")], check=True)
 
 
 def chained(message: Any) -> dict[str, Pose]:
