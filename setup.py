@@ -56,7 +56,7 @@ setup(
     maintainer_email="maintainers@sms-handover.example",
     license="BSD-3-Clause",
     packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
-    package_data={PACKAGE: ["py.typed", "scene/web/*"]},
+    package_data={PACKAGE: ["py.typed", "report/web/*", "scene/web/*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
@@ -76,7 +76,11 @@ setup(
         "zstandard>=0.22,<1",
     ],
     extras_require={
-        "analysis": ["matplotlib>=3.10,<4"],
+        "analysis": [
+            "jinja2>=3.1,<4",
+            "matplotlib>=3.10,<4",
+            "plotly>=7,<8",  # of it only plotly.js is used
+        ],
         "test": [
             "mcap-ros2-support>=0.5.7,<1",
             "mypy>=1.15",

@@ -27,7 +27,7 @@ FOUNDATION_MODULES = {
     "run_data",
 }
 MIDDLE = {"plant", "trajectory", "ik", "control"}
-CORE = {"model", *MIDDLE, "simulation", "bag", "analysis", "scene", "playback"}
+CORE = {"model", *MIDDLE, "simulation", "bag", "analysis", "scene", "playback", "report"}
 EDGE = {"ros", "nodes", "cli"}
 
 # What a layer may import besides itself and the foundation.
@@ -40,6 +40,7 @@ ALLOWED: dict[str, set[str]] = {
     "analysis": {"model", "simulation", "bag", "scene"},
     "scene": {"model", "bag"},
     "playback": {"bag"},
+    "report": {"plant", "bag", "analysis", "scene"},
     "ros": CORE,
     "nodes": CORE | {"ros"},
     "cli": CORE | {"ros", "nodes"},

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from math import isnan
+from math import inf, isnan
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -15,10 +15,14 @@ _GAP = "  "
 
 @dataclass(frozen=True)
 class Row:
-    """A label with its unit, and one cell per run; a subheading has none."""
+    """A label with its unit, and one cell per run; a subheading has none.
+
+    ``better`` has the places of the cells with the best value; none where there is nothing to choose.
+    """
 
     label: str
     cells: tuple[str, ...] = ()
+    better: frozenset[int] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -34,9 +38,33 @@ def number(value: float, missing: str = MISSING) -> str:
     return missing if isnan(value) else f"{value:.4g}"
 
 
-def row(label: str, items: Iterable[T | None], value: Callable[[T], float], missing: str = MISSING) -> Row:
-    """Return a row with a number of every item; ``missing`` stands for NaN, a dash for no item."""
-    return Row(label, tuple(MISSING if item is None else number(value(item), missing) for item in items))
+def row(
+    label: str,
+    items: Iterable[T | None],
+    value: Callable[[T], float],
+    missing: str = MISSING,
+    *,
+    smaller_is_better: bool = False,
+) -> Row:
+    """Return a row with a number of every item; ``missing`` stands for NaN, a dash for no item.
+
+    Where ``smaller_is_better``, a NaN with a word of its own, as *never*, is worse than any number.
+    """
+    values = [None if item is None else value(item) for item in items]
+    cells = tuple(MISSING if each is None else number(each, missing) for each in values)
+    if not smaller_is_better:
+        return Row(label, cells)
+    costs = [inf if each is None or isnan(each) else each for each in values]
+    return Row(label, cells, _best(cells, costs))
+
+
+def _best(cells: Sequence[str], costs: Sequence[float]) -> frozenset[int]:
+    """Return the places of the smallest cost, none if all that is known reads the same."""
+    known = [cell for cell in cells if cell != MISSING]
+    if len(set(known)) <= 1:
+        return frozenset()
+    best = cells[min(range(len(cells)), key=costs.__getitem__)]
+    return frozenset(place for place, cell in enumerate(cells) if cell == best)
 
 
 def layout(names: Sequence[str], sections: Sequence[Section]) -> list[str]:

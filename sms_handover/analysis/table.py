@@ -1,6 +1,7 @@
 """A comparison of runs as plain text: metrics, receipts, and the verdicts on the paper's claims."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from math import isnan
 from textwrap import wrap
 
@@ -18,6 +19,7 @@ from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
 
 _MICRO = 1e6
 _NEVER = "never"
+_cost = partial(row, smaller_is_better=True)
 _VERDICTS = {True: "HOLDS", False: "DOES NOT HOLD"}
 
 
@@ -37,17 +39,21 @@ def comparison_table(
 
 def render(comparison: Comparison, tolerance: Tolerance | None = None) -> str:
     """Return the table of a comparison."""
+    lines = layout(list(comparison.runs), figure_sections(comparison, tolerance))
+    if comparison.claims:
+        lines += layout(("NMPC", "PID"), [_claim_section(comparison.claims)])
+    return "\n".join(lines[1:]) + "\n"
+
+
+def figure_sections(comparison: Comparison, tolerance: Tolerance | None = None) -> tuple[Section, ...]:
+    """Return every figure of a comparison but the claims: grasps, each phase, torques, physics."""
     runs = list(comparison.runs.values())
-    sections = [
+    return (
         Section("Grasp events", _grasp_rows(runs, tolerance)),
         *(_phase_section(comparison, name) for name in comparison.phase_names),
         Section("Torque over the whole run, peak / RMS [N m]", _torque_rows(runs)),
         Section("Physics and inverse kinematics", _receipt_rows(runs)),
-    ]
-    lines = layout(list(comparison.runs), sections)
-    if comparison.claims:
-        lines += layout(("NMPC", "PID"), [_claim_section(comparison.claims)])
-    return "\n".join(lines[1:]) + "\n"
+    )
 
 
 def _grasp_rows(runs: Sequence[RunMetrics], tolerance: Tolerance | None) -> tuple[Row, ...]:
@@ -63,7 +69,7 @@ def _grasp_rows(runs: Sequence[RunMetrics], tolerance: Tolerance | None) -> tupl
         if command.action is not GraspAction.RELEASE:
             for what, value, limit in _REACHED:
                 allowed = f", allowed {limit(tolerance):g}" if tolerance else ""
-                rows.append(row(f"  {what}{allowed}", events, value))
+                rows.append(_cost(f"  {what}{allowed}", events, value))
     return tuple(rows) or (Row("none"),)
 
 
@@ -94,13 +100,15 @@ def _phase_section(comparison: Comparison, name: str) -> Section:
     for arm in dict.fromkeys(arm for item in phases if item for arm in item.tools):
         rows += _tool_rows(arm, phases)
     rows.append(Row("base"))
-    rows.append(row("  position change [mm]", phases, lambda item: item.base.position_change * MM_PER_M))
-    rows.append(row("  attitude change [deg]", phases, lambda item: item.base.attitude_change * DEG_PER_RAD))
+    rows.append(_cost("  position change [mm]", phases, lambda item: item.base.position_change * MM_PER_M))
+    rows.append(
+        _cost("  attitude change [deg]", phases, lambda item: item.base.attitude_change * DEG_PER_RAD)
+    )
     drifts = [drift[name] for drift in comparison.drift.values()]
     begin = largest([drift.begin for drift in drifts])
     since = "no run settles" if isnan(begin) else f"from {number(begin)} s on, when all runs that settle have"
     rows.append(Row(f"base, drift: {since}"))
-    rows += [row(label, drifts, value) for label, value in _DRIFT]
+    rows += [_cost(label, drifts, value) for label, value in _DRIFT]
     begin_s, end_s = (ns_to_seconds(time_ns) for time_ns in (spans[0].start_ns, spans[0].end_ns))
     return Section(f"Phase {name}, {begin_s:g} to {end_s:g} s", tuple(rows))
 
@@ -112,7 +120,6 @@ _DRIFT: tuple[tuple[str, Callable[[BaseMotion], float]], ...] = (
     ("  mean turn rate [urad/s]", lambda drift: drift.mean_turn_rate * _MICRO),
 )
 _MOVING: tuple[tuple[str, Callable[[ToolTracking], float]], ...] = (
-    ("  step length [mm]", lambda tool: tool.step_length * MM_PER_M),
     ("  overshoot [mm]", lambda tool: tool.overshoot * MM_PER_M),
     ("  overshoot [% of step]", lambda tool: tool.overshoot_ratio * 100.0),
 )
@@ -133,11 +140,13 @@ def _tool_rows(arm: str, phases: Sequence[PhaseMetrics | None]) -> list[Row]:
     kinds = {tool.motion for tool in tools if tool}
     kind = " or ".join(motion.value for motion in Motion if motion in kinds)
     rows = [Row(f"{arm} ({kind})")]
-    rows += [row(label, tools, value) for label, value in (_HELD if kinds == {Motion.HOLD} else _MOVING)]
-    rows.append(row("  settling time [s]", tools, lambda tool: tool.settling_time, _NEVER))
-    rows += [row(label, tools, value) for label, value in _EITHER]
-    rows.append(row("  peak torque [N m]", torques, lambda torque: largest(torque.peak)))
-    rows.append(row("  control effort [(N m)^2 s]", torques, lambda torque: float(torque.effort.sum())))
+    if kinds != {Motion.HOLD}:
+        rows.append(row("  step length [mm]", tools, lambda tool: tool.step_length * MM_PER_M))
+    rows += [_cost(label, tools, value) for label, value in (_HELD if kinds == {Motion.HOLD} else _MOVING)]
+    rows.append(_cost("  settling time [s]", tools, lambda tool: tool.settling_time, _NEVER))
+    rows += [_cost(label, tools, value) for label, value in _EITHER]
+    rows.append(_cost("  peak torque [N m]", torques, lambda torque: largest(torque.peak)))
+    rows.append(_cost("  control effort [(N m)^2 s]", torques, lambda torque: float(torque.effort.sum())))
     return rows
 
 
@@ -147,9 +156,9 @@ def _torque_rows(runs: Sequence[RunMetrics]) -> tuple[Row, ...]:
     joints = dict.fromkeys(name for torque in torques for name in torque.joint_names)
     return (
         *(Row(name, tuple(_peak_and_rms(item, name) for item in runs)) for name in joints),
-        row("control effort [(N m)^2 s]", torques, lambda torque: float(torque.effort.sum())),
-        row("ticks asking for more, worst joint", torques, lambda torque: largest(torque.saturated_ticks)),
-        row("ticks at the peak, worst joint", torques, lambda torque: largest(torque.ticks_at_peak)),
+        _cost("control effort [(N m)^2 s]", torques, lambda torque: float(torque.effort.sum())),
+        _cost("ticks asking for more, worst joint", torques, lambda torque: largest(torque.saturated_ticks)),
+        _cost("ticks at the peak, worst joint", torques, lambda torque: largest(torque.ticks_at_peak)),
     )
 
 
@@ -170,7 +179,7 @@ def _receipt_rows(runs: Sequence[RunMetrics]) -> tuple[Row, ...]:
         row("largest |dE - W| / max E [-]", runs, lambda item: item.physics.energy),
         row("peak kinetic energy [J]", runs, lambda item: item.physics.peak_kinetic_energy),
         row("IK solves", runs, lambda item: float(item.ik.solves)),
-        row("IK solves that failed", runs, lambda item: float(item.ik.failures)),
+        _cost("IK solves that failed", runs, lambda item: float(item.ik.failures)),
     )
 
 

@@ -2,21 +2,13 @@
 
 import json
 from argparse import ArgumentParser, Namespace
-from collections.abc import Mapping
-from dataclasses import fields
 from pathlib import Path
 
 from sms_handover.analysis.comparison import compare
 from sms_handover.analysis.summary import summary
 from sms_handover.analysis.table import render
-from sms_handover.bag.info import read_info
-from sms_handover.bag.reader import read_run
-from sms_handover.cli.folders import bag_of
-from sms_handover.errors import ConfigurationError
-from sms_handover.parameters import build
-from sms_handover.plant.deputy import GraspTolerance
-from sms_handover.plant.parameters import PlantParameters
-from sms_handover.topics import CONTROLLER, PLANT
+from sms_handover.cli.recorded import read_all
+from sms_handover.report.recorded_run import common_tolerance
 
 
 def add_parser(parser: ArgumentParser) -> None:
@@ -31,23 +23,11 @@ def add_parser(parser: ArgumentParser) -> None:
 
 def command(options: Namespace) -> int:
     """Carry out the command; return the exit code."""
-    runs, laws, tolerances = {}, {}, set()
-    for path in options.runs:
-        name = path.resolve().name
-        if name in runs:
-            raise ConfigurationError(f"two runs are named {name!r}; rename one folder")
-        runs[name] = read_run(bag_of(path))
-        parameters = read_info(bag_of(path)).parameters or {}
-        laws[name] = str(parameters.get(CONTROLLER, {}).get("law", "unknown"))
-        tolerances.add(_tolerance_in(parameters.get(PLANT, {})))
-    comparison = compare(runs, laws)
-    print(render(comparison, tolerances.pop() if len(tolerances) == 1 else None))
+    recorded = read_all(options.runs)
+    comparison = compare(
+        {run.name: run.data for run in recorded}, laws={run.name: run.law for run in recorded}
+    )
+    print(render(comparison, common_tolerance(recorded)))
     if options.json:
         options.json.write_text(json.dumps(summary(comparison), indent=2) + "\n", encoding="utf-8")
     return 0
-
-
-def _tolerance_in(plant: Mapping[str, object]) -> GraspTolerance | None:
-    """Return the grasp tolerance among the recorded parameters of a plant, if it is there."""
-    known = {item.name: plant[item.name] for item in fields(PlantParameters) if item.name in plant}
-    return build(PlantParameters, known, "recorded plant").grasp_tolerance if known else None

@@ -15,6 +15,8 @@ from sms_handover.simulation.scenario import Overrides, Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.types import Array, Pose, RobotState, Twist
 
+from .report_bags import write_handovers
+
 # A central difference of step h errs by h^2 f'''/6 + eps f/h. With every quantity here below 10 in
 # value and third derivative (m, rad, kg, s) that is 1.7e-10 + 2.2e-10.
 FD_STEP = 1e-5
@@ -213,3 +215,9 @@ def handover(request: pytest.FixtureRequest) -> RunData:
     """The whole shipped handover, under each law in turn."""
     data: RunData = request.getfixturevalue(f"{request.param}_run")
     return data
+
+
+@pytest.fixture(scope="session")
+def handover_bags(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The bags of a short handover, by law."""
+    return write_handovers(tmp_path_factory.mktemp("handovers"))

@@ -1,0 +1,28 @@
+"""The recorded runs that a command is given."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from sms_handover.cli.folders import BAG, bag_of
+from sms_handover.errors import ConfigurationError
+from sms_handover.report.recorded_run import RecordedRun, read_recorded
+
+
+def read_all(paths: Sequence[Path]) -> tuple[RecordedRun, ...]:
+    """Return the runs in output folders or bags, each under the name of its folder.
+
+    Raises ConfigurationError if two have the same name, or if one cannot be read or is not ours.
+    """
+    names: dict[str, Path] = {}
+    for path in paths:
+        name = _name(path)
+        if name in names:
+            raise ConfigurationError(f"two runs are named {name!r}; rename one folder")
+        names[name] = path
+    return tuple(read_recorded(name, bag_of(path)) for name, path in names.items())
+
+
+def _name(path: Path) -> str:
+    """Return the name of the output folder of a run, also if its bag is given."""
+    full = path.resolve()
+    return full.parent.name if full.name == BAG else full.stem if full.is_file() else full.name

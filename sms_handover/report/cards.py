@@ -1,0 +1,60 @@
+"""What the head of a report says of each run."""
+
+from dataclasses import dataclass
+
+from sms_handover.analysis.highlights import succeeded
+from sms_handover.bag.ledger import Ledger, ledger_table
+from sms_handover.report.recorded_run import RecordedRun
+from sms_handover.report.styles import RunStyle
+from sms_handover.units import ns_to_seconds
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A short statement, and whether it is good news; None if it cannot be told."""
+
+    text: str
+    good: bool | None
+
+
+@dataclass(frozen=True)
+class RunCard:
+    """One run: its looks, its length in s, when it was started, and how it went."""
+
+    style: RunStyle
+    duration: float
+    started: str
+    messages: int
+    size: int
+    verdicts: tuple[Verdict, ...]
+    ledger: str
+
+
+def run_card(run: RecordedRun, style: RunStyle) -> RunCard:
+    """Return the card of a run."""
+    ticks, ledger = run.data.tick_ns, run.info.ledger
+    return RunCard(
+        style=style,
+        duration=ns_to_seconds(int(ticks[-1] - ticks[0])) if len(ticks) else 0.0,
+        started=run.info.provenance.get("start", ""),
+        messages=run.info.message_count,
+        size=run.info.size,
+        verdicts=(_grasps(run), _recording(ledger)),
+        ledger="" if ledger is None else ledger_table(ledger),
+    )
+
+
+def _grasps(run: RecordedRun) -> Verdict:
+    """Tell how many grasp commands succeeded."""
+    count, total = succeeded(run.data.grasp_events)
+    if not total:
+        return Verdict("no grasp command recorded", None)
+    return Verdict(f"{count} of {total} grasp commands succeeded", count == total)
+
+
+def _recording(ledger: Ledger | None) -> Verdict:
+    """Tell whether messages are known to be missing."""
+    if ledger is None:
+        return Verdict("recorded without a loss ledger", None)
+    lost = sum(max(topic.missing, topic.lost or 0) for topic in ledger.topics)
+    return Verdict("no message missing" if ledger.complete else f"{lost} messages missing", ledger.complete)

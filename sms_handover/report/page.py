@@ -1,0 +1,63 @@
+"""Put a report of recorded runs together as one HTML page."""
+
+from collections.abc import Sequence
+
+from sms_handover import __version__
+from sms_handover.analysis.comparison import compare
+from sms_handover.analysis.highlights import highlights
+from sms_handover.analysis.table import figure_sections
+from sms_handover.errors import ConfigurationError
+from sms_handover.report.animation import animation
+from sms_handover.report.cards import run_card
+from sms_handover.report.engine import plotly_script, render, web_file
+from sms_handover.report.page_data import page_data
+from sms_handover.report.plots import plot_groups
+from sms_handover.report.provenance import compared_parameters, compared_versions, schedule_difference
+from sms_handover.report.recorded_run import RecordedRun, common_tolerance
+from sms_handover.report.security import content_security_policy, inline_scripts
+from sms_handover.report.styles import run_styles
+
+_SCRIPTS = ("data.js", "theme.js", "plot.js", "link.js", "main.js")
+
+
+def report_page(runs: Sequence[RecordedRun]) -> str:
+    """Return the report of recorded runs as one HTML document that loads nothing from anywhere.
+
+    Raises ConfigurationError if there is no run, or two have the same name.
+    """
+    names = [run.name for run in runs]
+    if not runs:
+        raise ConfigurationError("a report needs at least one run")
+    if len(set(names)) < len(names):
+        raise ConfigurationError(f"every run of a report needs a name of its own, these are {names}")
+    comparison = compare({run.name: run.data for run in runs}, {run.name: run.law for run in runs})
+    styles = run_styles(names, [run.law for run in runs])
+    infos, data = [run.info for run in runs], [run.data for run in runs]
+    groups = plot_groups(data)
+    moving = animation(runs)
+    scripts = (plotly_script(), "\n".join(web_file(name) for name in _SCRIPTS))
+    return render(
+        "report.html.j2",
+        title=_title(names),
+        version=__version__,
+        policy=content_security_policy((*scripts, *inline_scripts(moving.html))),
+        style=web_file("report.css"),
+        scripts=scripts,
+        runs=[run_card(run, style) for run, style in zip(runs, styles, strict=True)],
+        highlights=highlights(comparison),
+        sections=figure_sections(comparison, common_tolerance(runs)),
+        claims=comparison.claims,
+        plot_groups=groups,
+        data=page_data(data, styles, groups),
+        animation=moving,
+        versions=compared_versions(infos),
+        parameters=compared_parameters(infos),
+        schedules=[info.schedule_text for info in infos],
+        schedule_difference=schedule_difference(infos, names),
+    )
+
+
+def _title(names: Sequence[str]) -> str:
+    """Return the heading of the page."""
+    *others, last = names
+    return f"{', '.join(others)} and {last}, side by side" if others else last

@@ -1,0 +1,87 @@
+"""What the scripts of the page need: plots, phases and grasp events as JSON values."""
+
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from sms_handover.analysis.phases import phase_spans
+from sms_handover.report.plots import Plot, PlotGroup
+from sms_handover.report.styles import RunStyle
+from sms_handover.run_data import RunData
+from sms_handover.types import Array, GraspStatus
+from sms_handover.units import ns_to_seconds
+
+PageData = dict[str, Any]
+
+
+def page_data(runs: Sequence[RunData], styles: Sequence[RunStyle], groups: Sequence[PlotGroup]) -> PageData:
+    """Return the values that the scripts read; texts in it come from bags and are data, never markup."""
+    first = runs[0]
+    return {
+        "runs": [{"name": style.name, "colour": style.colour, "dash": style.dash} for style in styles],
+        "span": _span(runs),
+        "phases": [
+            {"name": span.name, "begin": ns_to_seconds(span.start_ns), "end": ns_to_seconds(span.end_ns)}
+            for span in phase_spans(first)
+        ],
+        "events": _events(runs, [style.name for style in styles]),
+        "plots": [_plot(plot) for group in groups for plot in group.plots],
+    }
+
+
+def _plot(plot: Plot) -> PageData:
+    """Return one plot."""
+    return {
+        "key": plot.key,
+        "unit": plot.unit,
+        "series": list(plot.series),
+        "size": plot.size,
+        "lines": [
+            {
+                "run": line.run,
+                "series": line.series,
+                "time": packed(line.time),
+                "values": packed(line.values),
+            }
+            for line in plot.lines
+        ],
+    }
+
+
+def packed(values: Array) -> str:
+    """Return numbers as base64 of little-endian float32: seven digits are more than a screen shows."""
+    return b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii")
+
+
+def _events(runs: Sequence[RunData], names: Sequence[str]) -> list[PageData]:
+    """Return what came of each grasp command; one of several runs comes once, and says where they differ."""
+    statuses: dict[tuple[int, str], dict[str, GraspStatus]] = {}
+    for run, name in zip(runs, names, strict=True):
+        for event in run.grasp_events:
+            key = (event.stamp_ns, f"{event.command.action.value} by {event.command.arm}")
+            statuses.setdefault(key, {})[name] = event.status
+    return [
+        {
+            "time": ns_to_seconds(stamp_ns),
+            "text": f"{command}: {_outcome(found)}",
+            "succeeded": set(found.values()) == {GraspStatus.SUCCEEDED},
+        }
+        for (stamp_ns, command), found in sorted(statuses.items(), key=lambda item: item[0])
+    ]
+
+
+def _outcome(statuses: Mapping[str, GraspStatus]) -> str:
+    """Return the outcome of a grasp command in every run in which it was given."""
+    if len(set(statuses.values())) == 1:
+        return next(iter(statuses.values())).value
+    return ", ".join(f"{status.value} in {name}" for name, status in statuses.items())
+
+
+def _span(runs: Sequence[RunData]) -> list[float]:
+    """Return the first and the last time in s of all runs."""
+    times = [stamps[[0, -1]] for run in runs for stamps in (run.tick_ns, run.reference_ns) if len(stamps)]
+    if not times:
+        return [0.0, 0.0]
+    return [ns_to_seconds(int(np.min(times))), ns_to_seconds(int(np.max(times)))]

@@ -1,0 +1,52 @@
+"""A recorded run with everything that a report tells of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sms_handover.bag.info import BagInfo, read_info
+from sms_handover.bag.reader import read_run
+from sms_handover.errors import BagError, ConfigurationError
+from sms_handover.plant.deputy import GraspTolerance
+from sms_handover.run_data import RunData
+from sms_handover.topics import CONTROLLER, PLANT
+
+UNKNOWN_LAW = "unknown"
+
+_TOLERANCES = ("grasp_position_tolerance", "grasp_angle_tolerance", "grasp_speed_tolerance")
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedRun:
+    """The arrays of a run under a name, and what its bag says of itself."""
+
+    name: str
+    data: RunData
+    info: BagInfo
+
+    @property
+    def law(self) -> str:
+        """Return the control law that the bag tells of, 'unknown' if it tells of none."""
+        return str(self.info.parameters.get(CONTROLLER, {}).get("law", UNKNOWN_LAW))
+
+    @property
+    def tolerance(self) -> GraspTolerance | None:
+        """Return how near a grasp had to be, None if the bag does not tell."""
+        plant = self.info.parameters.get(PLANT, {})
+        values = [plant.get(name) for name in _TOLERANCES]
+        numbers = [float(value) for value in values if isinstance(value, int | float)]
+        return GraspTolerance(*numbers) if len(numbers) == len(values) else None
+
+
+def read_recorded(name: str, bag: Path) -> RecordedRun:
+    """Return the run in a bag; raises ConfigurationError if the bag cannot be used or is not ours."""
+    try:
+        return RecordedRun(name, read_run(bag), read_info(bag))
+    except BagError as error:
+        raise ConfigurationError(str(error)) from error
+
+
+def common_tolerance(runs: Sequence[RecordedRun]) -> GraspTolerance | None:
+    """Return how near a grasp had to be if that was the same in all runs, else None."""
+    found = {run.tolerance for run in runs}
+    return found.pop() if len(found) == 1 else None
