@@ -68,6 +68,7 @@ setup(
         "ros-jazzy-common-interfaces>=5.3.6,<5.4",
         "ros-jazzy-rmw-fastrtps-cpp>=8.4.3,<8.5",
         "sms_handover_interfaces",
+        "lz4>=4.3,<5",
         "mcap>=1.5,<2",
         "numpy>=2.0,<3",
         "pin>=4.0,<5",

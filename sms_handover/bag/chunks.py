@@ -8,7 +8,7 @@ import lz4.frame
 import zstandard
 from mcap.opcode import Opcode
 
-from sms_handover.bag.records import MESSAGE_HEAD, RECORD_HEAD, ChunkHead, Fit, fit, plausible_head
+from sms_handover.bag.records import MESSAGE_HEAD, RECORD_HEAD, ChunkHead, fits, plausible_head
 
 _ERRORS = (zstandard.ZstdError, RuntimeError, EOFError, ValueError, MemoryError, OverflowError)
 
@@ -64,7 +64,7 @@ def inner_records(records: bytes) -> Iterator[Inner]:
         if opcode == Opcode.MESSAGE:
             if length < MESSAGE_HEAD.size:
                 return
-        elif fit(opcode, records[begin:end]) is Fit.NONE:
+        elif not fits(opcode, records[begin:end]):
             return
         yield Inner(opcode, begin, end)
         place = end

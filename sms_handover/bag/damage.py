@@ -1,4 +1,4 @@
-"""What is wrong at a place of a file."""
+"""What is wrong at a place of a file, and how long a stretch of time it has cost."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -32,3 +32,50 @@ class Damage:
     def __str__(self) -> str:
         """Return the damage in words, with its place."""
         return f"{self.file.name}: bytes {self.begin} to {self.end}: {self.reason}"
+
+
+class Hole:
+    """Follows the log times of messages and the damage between them."""
+
+    def __init__(self) -> None:
+        """Begin without a message."""
+        self.first_ns: int | None = None
+        self.newest_ns: int | None = None
+        self._begin_ns: int | None = None  # of a hole that no message has ended yet
+        self._open = False
+        self._late_start_ns: int | None = None  # of the first message, if there is damage before it
+        self._largest_ns = 0
+
+    def message(self, log_time_ns: int) -> None:
+        """Take the time of a message."""
+        if self.newest_ns is None or self.first_ns is None:
+            self.first_ns = self.newest_ns = log_time_ns
+        if self._open:
+            self._open = False
+            if self._begin_ns is None:
+                self._late_start_ns = log_time_ns
+            else:
+                self._largest_ns = max(self._largest_ns, log_time_ns - self._begin_ns)
+        self.newest_ns = max(self.newest_ns, log_time_ns)
+        self.first_ns = min(self.first_ns, log_time_ns)
+
+    def damage(self, damage: Damage) -> None:
+        """Take damage: it reaches from the newest message so far, or where it says itself, to the next."""
+        if not self._open:
+            self._open = True
+            self._begin_ns = damage.start_ns if self.newest_ns is None else self.newest_ns
+        if damage.start_ns is not None and damage.end_ns is not None:
+            self._largest_ns = max(self._largest_ns, damage.end_ns - damage.start_ns)
+
+    def largest(self, span: tuple[int, int] | None) -> int | None:
+        """Return the longest stretch lost of a recording with this first and last log time.
+
+        None if its span is not known and damage reaches one of its ends.
+        """
+        ends = []
+        if self._late_start_ns is not None:
+            ends.append(None if span is None else self._late_start_ns - span[0])
+        if self._open:
+            ends.append(None if span is None or self._begin_ns is None else span[1] - self._begin_ns)
+        known = [end for end in ends if end is not None]
+        return max(self._largest_ns, *known, 0) if len(known) == len(ends) else None

@@ -7,13 +7,15 @@ from typing import BinaryIO, NamedTuple
 
 from mcap.opcode import Opcode
 
-from sms_handover.bag.records import RECORD_HEAD, Fit, chunk_head, fit, plausible_head
+from sms_handover.bag.records import RECORD_HEAD, chunk_head, fits, plausible_head
 
 MAGIC = b"\x89MCAP0\r\n"  # the first and the last bytes of a complete file
 
 _SEARCH_BLOCK = 2**20  # [byte] looked through at once
 _HEAD_OF_CHUNK = 64  # [byte] enough to judge whether a chunk begins
 _LARGEST_INDEX = 2**26  # [byte] a record other than a chunk or an attachment that claims more is none
+_CHECKED = (Opcode.CHUNK, Opcode.ATTACHMENT)
+_IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 # a record whose length is below 2**40: how the search behind damage recognises where one may begin
 _CANDIDATE = re.compile(rb"(?=[\x03-\x0f].{5}\0\0\0)", re.DOTALL)
 
@@ -45,7 +47,8 @@ class FrameWalk:
         """Walk through the ``size`` bytes of a stream."""
         self._stream = stream
         self._size = size
-        self._chunked = False
+        self._newest: Frame | None = None
+        self._chunked: bool | None = None  # whether messages lie in chunks; None until that is known
 
     def __iter__(self) -> Iterator[Frame | Gap]:
         """Yield every record and every gap; the magic at both ends is neither."""
@@ -56,52 +59,90 @@ class FrameWalk:
             yield Gap(0, len(MAGIC), "it does not begin as an MCAP file does")
             place = len(MAGIC)
         while place < self._size and not self._is_end(place):
-            found = self._frame(place) or self._gap(place)
-            if isinstance(found, Frame):
-                self._chunked = self._chunked or found.opcode == Opcode.CHUNK
+            found = self._trusted(place) or self._gap(place)
+            if self._chunked is None and found.opcode in (Opcode.CHUNK, Opcode.MESSAGE):
+                self._chunked = found.opcode == Opcode.CHUNK
             yield found
             place = found.end
 
     def _frame(self, place: int) -> Frame | None:
-        """Return the record at a place, None if there is none that is whole."""
+        """Return the record at a place, None if there is none that is whole; the newest is kept at hand."""
+        if self._newest is None or self._newest.begin != place:
+            self._newest = self._read_frame(place)
+        return self._newest
+
+    def _read_frame(self, place: int) -> Frame | None:
+        """Read the record at a place."""
         head = self._head(place)
         if head is None:
             return None
         opcode, length = head
-        begin = place + RECORD_HEAD.size
-        end = begin + length
+        end = place + RECORD_HEAD.size + length
         if end > self._size or not plausible_head(opcode, length):
             return None
-        if opcode == Opcode.CHUNK and not self._chunk_begins(begin, length):
+        if opcode == Opcode.CHUNK and not self._chunk_begins(place):
             return None
-        frame = Frame(place, end, opcode, self._bytes(begin, length))
-        how = fit(opcode, frame.body)
-        return frame if how is Fit.EXACT or (how is Fit.LOOSE and self._goes_on(end)) else None
+        frame = Frame(place, end, opcode, self._bytes(place + RECORD_HEAD.size, length))
+        return frame if fits(opcode, frame.body) else None
+
+    def _trusted(self, place: int) -> Frame | None:
+        """Return the record at a place if nothing speaks against it.
+
+        A chunk and an attachment have checksums to be judged by. Of any other record a wrong length
+        shows by no record following, while one begins within what it claims for itself.
+        """
+        frame = self._frame(place)
+        if frame is None or frame.opcode in _CHECKED or self._goes_on(frame.end):
+            return None if frame is not None and self._stray(frame) else frame
+        if frame.opcode == Opcode.MESSAGE:
+            return None
+        first = next((found for found in self._candidates(place + 1) if self._resumes(found)), frame.end)
+        return frame if first >= frame.end else None
+
+    def _stray(self, frame: Frame) -> bool:
+        """Tell whether it is a message outside of the chunks of a file that has chunks."""
+        return frame.opcode == Opcode.MESSAGE and self._chunked is True
 
     def _gap(self, place: int) -> Gap:
         """Return the bytes up to the next record."""
+        cut = self._cut(place)
+        if cut is not None and self._chunk_begins(place):
+            return cut
         for candidate in self._candidates(place + 1):
             if self._is_end(candidate) or self._resumes(candidate):
                 return Gap(place, candidate, "what is there is no record")
+        return cut or Gap(place, self._size, "no record is found from there to the end")
+
+    def _cut(self, place: int) -> Gap | None:
+        """Return what looks like a record that the end of the file cuts off."""
         head = self._head(place)
         if head is None:
             return Gap(place, self._size, "the file ends within the head of a record")
         opcode, length = head
         begin = place + RECORD_HEAD.size
-        if plausible_head(opcode, length) and begin + length > self._size:
-            reason = f"the file ends within a record, {begin + length - self._size} bytes of it are missing"
-            return Gap(place, self._size, reason, opcode, self._bytes(begin, self._size - begin))
-        return Gap(place, self._size, "no record is found from there to the end")
+        if not plausible_head(opcode, length) or begin + length <= self._size:
+            return None
+        reason = f"the file ends within a record, {begin + length - self._size} bytes of it are missing"
+        return Gap(place, self._size, reason, opcode, self._bytes(begin, self._size - begin))
 
     def _resumes(self, place: int) -> bool:
         """Tell whether a record begins at a place for sure, so that the walk can go on there."""
         head = self._head(place)
-        if head is None or (head[0] == Opcode.MESSAGE and self._chunked):
+        if head is None:
             return False
-        if head[0] not in (Opcode.CHUNK, Opcode.ATTACHMENT) and head[1] > _LARGEST_INDEX:
+        if head[0] not in _CHECKED and head[1] > _LARGEST_INDEX:
             return False
         frame = self._frame(place)
-        return frame is not None and self._goes_on(frame.end)
+        if frame is None or not self._goes_on(frame.end):
+            return False
+        return head[0] not in _IN_CHUNKS or not self._holds_chunks(frame.end)
+
+    def _holds_chunks(self, place: int) -> bool:
+        """Tell whether messages lie in chunks: then what looks like one elsewhere is in a broken chunk."""
+        if self._chunked is None:
+            chunks = (c for c in self._candidates(place) if (self._head(c) or (0,))[0] == Opcode.CHUNK)
+            self._chunked = any(self._frame(chunk) is not None for chunk in chunks)
+        return self._chunked
 
     def _candidates(self, place: int) -> Iterator[int]:
         """Yield the places from ``place`` on where a record, or the end of the file, may begin."""
@@ -115,17 +156,22 @@ class FrameWalk:
         if start <= self._size - len(MAGIC):
             yield self._size - len(MAGIC)
 
-    def _chunk_begins(self, begin: int, length: int) -> bool:
-        """Tell by its first bytes whether a body is that of a chunk, before all of it is read."""
-        head = chunk_head(self._bytes(begin, min(length, _HEAD_OF_CHUNK)))
-        return head is not None and head.begin + head.size == length
+    def _chunk_begins(self, place: int) -> bool:
+        """Tell by its first bytes whether a chunk is at a place, before all of it is read."""
+        opcode, length = self._head(place) or (0, 0)
+        head = chunk_head(self._bytes(place + RECORD_HEAD.size, min(length, _HEAD_OF_CHUNK)))
+        return opcode == Opcode.CHUNK and head is not None and head.begin + head.size == length
 
     def _goes_on(self, place: int) -> bool:
-        """Tell whether a record, or the end of the file, may be at a place."""
+        """Tell whether a record, one that the end of the file cuts off, or that end itself is at a place."""
         if place == self._size or self._is_end(place):
             return True
         head = self._head(place)
-        return head is None or plausible_head(*head)  # a head that is not whole is the end of a cut file
+        if head is None:
+            return True
+        if place + RECORD_HEAD.size + head[1] > self._size:
+            return plausible_head(*head)
+        return self._frame(place) is not None
 
     def _is_end(self, place: int) -> bool:
         """Tell whether the magic that ends a file is at a place."""

@@ -88,6 +88,14 @@ class Ledger:
             raise BagError(f"the loss ledger of the bag is not readable: {error}") from error
 
 
+def periods_of(record: Mapping[str, str]) -> dict[str, int]:
+    """Return the step of the stamps [ns] by topic; raises BagError if the metadata record holds none."""
+    try:
+        return {name: int(text) for name, text in record.items()}
+    except ValueError as error:
+        raise BagError(f"the periods in the bag are not readable: {error}") from error
+
+
 def ledger_table(ledger: Ledger) -> str:
     """Return the ledger as text, one line per topic under a heading."""
     rows = [_HEADING, *(_row(topic) for topic in ledger.topics)]

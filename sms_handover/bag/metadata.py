@@ -2,12 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import yaml
 
+from sms_handover.errors import BagError
+
 METADATA_FILE = "metadata.yaml"
 ROSBAG2_KEY = "rosbag2_bagfile_information"
+ROSBAG2_RECORD = "rosbag2"  # name of the metadata record with the same text
 _VERSION = 9
 _ROS_DISTRO = "jazzy"
 
@@ -40,6 +44,41 @@ def bag_information(
         "custom_data": None,
         "ros_distro": _ROS_DISTRO,
     }
+
+
+def metadata_of(bag: Path) -> dict[str, Any] | None:
+    """Return the body of ``metadata.yaml``; raises BagError if it is no such.
+
+    None if the bag has none, or is given as one of its files.
+    """
+    file = bag / METADATA_FILE
+    if not file.is_file():
+        return None
+    try:
+        body = yaml.safe_load(file.read_text(encoding="utf-8"))[ROSBAG2_KEY]
+        return dict(body)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, LookupError, TypeError, ValueError) as error:
+        raise BagError(f"{file} is not readable: {' '.join(str(error).split())[:200]}") from error
+
+
+def counts_of(metadata: Mapping[str, Any]) -> dict[str, int]:
+    """Return the number of messages by topic in the body of a ``metadata.yaml``; raises BagError."""
+    counts: dict[str, int] = {}
+    try:
+        for item in metadata.get("topics_with_message_count") or ():
+            name = str(item["topic_metadata"]["name"])
+            counts[name] = counts.get(name, 0) + int(item["message_count"])
+    except (LookupError, TypeError, ValueError) as error:
+        raise BagError(f"{METADATA_FILE} is not readable: its topics are no list of topics") from error
+    return counts
+
+
+def counts_in_metadata(bag: Path) -> dict[str, int]:
+    """Return the number of messages by topic that ``metadata.yaml`` tells; nothing if it tells none."""
+    try:
+        return counts_of(metadata_of(bag) or {})
+    except BagError:
+        return {}
 
 
 def to_yaml(value: object) -> str:

@@ -17,7 +17,7 @@ from sms_handover.errors import BagError
 
 PUBLISHED_COUNTS = "sms_handover_interfaces/msg/PublishedCounts"
 
-_LONGEST_RUN_NS = 10**17  # [ns] three years; a later stamp is the wall clock's
+LONGEST_RUN_NS = 10**17  # [ns] three years; a later stamp is the wall clock's
 
 
 class Recording:
@@ -103,7 +103,7 @@ class Recording:
         """Record the CDR bytes of one message that arrived at ``wall_ns``."""
         if self._stamped.get(topic):
             time_ns = stamp_ns(data)
-            if 0 <= time_ns < _LONGEST_RUN_NS:
+            if 0 <= time_ns < LONGEST_RUN_NS:
                 if time_ns > self._now_ns:
                     self._now_ns = time_ns
                 self.writer.write(topic, data, time_ns, wall_ns)

@@ -4,7 +4,6 @@ import struct
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import Enum
 from io import BytesIO
 from typing import Any
 
@@ -51,15 +50,8 @@ _READ: dict[int, Callable[[ReadDataStream], Any]] = {
     Opcode.SUMMARY_OFFSET: SummaryOffset.read,
     Opcode.DATA_END: DataEnd.read,
 }
+_KNOWN = frozenset(Opcode)
 _ERRORS = (struct.error, EndOfFile, UnicodeDecodeError, ValueError, OverflowError, MemoryError)
-
-
-class Fit(Enum):
-    """How well bytes fit the record that they are said to be."""
-
-    EXACT = "every length in it agrees"
-    LOOSE = "nothing speaks against it"
-    NONE = "it is no such record"
 
 
 @dataclass(frozen=True)
@@ -76,30 +68,27 @@ class ChunkHead:
 
 
 def plausible_head(opcode: int, length: int) -> bool:
-    """Tell whether this may begin a record; opcodes of later versions of MCAP may."""
-    return opcode != 0 and length < _LONGEST
+    """Tell whether this may begin a record. What MCAP does not define is none: it could not be kept."""
+    return opcode in _KNOWN and length < _LONGEST
 
 
-def fit(opcode: int, body: bytes) -> Fit:
-    """Tell how well the body of a record fits its opcode."""
+def fits(opcode: int, body: bytes) -> bool:
+    """Tell whether a body is one of that kind of record: every length in it agrees with the whole."""
     if opcode == Opcode.CHUNK:
         head = chunk_head(body)
-        return Fit.EXACT if head is not None and head.begin + head.size == len(body) else Fit.NONE
+        return head is not None and head.begin + head.size == len(body)
     if opcode == Opcode.MESSAGE:
-        return Fit.LOOSE if len(body) >= MESSAGE_HEAD.size else Fit.NONE
+        return len(body) >= MESSAGE_HEAD.size
     if opcode == Opcode.MESSAGE_INDEX:
-        return Fit.EXACT if _INDEX_HEAD.size + _stated(body) == len(body) else Fit.NONE
-    if opcode not in _READ:
-        return Fit.LOOSE
+        return _INDEX_HEAD.size + _stated(body) == len(body)
     try:
-        stream = _parse(opcode, body)[1]
+        return opcode in _READ and _parse(opcode, body)[1].count == len(body)
     except _ERRORS:
-        return Fit.NONE
-    return Fit.EXACT if stream.count == len(body) else Fit.LOOSE
+        return False
 
 
 def parse(opcode: int, body: bytes) -> Any:
-    """Return the record in a body that fits; None for chunks, messages and what is not known."""
+    """Return the record in a body that fits, None for a chunk or a message."""
     return _parse(opcode, body)[0] if opcode in _READ else None
 
 

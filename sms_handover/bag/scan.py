@@ -16,7 +16,7 @@ from mcap.records import Channel, Schema
 
 from sms_handover.bag.chunks import DamagedChunkError, inner_records, records_of, records_of_cut
 from sms_handover.bag.damage import Damage
-from sms_handover.bag.definitions import definitions_at_end
+from sms_handover.bag.definitions import Definitions, definitions_at_end
 from sms_handover.bag.frames import MAGIC, Frame, FrameWalk, Gap
 from sms_handover.bag.records import (
     MESSAGE_HEAD,
@@ -82,22 +82,24 @@ class FileScan:
         self._schemas: dict[int, Schema] = {0: _NO_SCHEMA}
         self._sources: dict[int, Source] = {}
         self._in_summary = False
+        self._data_end = 0  # [byte]
         self._lost: Damage | None = None  # a chunk whose message indexes may follow
         self._checksum = zlib.crc32(MAGIC)
         self._whole = True  # no gap so far
         self._undescribed: dict[int, int] = {}  # messages by number of channel
-        self._later_schemas: dict[int, Schema] = {}  # what the end of the file tells
-        self._later_channels: dict[int, Channel] = {}
+        self._later = Definitions({}, {}, True)  # what the end of the file tells
 
     def __iter__(self) -> Iterator[Found]:
         """Yield channels as they are described, messages, other records and damage, in the file's order."""
         size = self.file.stat().st_size
         with self.file.open("rb") as stream:
-            self._later_schemas, self._later_channels = definitions_at_end(stream, size)
+            self._later = definitions_at_end(stream, size)
             for found in FrameWalk(stream, size):
                 self.place = found.end
                 self._add_to_checksum(found)
-                if self._lost is not None and not self._counts_lost(found):
+                if self._lost is not None:
+                    if self._counts_lost(found):
+                        continue
                     yield self._lost
                     self._lost = None
                 yield from self._gap(found) if isinstance(found, Gap) else self._frame(found)
@@ -105,10 +107,18 @@ class FileScan:
                 yield self._lost
             stream.seek(max(0, size - len(MAGIC)))
             self.closed = size > len(MAGIC) and stream.read() == MAGIC
+        if self.closed and not self._later.sound:
+            reason = "the checksum of the summary does not match"
+            yield Damage(self.file, self._data_end, size, reason, of_index=True)
         for channel, count in self._undescribed.items():
             name = f"channel {channel}"
             reason = f"{count} messages belong to {name}, which nothing describes"
             yield Damage(self.file, 0, 0, reason, messages=MappingProxyType({name: count}))
+
+    def topic_of(self, number: int) -> str:
+        """Return the topic of a channel, by the number that the file gives it."""
+        source = self._sources.get(number) or self._source_told_later(number)
+        return f"channel {number}" if source is None else source.topic
 
     def _frame(self, frame: Frame) -> Iterator[Found]:
         """Yield what a record holds."""
@@ -130,7 +140,8 @@ class FileScan:
                 and record.data_section_crc not in (0, self._checksum)
             ):
                 yield self._damage(frame, "the checksum over all messages does not match")
-            self._in_summary = self._in_summary or frame.opcode == Opcode.DATA_END
+            if frame.opcode == Opcode.DATA_END:
+                self._in_summary, self._data_end = True, frame.end
             yield Located(frame.begin, frame.end, frame.opcode, record)
             yield from self._defined(record)
 
@@ -193,7 +204,7 @@ class FileScan:
 
     def _source_told_later(self, number: int) -> Source | None:
         """Return a channel that only the end of the file describes."""
-        channel = self._later_channels.get(number)
+        channel = self._later.channels.get(number)
         source = None if channel is None else self._source(channel)
         if source is not None:
             self._sources[number] = source
@@ -201,7 +212,7 @@ class FileScan:
 
     def _source(self, channel: Channel) -> Source | None:
         """Return a channel with its schema, None if that is lost."""
-        schema = self._schemas.get(channel.schema_id) or self._later_schemas.get(channel.schema_id)
+        schema = self._schemas.get(channel.schema_id) or self._later.schemas.get(channel.schema_id)
         if schema is None:
             return None
         return Source(
@@ -226,8 +237,7 @@ class FileScan:
         if isinstance(found, Gap) or found.opcode != Opcode.MESSAGE_INDEX or self._lost is None:
             return False
         index = parse(found.opcode, found.body)
-        source = self._sources.get(index.channel_id) or self._source_told_later(index.channel_id)
-        name = f"channel {index.channel_id}" if source is None else source.topic
+        name = self.topic_of(index.channel_id)
         counts = {**self._lost.messages, name: self._lost.messages.get(name, 0) + len(index.records)}
         self._lost = replace(self._lost, messages=MappingProxyType(counts))
         return True

@@ -20,6 +20,7 @@ from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.metadata import (
     METADATA_FILE,
     ROSBAG2_KEY,
+    ROSBAG2_RECORD,
     TopicCount,
     bag_information,
     qos_text,
@@ -33,8 +34,12 @@ CHUNK_SIZE = 64 * 1024  # [byte] of uncompressed messages held back at most
 FLUSH_PERIOD_NS = 20_000_000  # [ns] of log time held back at most
 
 _PROFILE = "ros2"
-_LIBRARY = "sms_handover"
-_ROSBAG2_RECORD = "rosbag2"
+LIBRARY = "sms_handover"  # what the header of our bags names
+
+
+def is_of_ours(record: str) -> bool:
+    """Tell by the name of a metadata record whether it is one that our recordings carry."""
+    return record.startswith(f"{LIBRARY}.")
 
 
 @dataclass
@@ -79,7 +84,7 @@ class BagWriter:
         self._mcap = Writer(self._stream, chunk_size=chunk_size, compression=CompressionType.ZSTD)
         try:
             with self._reported():
-                self._mcap.start(profile=_PROFILE, library=_LIBRARY)
+                self._mcap.start(profile=_PROFILE, library=LIBRARY)
                 self._describe()  # a file that is never closed still tells how its QoS texts are to be read
                 self._stream.flush()
         except BagError:
@@ -112,6 +117,10 @@ class BagWriter:
     def message_counts(self) -> dict[str, int]:
         """Return the number of messages written so far, by topic."""
         return {name: topic.count for name, topic in self._topics.items()}
+
+    def topic_of(self, key: str) -> str:
+        """Return the name of the topic that messages are written to by ``key``."""
+        return self._topics[key].name
 
     def add_topic(self, name: str, type_name: str, qos: Sequence[Qos] = ()) -> None:
         """Open a topic for writing; raises BagError on a second topic of that name or an unknown type."""
@@ -245,7 +254,7 @@ class BagWriter:
 
     def _describe(self) -> None:
         """Write the record from which rosbag2 reads the metadata if ``metadata.yaml`` is lost."""
-        self._mcap.add_metadata(_ROSBAG2_RECORD, {"serialized_metadata": to_yaml(self._information())})
+        self._mcap.add_metadata(ROSBAG2_RECORD, {"serialized_metadata": to_yaml(self._information())})
 
     def _information(self) -> dict[str, object]:
         """Return the metadata of what has been written so far."""

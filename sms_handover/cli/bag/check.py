@@ -1,0 +1,60 @@
+"""``sms-handover bag check``: whether a bag is complete, and what is missing."""
+
+import json
+from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from pathlib import Path
+
+from sms_handover.bag.check import check
+from sms_handover.bag.files import recover_hint
+from sms_handover.bag.findings import CheckResult, Severity
+from sms_handover.cli.bag.progress import ProgressLine
+from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
+from sms_handover.cli.folders import bag_of
+
+_MARKS = {Severity.DAMAGED: "DAMAGED", Severity.MISSING: "MISSING", Severity.NOTE: "note"}
+
+
+def add_parser(parser: ArgumentParser) -> None:
+    """Describe the command."""
+    parser.formatter_class = RawDescriptionHelpFormatter
+    parser.description = (
+        "Go through every byte of a bag and tell whether it is complete: checksums, index and counts\n"
+        "against the file, metadata.yaml against both, schemas, stamps against the loss ledger, messages\n"
+        "published against messages recorded, and whether the run was finished."
+    )
+    parser.epilog = "exit codes: 0 complete; 3 something is damaged or missing; 1 it is no bag"
+    parser.add_argument("bag", type=Path, metavar="BAG", help="run folder, bag folder or .mcap file")
+    parser.add_argument("--json", action="store_true", help="print the findings as JSON")
+
+
+def command(options: Namespace) -> int:
+    """Carry out the command; return the exit code."""
+    path = bag_of(options.bag)
+    with ProgressLine("checking") as progress:
+        result = check(path, progress)
+    print(json.dumps(_values(result), indent=2) if options.json else _text(result))
+    return EXIT_OK if result.complete else EXIT_LOSS
+
+
+def _values(result: CheckResult) -> dict[str, object]:
+    """Return a result for JSON."""
+    return {
+        "bag": str(result.path),
+        "complete": result.complete,
+        "messages": result.counts,
+        "findings": [
+            {"severity": finding.severity.value, "text": finding.text} for finding in result.findings
+        ],
+    }
+
+
+def _text(result: CheckResult) -> str:
+    """Return a result in words."""
+    width = max(map(len, _MARKS.values()))
+    lines = [f"{_MARKS[finding.severity]:<{width}}  {finding.text}" for finding in result.findings]
+    count, number = sum(result.counts.values()), len(result.counts)
+    verdict = "complete" if result.complete else "NOT complete"
+    lines.append(f"{result.path} is {verdict}: {count} messages on {number} topics")
+    if result.damaged:
+        lines.append(recover_hint(result.path))
+    return "\n".join(lines)

@@ -1,0 +1,93 @@
+"""``sms-handover bag recover``: make a whole bag of a truncated or damaged one."""
+
+import json
+from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from pathlib import Path
+
+from sms_handover.bag.ledger import ledger_table
+from sms_handover.bag.recover import recover
+from sms_handover.bag.recovery import Recovery
+from sms_handover.cli.bag.progress import ProgressLine
+from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
+from sms_handover.cli.folders import bag_of
+from sms_handover.units import NS_PER_S
+
+_MOST = 20  # places of damage that are listed
+_NS_PER_MS = 1e6
+
+
+def add_parser(parser: ArgumentParser) -> None:
+    """Describe the command."""
+    parser.formatter_class = RawDescriptionHelpFormatter
+    parser.description = (
+        "Write everything that can be read of a bag into a new one, with index and metadata.yaml, and tell\n"
+        "what is lost. A damaged chunk is left out and reading goes on behind it; no message is altered.\n"
+        "Attachments and records are kept, the loss ledger is made anew. The bag itself is not touched."
+    )
+    parser.epilog = "exit codes: 0 nothing in the file is lost; 3 something is; 1 nothing could be recovered"
+    parser.add_argument("bag", type=Path, metavar="BAG", help="run folder, bag folder or .mcap file")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FOLDER", help="new folder (default: <bag>_recovered beside BAG)"
+    )
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+
+
+def command(options: Namespace) -> int:
+    """Carry out the command; return the exit code."""
+    path = bag_of(options.bag)
+    output = options.output or _beside(path)
+    with ProgressLine("recovering") as progress:
+        result = recover(path, output, progress)
+    print(json.dumps(_values(result), indent=2) if options.json else _text(result))
+    return EXIT_OK if result.clean else EXIT_LOSS
+
+
+def _beside(path: Path) -> Path:
+    """Return the folder for the new bag if none is given."""
+    whole = path.resolve()
+    return whole.with_name(f"{whole.stem if whole.is_file() else whole.name}_recovered")
+
+
+def _values(result: Recovery) -> dict[str, object]:
+    """Return a result for JSON."""
+    return {
+        **{key: json.loads(text) for key, text in result.to_record().items()},
+        "output": str(result.folder),
+        "clean": result.clean,
+        "messages": {topic.name: topic.recovered for topic in result.topics},
+        "messages_from_a_cut_chunk": result.from_cut_chunk,
+    }
+
+
+def _text(result: Recovery) -> str:
+    """Return a result in words."""
+    lines = [f"lost: {damage}" for damage in result.losses[:_MOST]]
+    if len(result.losses) > _MOST:
+        lines.append(f"lost: {len(result.losses) - _MOST} more places")
+    lines += [
+        f"{topic.name}: {topic.lost} of {topic.recorded} messages lost"
+        for topic in result.topics
+        if topic.lost
+    ]
+    if result.from_cut_chunk:
+        lines.append(f"{result.from_cut_chunk} messages are out of a chunk that the end of the file cuts off")
+    if result.largest_loss_ns:
+        lines.append(f"largest loss: {result.largest_loss_ns / _NS_PER_MS:.3f} ms of log time")
+    if not result.closed:
+        lines.append(
+            "the recording was not closed: what the recorder had not written when it ended is in no file"
+        )
+    if result.ledger is not None:
+        lines += ["", ledger_table(result.ledger), ""]
+    lines.append(
+        f"recovered {result.message_count} messages on {len(result.topics)} topics{_span(result)} into"
+        f" {result.folder}; {result.lost_bytes} of {result.size} bytes lost"
+    )
+    return "\n".join(lines)
+
+
+def _span(result: Recovery) -> str:
+    """Return from when to when."""
+    if result.start_ns is None or result.end_ns is None:
+        return ""
+    return f", log time {result.start_ns / NS_PER_S:.3f} to {result.end_ns / NS_PER_S:.3f} s,"
