@@ -72,6 +72,7 @@ ANGULAR_MOMENTUM = "momentum/angular"
 ENERGY = "energy"
 IK_STATUS = "ik/status"
 ROBOT_DESCRIPTION = "robot_description"
+DEPUTY_MARKER = "deputy/marker"
 RUN_STATE = "run/state"
 RUN_READY = "run/ready"
 RUN_PUBLISHED = "run/published"
@@ -79,7 +80,6 @@ LOOP_TIMING = "loop_timing"
 CLOCK = "/clock"
 DIAGNOSTICS = "/diagnostics"
 TF = "/tf"  # written into the bag by the recorder; tf2_msgs cannot be imported everywhere
-DEPUTY_MARKER = "deputy/marker"  # written into the bag too, once, for viewers that have no live graph
 
 SOLVE_IK = "solve_ik"  # service of the ik node
 
@@ -107,6 +107,7 @@ def graph_topics(arms: Iterable[str]) -> tuple[Topic, ...]:
         Topic(ENERGY, f"{_OURS}/EnergyStamped", (PLANT,), (), Rate.REFERENCE),
         Topic(IK_STATUS, f"{_OURS}/IkStatus", (TRAJECTORY,), (), Rate.REFERENCE),
         Topic(ROBOT_DESCRIPTION, text, (PLANT,), (), Rate.CHANGE),
+        Topic(DEPUTY_MARKER, "visualization_msgs/msg/Marker", (PLANT,), (), Rate.CHANGE),
         Topic(RUN_STATE, f"{_OURS}/RunState", (PLANT,), everyone_else, Rate.CHANGE),
         Topic(RUN_READY, text, everyone_else, (PLANT,), Rate.CHANGE),
         Topic(RUN_PUBLISHED, f"{_OURS}/PublishedCounts", LOOP_NODES, (), Rate.CHANGE),

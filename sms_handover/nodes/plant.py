@@ -25,6 +25,7 @@ from sms_handover.ros.convert import (
 from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.loop_clock import LoopClock
 from sms_handover.ros.main import EXIT_OK, Stop, run_node
+from sms_handover.ros.marker import deputy_marker
 from sms_handover.ros.stamp_sync import StampSync
 from sms_handover.ros.wire import JointStateWire, StateWire, energy_wire, pose_wire, vector_wire
 from sms_handover.simulation.parameters import LOCKSTEP
@@ -35,6 +36,7 @@ from sms_handover.topics import (
     BASE_ODOMETRY,
     CLOCK,
     CLOCK_PERIOD_NS,
+    DEPUTY_MARKER,
     DEPUTY_POSE,
     ENERGY,
     GRASP_EVENT,
@@ -68,6 +70,7 @@ class PlantNode(GraphNode[PlantParameters]):
         super().__init__(PLANT, PlantParameters)
         schedule = load_task(self.common, self.robot)
         self._plant = make_plant(self.robot, schedule, self.common, self.parameters)
+        self._deputy_size = schedule.deputy.size
         self._last_tick = self.common.last_tick(schedule.end_ns)
         self._lockstep = self.common.mode == LOCKSTEP
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
@@ -85,8 +88,9 @@ class PlantNode(GraphNode[PlantParameters]):
         self.create_timer(_TIMING_PERIOD_S, self._publish_timing)
 
     def on_matched(self) -> None:
-        """Say what robot this is; the run begins when the other nodes are ready too."""
+        """Say what robot and deputy these are; the run begins when the other nodes are ready too."""
         self._publish[ROBOT_DESCRIPTION].publish(String(data=self.robot.urdf))
+        self._publish[DEPUTY_MARKER].publish(deputy_marker(self._deputy_size))
         self._begin_if_ready()
 
     def diagnostic_values(self) -> dict[str, object]:
@@ -111,7 +115,7 @@ class PlantNode(GraphNode[PlantParameters]):
     def _make_endpoints(self) -> None:
         """Make publishers, subscriptions and services."""
         names = [JOINT_STATES, BASE_ODOMETRY, DEPUTY_POSE, GRASP_EVENT, LINEAR_MOMENTUM, ANGULAR_MOMENTUM]
-        names += [ENERGY, ROBOT_DESCRIPTION, RUN_STATE, LOOP_TIMING, CLOCK]
+        names += [ENERGY, ROBOT_DESCRIPTION, DEPUTY_MARKER, RUN_STATE, LOOP_TIMING, CLOCK]
         names += [SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY]
         names += [tool_pose(arm) for arm in self.robot.arms]
         self._publish = {name: self.endpoints.publisher(name) for name in names}

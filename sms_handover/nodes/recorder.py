@@ -13,7 +13,6 @@ from rclpy.serialization import deserialize_message
 from sms_handover_interfaces.msg import PublishedCounts
 
 from sms_handover.bag.ledger import ledger_table
-from sms_handover.bag.marker import MARKER_TYPE, deputy_marker_cdr
 from sms_handover.bag.parameters import RecorderParameters
 from sms_handover.bag.provenance import provenance
 from sms_handover.bag.recording import Recording
@@ -27,7 +26,7 @@ from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, Stop, run_node
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.peer_parameters import PeerParameters
-from sms_handover.ros.qos import LATCHED, LOSSLESS, profile_of, stored, weakest
+from sms_handover.ros.qos import LOSSLESS, profile_of, stored, weakest
 from sms_handover.ros.stamp_sync import StampSync
 from sms_handover.ros.taps import Receive, Taps
 from sms_handover.ros.wire import StateWire
@@ -35,7 +34,6 @@ from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import load_task
 from sms_handover.topics import (
     CLOCK_PERIOD_NS,
-    DEPUTY_MARKER,
     DEPUTY_POSE,
     PLANT,
     RECORDER,
@@ -46,7 +44,7 @@ from sms_handover.topics import (
     Rate,
     Topic,
 )
-from sms_handover.types import Array, Pose
+from sms_handover.types import Pose
 
 _POLL_S = 0.005  # [s] of wall time between two batches: long enough to be cheap, short enough to lose little
 _QUIET_S = 0.05  # [s] of wall time without a message after which nothing is on the way any more
@@ -87,7 +85,6 @@ class RecorderNode(GraphNode[RecorderParameters]):
             self._record(topic)
         self._recording.add_topic(TF, TF_TYPE, (stored(LOSSLESS),), self.common.reference_ns)
         self._topics.add(TF)
-        self._record_marker(schedule.deputy.size)
         self._recording.begin()
         if self.parameters.record_all:
             self.create_timer(_DISCOVERY_PERIOD_S, self._look_for_topics)
@@ -170,13 +167,6 @@ class RecorderNode(GraphNode[RecorderParameters]):
             receive = partial(self._receive_anyway, name)
         subscription = self.endpoints.subscribe(topic.name, lambda data: None, raw=True)
         self._taps.take_over(subscription, receive)
-
-    def _record_marker(self, size: Array) -> None:
-        """Write the box that shows the deputy in viewers."""
-        name = self.resolve_topic_name(DEPUTY_MARKER)
-        self._open(name, MARKER_TYPE, LATCHED, 0)
-        marker = deputy_marker_cdr(self._recording.writer.types, size)
-        self._recording.receive(name, marker, time_ns())
 
     def _open(self, name: str, type_name: str, profile: QoSProfile, period_ns: int) -> None:
         """Open a topic in the bag."""

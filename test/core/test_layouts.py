@@ -3,15 +3,13 @@
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
 import pytest
 
-from sms_handover.bag.marker import MARKER_TYPE, deputy_marker_cdr
 from sms_handover.bag.recording import Recording
 from sms_handover.frames import DEPUTY, WORLD
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.scene.links import DescribedRobot
-from sms_handover.topics import ROBOT_DESCRIPTION
+from sms_handover.topics import ROBOT_DESCRIPTION, graph_topics
 
 from .bag_messages import TYPES, WALL_NS, joint_state, made_up_run, odometry, open_topics, record_run
 from .layout_paths import (
@@ -23,9 +21,6 @@ from .layout_paths import (
     plotjuggler_curves,
     plotjuggler_value,
 )
-
-CUBE, ADD = 1, 0  # [-] of visualization_msgs/msg/Marker
-SIZE = (0.1, 0.34, 0.2)  # m
 
 
 @pytest.fixture(scope="module")
@@ -39,8 +34,6 @@ def messages(tmp_path_factory: pytest.TempPathFactory) -> Messages:
         recording.receive("/sampled_joint_states", TYPES.serialize(state), WALL_NS)
         base = odometry(0, run.base_pose[0], run.base_twist[0])
         recording.receive("/sampled_base_odometry", TYPES.serialize(base), WALL_NS)
-        recording.add_topic("/deputy/marker", MARKER_TYPE)
-        recording.receive("/deputy/marker", deputy_marker_cdr(TYPES, np.array(SIZE)), WALL_NS)
     return last_messages(folder)
 
 
@@ -83,22 +76,13 @@ def test_a_curve_that_leads_nowhere_is_noticed(messages: Messages, name: str) ->
 
 def test_what_the_3d_panel_shows_is_there(messages: Messages, robot: RobotModel) -> None:
     panel = foxglove_layout()["configById"]["3D!scene"]
-    assert set(panel["topics"]) <= set(messages)
+    published = {f"/{topic.name.lstrip('/')}" for topic in graph_topics(robot.arms)}
+    assert set(panel["topics"]) <= published
     (layer,) = panel["layers"].values()
     assert layer["sourceType"] == "topic" and layer["topic"] == f"/{ROBOT_DESCRIPTION}"
     assert messages[layer["topic"]][0] == "std_msgs/msg/String"
     frames = {name.removeprefix("frame:") for name in panel["transforms"]}
     assert frames == {*DescribedRobot(robot.urdf).links, WORLD, DEPUTY}
-
-
-def test_the_deputy_is_a_box_that_stays_with_its_frame(messages: Messages) -> None:
-    kind, marker = messages["/deputy/marker"]
-    assert kind == "visualization_msgs/msg/Marker"
-    assert (marker.type, marker.action, marker.frame_locked) == (CUBE, ADD, True)
-    assert marker.header.frame_id == DEPUTY
-    assert (marker.scale.x, marker.scale.y, marker.scale.z) == SIZE
-    assert marker.color.a == 1.0 and marker.pose.orientation.w == 1.0
-    assert (marker.lifetime.sec, marker.lifetime.nanosec) == (0, 0)
 
 
 def test_every_panel_has_one_place() -> None:

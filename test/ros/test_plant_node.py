@@ -6,12 +6,15 @@ import pytest
 from sms_handover_interfaces.msg import GraspEvent, RunState
 from sms_handover_interfaces.srv import StepTicks
 from std_srvs.srv import SetBool, Trigger
+from visualization_msgs.msg import Marker
 
 from sms_handover.bag.decode import header_ns
+from sms_handover.frames import DEPUTY
 from sms_handover.ros.convert import stamp_ns_of
 from sms_handover.topics import (
     BASE_ODOMETRY,
     CLOCK,
+    DEPUTY_MARKER,
     DEPUTY_POSE,
     GRASP_EVENT,
     JOINT_COMMAND,
@@ -89,6 +92,16 @@ def test_robot_description_is_there_for_late_comers(graph: Graph) -> None:
     graph.run()
     (message,) = Messages().of(graph, ROBOT_DESCRIPTION)
     assert message.data == graph.plant.robot.urdf
+
+
+def test_the_deputy_is_a_box_that_stays_with_its_frame(graph: Graph) -> None:
+    graph.run()
+    (marker,) = Messages().of(graph, DEPUTY_MARKER)
+    assert (marker.type, marker.action, marker.frame_locked) == (Marker.CUBE, Marker.ADD, True)
+    assert marker.header.frame_id == DEPUTY
+    assert [marker.scale.x, marker.scale.y, marker.scale.z] == [0.1, 0.34, 0.1]
+    assert marker.color.a == 1.0 and marker.pose.orientation.w == 1.0
+    assert (marker.lifetime.sec, marker.lifetime.nanosec) == (0, 0)
 
 
 # Reset

@@ -32,7 +32,6 @@ from sms_handover.ros.wire import JointStateWire
 from sms_handover.simulation.scenario import Overrides, load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.topics import (
-    DEPUTY_MARKER,
     DIAGNOSTICS,
     JOINT_STATES,
     NODES,
@@ -189,7 +188,7 @@ def test_only_the_graph_is_recorded_if_wanted(bench: Bench) -> None:
     bench.plain("user").create_publisher(String, "notes", LATCHED).publish(String(data="a note"))
     assert recorded.run() == EXIT_OK
     graph = {topic.name if topic.name.startswith("/") else f"/{topic.name}" for topic in TOPICS}
-    assert set(recorded.info.topics) == {*graph, TF, f"/{DEPUTY_MARKER}"}
+    assert set(recorded.info.topics) == {*graph, TF}
 
 
 def test_asked_to_stop_it_stops_and_the_bag_is_whole(bench: Bench) -> None:
