@@ -3,6 +3,7 @@
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from pathlib import Path
 
+from sms_handover.cli.closed_loop import closed_loop
 from sms_handover.cli.folders import bag_of
 from sms_handover.cli.node_options import add_graph_options, add_topic_options, given, run_in_process
 from sms_handover.errors import ConfigurationError
@@ -26,6 +27,7 @@ _PARAMETERS = {
     "ack_timeout": "ack_timeout",
     "read_ahead_queue_size": "read_ahead",
 }
+_OF_CLOSED_LOOP = {"bag", "closed_loop", "domain_id"}
 _CLOCK_HZ = 40.0  # [Hz] of a generated /clock if no rate is given, as with ros2 bag play
 _WAIT_S = 60.0  # [s] of wall time to wait for subscribers if no time is given
 
@@ -43,7 +45,7 @@ def add_parser(parser: ArgumentParser) -> None:
         "services of the node /player: pause resume toggle_paused play_next stop set_rate seek\n"
         "exit codes: 0 played to the end, everything confirmed; 1 the bag is damaged, or nobody subscribed\n"
         "in time; 2 wrong input, nothing was played; 3 a subscriber has not confirmed everything;\n"
-        "130 interrupted"
+        "130 interrupted. With --closed-loop: 0 every bit is the same; 1 the states differ, or the plant died"
     )
     parser.add_argument("bag", type=Path, metavar="BAG", help="bag folder or file, or output folder of a run")
     group = parser.add_argument_group("time")
@@ -89,6 +91,12 @@ def add_parser(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--read-ahead-queue-size", type=int, metavar="N", help="messages held in memory (default: 1000)"
     )
+    parser.add_argument(
+        "--closed-loop",
+        action="store_true",
+        help="of a run of ours: give the recorded commands and phases, and only them, to a live plant in "
+        "lock step, and tell how far its states are from the recorded ones; exit code 0 if not by a bit",
+    )
     parser.add_argument("--disable-keyboard-controls", action="store_true", help="take no keys")
     add_graph_options(parser)
 
@@ -96,6 +104,11 @@ def add_parser(parser: ArgumentParser) -> None:
 def command(options: Namespace) -> int:
     """Carry out the command; return the exit code."""
     options.bag = bag_of(options.bag)
+    if options.closed_loop:
+        of_player = given(options, {name: name for name in vars(options)}).keys() - _OF_CLOSED_LOOP
+        if of_player:
+            raise ConfigurationError(f"--closed-loop takes no other option, given is {min(of_player)}")
+        return closed_loop(options.bag, options.domain_id)
     for rule in options.remap:
         if rule.count(":=") != 1 or not all(rule.split(":=")):
             raise ConfigurationError(f"remapping {rule!r} is not of the form OLD:=NEW")

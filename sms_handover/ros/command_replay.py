@@ -1,0 +1,121 @@
+"""Stands in for controller and trajectory: answers the plant with the commands of a recorded run."""
+
+import struct
+from collections.abc import Callable, Iterator
+
+from rclpy.node import Node
+from sms_handover_interfaces.msg import RunState
+from std_msgs.msg import String
+
+from sms_handover.analysis.deviation import LargestDeviation, state_deviation
+from sms_handover.bag.stamp import stamp_ns
+from sms_handover.bag.ticks import RecordedTick
+from sms_handover.frames import BASE, WORLD
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.ros.endpoints import Endpoints
+from sms_handover.ros.stamp_sync import StampSync
+from sms_handover.ros.wire import StateWire
+from sms_handover.topics import (
+    BASE_ODOMETRY,
+    CONTROLLER,
+    JOINT_COMMAND,
+    JOINT_STATES,
+    PLANT,
+    RUN_READY,
+    RUN_STATE,
+    TASK_PHASE,
+    graph_topics,
+)
+from sms_handover.units import NS_PER_S
+
+PEERS = (PLANT, CONTROLLER)
+
+_MATCHING_PERIOD_S = 0.02  # [s] of wall time between two looks at who has matched
+_STAMP = struct.Struct("<iI")  # seconds, nanoseconds
+_STAMP_AT = 4  # [byte] behind the encapsulation header
+_STATE = (JOINT_STATES, BASE_ODOMETRY)
+
+
+class CommandReplay:
+    """Feeds a live plant in lock step from a recording, and compares every state with the recorded one."""
+
+    def __init__(self, node: Node, ticks: Iterator[RecordedTick], robot: RobotModel) -> None:
+        """Make the endpoints on a node that has the name of the controller."""
+        self.deviation = LargestDeviation()
+        self.stamp_ns = -1  # of the last state that came
+        self.held = 0  # ticks without a recorded command
+        self.done = False
+        self._ticks = ticks
+        self._next = next(ticks, None)
+        self._last_command: bytes | None = None
+        self._wire = StateWire(robot.joint_names, WORLD, BASE)
+        self._inputs: StampSync[bytes] = StampSync()
+        self._endpoints = Endpoints(node, graph_topics(robot.arms), PEERS)
+        self._command = self._endpoints.publisher(JOINT_COMMAND)
+        self._phase = self._endpoints.publisher(TASK_PHASE)
+        self._ready = self._endpoints.publisher(RUN_READY)
+        for name in _STATE:
+            self._endpoints.subscribe(name, self._taker(name), raw=True)
+        self._endpoints.subscribe(RUN_STATE, self._on_run_state)
+        self._matching = node.create_timer(_MATCHING_PERIOD_S, self._look_for_plant)
+
+    @property
+    def unmatched(self) -> list[str]:
+        """Return in words what of the plant has not been found yet."""
+        return self._endpoints.unmatched
+
+    def _look_for_plant(self) -> None:
+        """Say that everybody is ready once the plant is there."""
+        if not self._endpoints.unmatched:
+            self._matching.cancel()
+            self._ready.publish(String(data=CONTROLLER))
+
+    def _on_run_state(self, message: RunState) -> None:
+        """Take notice of the end of the run."""
+        self.done = self.done or message.state in (RunState.FINISHED, RunState.FAILED)
+
+    def _taker(self, name: str) -> Callable[[bytes], None]:
+        """Return the callback of one part of the state."""
+
+        def take(data: bytes) -> None:
+            stamp = stamp_ns(data)
+            self._inputs.add(stamp, name, data)
+            state = self._inputs.take(stamp, _STATE)
+            if state is not None and not self.done:
+                self._tick(stamp, state[JOINT_STATES], state[BASE_ODOMETRY])
+
+        return take
+
+    def _tick(self, stamp: int, joints: bytes, odometry: bytes) -> None:
+        """Answer one state, then compare it."""
+        self.stamp_ns = stamp
+        while self._next is not None and self._next.stamp_ns < stamp:
+            self._next = next(self._ticks, None)
+        if self._next is None:
+            self.done = True
+            return
+        tick = self._next if self._next.stamp_ns == stamp else RecordedTick(stamp, None, None, None, None)
+        if tick.task_phase is not None:
+            self._phase.publish(tick.task_phase)
+        self._answer(stamp, tick.joint_command)
+        if tick.joint_states is None or tick.base_odometry is None:
+            return
+        if (joints, odometry) == (tick.joint_states, tick.base_odometry):
+            self.deviation.add_same()
+        else:
+            recorded = self._wire.read(tick.joint_states, tick.base_odometry)
+            self.deviation.add(state_deviation(recorded, self._wire.read(joints, odometry)))
+
+    def _answer(self, stamp: int, command: bytes | None) -> None:
+        """Publish the recorded command, or hold the last one where none was recorded."""
+        if command is None:
+            self.held += 1
+            command = self._last_command
+        if command is not None:
+            self._last_command = command
+            self._command.publish(_restamped(command, stamp))
+
+
+def _restamped(data: bytes, stamp: int) -> bytes:
+    """Return a message in little endian CDR with another stamp in its header."""
+    return data[:_STAMP_AT] + _STAMP.pack(*divmod(stamp, NS_PER_S)) + data[_STAMP_AT + _STAMP.size :]
