@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sms_handover.types import Array, Pose, RobotState
+from sms_handover.types import Pose, RobotState
 
 
 @dataclass(frozen=True)
@@ -71,17 +71,7 @@ class LargestDeviation:
 
 def _bits(state: RobotState) -> bytes:
     """Return all numbers of a state as bytes."""
-    base, twist = state.base_in_world, state.twist_base_in_base
-    arrays: tuple[Array, ...] = (
-        base.position,
-        base.quaternion_xyzw,
-        twist.linear,
-        twist.angular,
-        state.joint_position,
-        state.joint_velocity,
-        state.joint_effort,
-    )
-    return b"".join(array.tobytes() for array in arrays)
+    return state.q.tobytes() + state.v.tobytes() + state.joint_effort.tobytes()
 
 
 def _angle_between(one: Pose, other: Pose) -> float:

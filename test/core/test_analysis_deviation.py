@@ -21,7 +21,7 @@ def state(
         angles[place] = angle
     zero = np.zeros(3)
     pose = Pose(np.array(position), np.array(turn))
-    return RobotState(stamp_ns, pose, Twist(zero, zero), angles, np.zeros(JOINTS), np.full(JOINTS, effort))
+    return RobotState.of(stamp_ns, pose, Twist(zero, zero), angles, np.zeros(JOINTS), np.full(JOINTS, effort))
 
 
 def about(axis: tuple[float, float, float], angle: float) -> tuple[float, float, float, float]:
