@@ -1,5 +1,6 @@
 """Levenberg-Marquardt inverse kinematics with the error-dependent damping of Sugihara."""
 
+import eigenpy
 import numpy as np
 
 from sms_handover.ik.parameters import IkParameters
@@ -14,25 +15,24 @@ _MAX_GROWTHS = 40  # [-] damping then exceeds any curvature, so the step is as g
 def solve_ik(robot: RobotModel, request: IkRequest, parameters: IkParameters) -> IkResult:
     """Return the joint angles that bring the tools to their targets, or come nearest from the seed.
 
-    Iterates q <- clamp(q - (J^T J + W_n)^-1 J^T e) with W_n = (E + bias) 1 and E = e^T e / 2
-    [Sugihara2011]; a step that does not lower E is tried again with a larger damping. Joints that
-    the step would push through a limit are frozen at it for that iteration, so the others make up
-    for it. Always returns: the status tells how it ended.
+    Iterates q <- clamp(q - J^T (J J^T + W_n)^-1 e) with W_n = (E + bias) 1 and E = e^T e / 2
+    [Sugihara2011]: the step (J^T J + W_n)^-1 J^T e, whose matrix is as large as there are joints, by one
+    that is as large as there are errors. A step that does not lower E is tried again with a larger
+    damping. Joints that the step would push through a limit are frozen at it for that iteration, so the
+    others make up for it. Always returns: the status tells how it ended.
     """
-    seed = np.clip(request.seed, robot.lower, robot.upper)
+    seed = robot.within_limits(request.seed)
     if not request.tool_in_world:
         return _result(robot, request, seed, None, IkStatus.CONVERGED, 0)
     problem = PoseResidual(robot, request.base_in_world, request.tool_in_world)
-    q = seed
-    residual = problem.evaluate(q)
+    q, residual = seed, problem.evaluate(seed)
     for iteration in range(parameters.max_iterations):
         if _converged(residual, parameters):
             return _result(robot, request, q, residual, IkStatus.CONVERGED, iteration)
-        q_next = _descend(robot, problem, q, residual, parameters.damping_bias)
-        if np.max(np.abs(q_next - q)) <= parameters.stall_step:
+        q_next, residual_next = _descend(robot, problem, q, residual, parameters.damping_bias)
+        if np.abs(q_next - q).max() <= parameters.stall_step:
             return _result(robot, request, q, residual, IkStatus.STALLED, iteration)
-        q = q_next
-        residual = problem.evaluate(q)
+        q, residual = q_next, residual_next
     status = IkStatus.CONVERGED if _converged(residual, parameters) else IkStatus.ITERATION_LIMIT
     return _result(robot, request, q, residual, status, parameters.max_iterations)
 
@@ -45,23 +45,30 @@ def _converged(residual: Residual, parameters: IkParameters) -> bool:
     )
 
 
-def _descend(robot: RobotModel, problem: PoseResidual, q: Array, residual: Residual, bias: float) -> Array:
-    """Return the next iterate: the first damped step that lowers the error energy, or ``q`` itself."""
-    gradient = residual.jacobian.T @ residual.values
-    at_limit = ((q <= robot.lower) & (gradient > 0)) | ((q >= robot.upper) & (gradient < 0))
-    free = np.flatnonzero(~at_limit)
-    jacobian = residual.jacobian[:, free]
-    curvature = jacobian.T @ jacobian
-    identity = np.eye(free.size)
+def _descend(
+    robot: RobotModel, problem: PoseResidual, q: Array, residual: Residual, bias: float
+) -> tuple[Array, Residual]:
+    """Return the next iterate with its residual: the first damped step that lowers the error energy.
+
+    If no step does, that is ``q`` itself.
+    """
+    jacobian = problem.jacobian(q)
+    at_lower, at_upper = q <= robot.lower, q >= robot.upper
+    if np.count_nonzero(at_lower) or np.count_nonzero(at_upper):
+        gradient = residual.values.dot(jacobian)
+        jacobian[:, (at_lower & (gradient > 0)) | (at_upper & (gradient < 0))] = 0.0
+    damped = jacobian.dot(jacobian.T)
+    diagonal = damped.reshape(-1)[:: len(damped) + 1]
+    undamped = diagonal.copy()
     for growth in range(_MAX_GROWTHS):
         damping = residual.energy + bias * _DAMPING_GROWTH**growth
-        step = np.zeros_like(q)
-        step[free] = np.linalg.solve(curvature + damping * identity, gradient[free])
-        candidate: Array = np.clip(q - step, robot.lower, robot.upper)
-        values = problem.values(candidate)
-        if 0.5 * float(values @ values) < residual.energy:
-            return candidate
-    return q
+        np.add(undamped, damping, out=diagonal)
+        step = eigenpy.LLT(damped).solve(residual.values).dot(jacobian)
+        candidate = robot.within_limits(q - step)
+        found = problem.evaluate(candidate)
+        if found.energy < residual.energy:
+            return candidate, found
+    return q, residual
 
 
 def _result(
@@ -74,7 +81,7 @@ def _result(
         iterations=count,
         position_error=residual.position_error if residual else 0.0,
         orientation_error=residual.orientation_error if residual else 0.0,
-        limit_margin=float(np.min(np.minimum(q - robot.lower, robot.upper - q))),
+        limit_margin=float(np.minimum(q - robot.lower, robot.upper - q).min()),
         manipulability=manipulability(robot, request.base_in_world, q),
-        seed_distance=float(np.max(np.abs(q - request.seed))),
+        seed_distance=float(np.abs(q - request.seed).max()),
     )

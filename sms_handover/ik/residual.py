@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from math import hypot
 
 import numpy as np
 import pinocchio as pin
 
 from sms_handover.model.poses import se3_of
-from sms_handover.model.robot_model import BASE_NV, RobotModel
+from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.types import Array, Pose
 
 _ROWS = 6  # residual rows per tool: position, orientation
@@ -15,25 +17,26 @@ _ROWS = 6  # residual rows per tool: position, orientation
 
 @dataclass(frozen=True, eq=False)
 class Residual:
-    """Residual (6 k,) of k tools and its Jacobian (6 k, n) with respect to the joint angles."""
+    """Residual (6 k,) of k tools."""
 
     values: Array
-    jacobian: Array
 
     @property
     def position_error(self) -> float:
         """Largest distance in m of a tool to its target."""
-        return max(float(np.linalg.norm(row[:3])) for row in self.values.reshape(-1, _ROWS))
+        x = self.values.tolist()
+        return max(hypot(*x[row : row + 3]) for row in range(0, len(x), _ROWS))
 
     @property
     def orientation_error(self) -> float:
         """Largest angle in rad of a tool to its target."""
-        return max(float(np.linalg.norm(row[3:])) for row in self.values.reshape(-1, _ROWS))
+        x = self.values.tolist()
+        return max(hypot(*x[row + 3 : row + 6]) for row in range(0, len(x), _ROWS))
 
-    @property
+    @cached_property
     def energy(self) -> float:
         """Half the squared norm of the residual, metres and radians weighted alike."""
-        return 0.5 * float(self.values @ self.values)
+        return 0.5 * float(self.values.dot(self.values))
 
 
 class PoseResidual:
@@ -46,49 +49,52 @@ class PoseResidual:
     def __init__(self, robot: RobotModel, base_in_world: Pose, tool_in_world: Mapping[str, Pose]) -> None:
         """Fix the base and the targets."""
         self._robot = robot
-        self._base = base_in_world
-        self._targets = [(robot.tool_frame_id[arm], se3_of(pose)) for arm, pose in tool_in_world.items()]
-
-    def values(self, joint_position: Array) -> Array:
-        """Return the residual (6 k,) alone."""
-        robot = self._robot
-        pin.forwardKinematics(robot.pin, robot.data, robot.configuration(self._base, joint_position))
-        rows = []
-        for frame_id, target in self._targets:
-            tool = pin.updateFramePlacement(robot.pin, robot.data, frame_id)
-            rows.append(tool.translation - target.translation)
-            rows.append(pin.log3(target.rotation.T @ tool.rotation))
-        return np.concatenate(rows)
+        self._q = robot.configuration(base_in_world, np.zeros(robot.n_joints))
+        targets = {robot.tool_frame_id[arm]: se3_of(pose) for arm, pose in tool_in_world.items()}
+        self._targets = [
+            (slice(_ROWS * index, _ROWS * (index + 1)), frame_id, target, np.array(target.translation))
+            for index, (frame_id, target) in enumerate(targets.items())
+        ]
+        self._to_rows = np.zeros((_ROWS, _ROWS))  # takes a body twist of the tool to rows of the Jacobian
 
     def evaluate(self, joint_position: Array) -> Residual:
-        """Return residual and Jacobian."""
-        robot = self._robot
-        q = robot.configuration(self._base, joint_position)
-        pin.computeJointJacobians(robot.pin, robot.data, q)
+        """Return the residual."""
+        model, data = self._robot.pin, self._robot.data
+        self._q[BASE_NQ:] = joint_position
+        pin.forwardKinematics(model, data, self._q)
         values = np.empty(_ROWS * len(self._targets))
-        jacobian = np.empty((_ROWS * len(self._targets), robot.n_joints))
-        for index, (frame_id, target) in enumerate(self._targets):
-            tool = pin.updateFramePlacement(robot.pin, robot.data, frame_id)
-            turn = target.rotation.T @ tool.rotation
-            frame = pin.ReferenceFrame.LOCAL
-            body = pin.getFrameJacobian(robot.pin, robot.data, frame_id, frame)[:, BASE_NV:]
-            row = _ROWS * index
-            values[row : row + 3] = tool.translation - target.translation
-            values[row + 3 : row + 6] = pin.log3(turn)
-            jacobian[row : row + 3] = tool.rotation @ body[:3]
-            jacobian[row + 3 : row + 6] = pin.Jlog3(turn) @ body[3:]
-        return Residual(values, jacobian)
+        for rows, frame_id, target, place in self._targets:
+            tool = pin.updateFramePlacement(model, data, frame_id)
+            part = values[rows]
+            np.subtract(tool.translation, place, out=part[:3])
+            part[3:] = pin.log3(target.actInv(tool).rotation)
+        return Residual(values)
+
+    def jacobian(self, joint_position: Array) -> Array:
+        """Return the derivative (6 k, n) of the residual with respect to the joint angles."""
+        model, data, to_rows = self._robot.pin, self._robot.data, self._to_rows
+        self._q[BASE_NQ:] = joint_position
+        pin.computeJointJacobians(model, data, self._q)
+        jacobian = np.empty((_ROWS * len(self._targets), self._robot.n_joints))
+        for rows, frame_id, target, _ in self._targets:
+            tool = pin.updateFramePlacement(model, data, frame_id)
+            to_rows[:3, :3] = tool.rotation
+            to_rows[3:, 3:] = pin.Jlog3(target.actInv(tool).rotation)
+            body = pin.getFrameJacobian(model, data, frame_id, pin.ReferenceFrame.LOCAL)
+            to_rows.dot(body[:, BASE_NV:], out=jacobian[rows])
+        return jacobian
 
 
 def manipulability(robot: RobotModel, base_in_world: Pose, joint_position: Array) -> Array:
     """Return sqrt(det(J J^T)) of every arm with the base locked [Yoshikawa1985], shape (arms,)."""
     q = robot.configuration(base_in_world, joint_position)
     pin.computeJointJacobians(robot.pin, robot.data, q)
-    measures = []
-    for arm in robot.arms:
-        columns = robot.arm_joints[arm]
-        part = slice(BASE_NV + columns.start, BASE_NV + columns.stop)
-        frame = pin.ReferenceFrame.LOCAL
-        body = pin.getFrameJacobian(robot.pin, robot.data, robot.tool_frame_id[arm], frame)[:, part]
-        measures.append(np.sqrt(max(np.linalg.det(body @ body.T), 0.0)))
-    return np.array(measures)
+    squares = np.empty((len(robot.arms), _ROWS, _ROWS))
+    for square, arm in zip(squares, robot.arms, strict=True):
+        frame_id, local = robot.tool_frame_id[arm], pin.ReferenceFrame.LOCAL
+        part = robot.arm_joints[arm]
+        body = pin.getFrameJacobian(robot.pin, robot.data, frame_id, local)
+        own = body[:, BASE_NV + part.start : BASE_NV + part.stop]
+        own.dot(own.T, out=square)
+    measures: Array = np.sqrt(np.maximum(np.linalg.det(squares), 0.0))
+    return measures

@@ -77,6 +77,10 @@ class RobotModel:
         """Return joint efforts (n,) N m, each limited to what its joint can give."""
         return np.minimum(np.maximum(effort, self._least_effort), self.effort_limit)
 
+    def within_limits(self, joint_position: Array) -> Array:
+        """Return joint angles (n,) rad, each brought inside the limits of its joint."""
+        return np.minimum(np.maximum(joint_position, self.lower), self.upper)
+
     def tools_in_world(self, base_in_world: Pose, joint_position: Array) -> dict[str, Pose]:
         """Return the pose of every tool frame in ``world``, by forward kinematics."""
         pin.forwardKinematics(self.pin, self.data, self.configuration(base_in_world, joint_position))

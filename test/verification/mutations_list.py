@@ -406,22 +406,22 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "joint limits not kept",
         "ik/levenberg_marquardt",
-        "np.clip(q - step, robot.lower, robot.upper)",
-        "q - step",
+        "candidate = robot.within_limits(q - step)",
+        "candidate = q - step",
         "ik",
     ),
     _core(
         "joints at a limit not frozen",
         "ik/levenberg_marquardt",
-        "free = np.flatnonzero(~at_limit)",
-        "free = np.flatnonzero(~at_limit | True)",
+        "(at_lower & (gradient > 0)) | (at_upper & (gradient < 0))",
+        "at_lower & at_upper",
         "ik",
     ),
     _core(
         "steps taken that make the error larger",
         "ik/levenberg_marquardt",
-        "if 0.5 * float(values @ values) < residual.energy:",
-        "if 0.5 * float(values @ values) < residual.energy + 10.0:",
+        "if found.energy < residual.energy:",
+        "if found.energy < residual.energy + 10.0:",
         "ik",
     ),
     _core(
@@ -434,15 +434,15 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "derivative of the logarithm taken as the identity",
         "ik/residual",
-        "pin.Jlog3(turn) @ body[3:]",
-        "body[3:]",
+        "to_rows[3:, 3:] = pin.Jlog3(target.actInv(tool).rotation)",
+        "to_rows[3:, 3:] = np.eye(3)",
         "ik",
     ),
     _core(
         "rotation of the tool transposed in the Jacobian",
         "ik/residual",
-        "tool.rotation @ body[:3]",
-        "tool.rotation.T @ body[:3]",
+        "to_rows[:3, :3] = tool.rotation",
+        "to_rows[:3, :3] = tool.rotation.T",
         "ik",
     ),
     _core(

@@ -36,9 +36,9 @@ def test_jacobian_is_the_derivative_of_the_residual(record: Record, angle: float
             turn = pin.SE3(pin.exp3(angle * axis / np.linalg.norm(axis)), random.uniform(-1.0, 1.0, 3))
             targets[arm] = pose_of(se3_of(tool) * turn)
         problem = PoseResidual(robot, base, targets)
-        jacobian = problem.evaluate(joints).jacobian
+        jacobian = problem.jacobian(joints)
         for column, direction in zip(jacobian.T, np.eye(robot.n_joints), strict=True):
-            at = {k: problem.values(joints + k * _STEP * direction) for k in (-2, -1, 1, 2)}
+            at = {k: problem.evaluate(joints + k * _STEP * direction).values for k in (-2, -1, 1, 2)}
             slope = (at[-2] - 8.0 * at[-1] + 8.0 * at[1] - at[2]) / (12.0 * _STEP)
             largest = max(largest, float(np.max(np.abs(slope - column))))
     claim = f"Jacobian of the residual, {angle:g} rad from the target"
