@@ -8,6 +8,7 @@ from types import MappingProxyType
 from sms_handover.analysis.base_motion import BaseMotion
 from sms_handover.analysis.claims import Claim, judge
 from sms_handover.analysis.metrics import RunMetrics, common_settling, measure
+from sms_handover.bag.loop import LoopRecord
 from sms_handover.errors import UnknownNameError
 from sms_handover.run_data import RunData
 
@@ -36,16 +37,22 @@ class Comparison:
         object.__setattr__(self, "drift", MappingProxyType(drift))
 
 
-def compare(runs: Mapping[str, RunData], laws: Mapping[str, str] | None = None) -> Comparison:
+def compare(
+    runs: Mapping[str, RunData],
+    laws: Mapping[str, str] | None = None,
+    loops: Mapping[str, LoopRecord] | None = None,
+) -> Comparison:
     """Return the comparison of runs by name.
 
     ``laws`` has the control law of each run; without it a run whose name holds the word ``nmpc`` or
-    ``pid`` is taken to be under that law. Raises UnknownNameError for a law of a run that is not there.
+    ``pid`` is taken to be under that law. ``loops`` has the course of runs in wall time. Raises
+    UnknownNameError for a law or a course of a run that is not there.
     """
-    for name in laws or {}:
-        if name not in runs:
-            raise UnknownNameError("run", name, runs, "control laws")
-    metrics = {name: measure(run) for name, run in runs.items()}
+    for given, what in ((laws, "control laws"), (loops, "loops")):
+        for name in given or {}:
+            if name not in runs:
+                raise UnknownNameError("run", name, runs, what)
+    metrics = {name: measure(run, (loops or {}).get(name)) for name, run in runs.items()}
     names = tuple(dict.fromkeys(item.phase.name for run in metrics.values() for item in run.phases))
     begins = {name: common_settling(metrics.values(), name) for name in names}
     drift = {

@@ -6,22 +6,28 @@ from math import isnan, nan
 from types import MappingProxyType
 
 from sms_handover.analysis.base_motion import UNKNOWN_MOTION, BaseMotion, base_motion
+from sms_handover.analysis.loop_timing import LoopTiming, loop_timing
 from sms_handover.analysis.numbers import largest
 from sms_handover.analysis.phases import PhaseSpan, phase_spans
 from sms_handover.analysis.receipts import IkOutcomes, PhysicsResiduals, ik_outcomes, physics_residuals
 from sms_handover.analysis.torque import JointTorque, joint_torque
 from sms_handover.analysis.tracking import ToolTracking, tool_tracking
+from sms_handover.analysis.work import JointWork, joint_work
+from sms_handover.bag.loop import LoopRecord
 from sms_handover.run_data import RunData
 
 
 @dataclass(frozen=True, eq=False)
 class PhaseMetrics:
-    """One phase: every arm's tracking, the motion of the base over it, and the torques."""
+    """One phase: every arm's tracking, the motion of the base over it, torques, work and receipts."""
 
     phase: PhaseSpan
     tools: Mapping[str, ToolTracking]
     base: BaseMotion
     torque: JointTorque
+    work: JointWork
+    physics: PhysicsResiduals
+    ik: IkOutcomes
 
     def __post_init__(self) -> None:
         """Make the mapping immutable."""
@@ -36,13 +42,18 @@ class PhaseMetrics:
 
 @dataclass(frozen=True, eq=False)
 class RunMetrics:
-    """One run: its phases in the order of time, and what holds for the whole of it."""
+    """One run: its phases in the order of time, and what holds for the whole of it.
+
+    ``loop`` is how the run kept time, None where that is not known.
+    """
 
     run: RunData
     phases: tuple[PhaseMetrics, ...]
     torque: JointTorque
+    work: JointWork
     physics: PhysicsResiduals
     ik: IkOutcomes
+    loop: LoopTiming | None = None
 
     def phase(self, name: str) -> PhaseMetrics | None:
         """Return the phase of a name, None if the run has none."""
@@ -68,14 +79,16 @@ def common_settling(runs: Iterable[RunMetrics], name: str) -> float:
     return largest([phase.settling_time for phase in found])
 
 
-def measure(run: RunData) -> RunMetrics:
-    """Return all metrics of a run."""
+def measure(run: RunData, loop: LoopRecord | None = None) -> RunMetrics:
+    """Return all metrics of a run; ``loop`` is its course in wall time, where it is known."""
     return RunMetrics(
         run=run,
         phases=tuple(_measure_phase(run, phase) for phase in phase_spans(run)),
         torque=joint_torque(run),
+        work=joint_work(run),
         physics=physics_residuals(run),
         ik=ik_outcomes(run),
+        loop=loop_timing(loop) if loop else None,
     )
 
 
@@ -86,4 +99,7 @@ def _measure_phase(run: RunData, phase: PhaseSpan) -> PhaseMetrics:
         {arm: tool_tracking(run, phase, arm) for arm in run.arms},
         base_motion(run, phase),
         joint_torque(run, phase),
+        joint_work(run, phase),
+        physics_residuals(run, phase),
+        ik_outcomes(run, phase),
     )

@@ -6,11 +6,11 @@ from math import nan
 import numpy as np
 
 from sms_handover.analysis.numbers import largest, lengths
+from sms_handover.analysis.phases import PhaseSpan
 from sms_handover.analysis.signals import energy_residual
 from sms_handover.run_data import RunData
 from sms_handover.types import IkStatus
 
-_CONVERGED = list(IkStatus).index(IkStatus.CONVERGED)
 _NOT_ASKED = -1
 
 
@@ -31,25 +31,42 @@ class PhysicsResiduals:
 
 @dataclass(frozen=True)
 class IkOutcomes:
-    """How many inverse-kinematics solves a run asked for, and how many did not converge."""
+    """How many inverse-kinematics solves a run asked for, and how many did not converge.
+
+    ``failures`` are those that ``stalled`` and those that came to the ``iteration_limit``.
+    """
 
     solves: int
     failures: int
+    stalled: int
+    iteration_limit: int
 
 
-def physics_residuals(run: RunData) -> PhysicsResiduals:
-    """Return how far momenta and energy were from what they must be."""
-    peak = largest(run.kinetic_energy)
+def physics_residuals(run: RunData, phase: PhaseSpan | None = None) -> PhysicsResiduals:
+    """Return how far momenta and energy were from what they must be, in a phase or in the whole run.
+
+    The energy of a phase is balanced from its first sample on.
+    """
+    rows = phase.rows if phase else slice(None)
+    peak = largest(run.kinetic_energy[rows])
+    residual = energy_residual(run).values[rows, 0]
+    known = residual[~np.isnan(residual)]
     return PhysicsResiduals(
-        linear_momentum=largest(lengths(run.linear_momentum)),
-        angular_momentum=largest(lengths(run.angular_momentum)),
-        energy=largest(np.abs(energy_residual(run).values)) / peak if peak > 0.0 else nan,
+        linear_momentum=largest(lengths(run.linear_momentum[rows])),
+        angular_momentum=largest(lengths(run.angular_momentum[rows])),
+        energy=largest(np.abs(known - known[:1])) / peak if peak > 0.0 else nan,
         peak_kinetic_energy=peak,
     )
 
 
-def ik_outcomes(run: RunData) -> IkOutcomes:
-    """Return how the inverse-kinematics solves of a run ended."""
-    asked = run.ik_status != _NOT_ASKED
-    failed = asked & (run.ik_status != _CONVERGED)
-    return IkOutcomes(int(np.count_nonzero(asked)), int(np.count_nonzero(failed)))
+def ik_outcomes(run: RunData, phase: PhaseSpan | None = None) -> IkOutcomes:
+    """Return how the inverse-kinematics solves of a phase, or of the whole run, ended."""
+    status = run.ik_status[phase.rows if phase else slice(None)]
+    of_kind = {kind: int(np.count_nonzero(status == number)) for number, kind in enumerate(IkStatus)}
+    solves = int(np.count_nonzero(status != _NOT_ASKED))
+    return IkOutcomes(
+        solves=solves,
+        failures=solves - of_kind[IkStatus.CONVERGED],
+        stalled=of_kind[IkStatus.STALLED],
+        iteration_limit=of_kind[IkStatus.ITERATION_LIMIT],
+    )

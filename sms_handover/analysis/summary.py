@@ -14,6 +14,7 @@ from sms_handover.analysis.comparison import Comparison
 from sms_handover.analysis.metrics import PhaseMetrics, RunMetrics
 from sms_handover.analysis.torque import JointTorque
 from sms_handover.analysis.tracking import ToolTracking
+from sms_handover.analysis.work import JointWork
 from sms_handover.types import GraspEvent
 from sms_handover.units import ns_to_seconds
 
@@ -34,9 +35,11 @@ def _run(metrics: RunMetrics, drift: Mapping[str, BaseMotion]) -> Summary:
     """Return the figures of one run."""
     return {
         "phases": [_phase(item, drift[item.phase.name]) for item in metrics.phases],
-        "torque": _torque(metrics.torque),
+        "torque": _per_joint(metrics.torque),
+        "work": _per_joint(metrics.work),
         "physics": _values(metrics.physics),
         "ik": _values(metrics.ik),
+        "loop": _values(metrics.loop) if metrics.loop else None,
         "grasp_events": [_event(event) for event in metrics.run.grasp_events],
     }
 
@@ -51,21 +54,25 @@ def _phase(metrics: PhaseMetrics, drift: BaseMotion) -> Summary:
         "tools": {arm: _tool(tool) for arm, tool in metrics.tools.items()},
         "base": _values(metrics.base),
         "base_drift": _values(drift),
-        "torque": _torque(metrics.torque),
+        "torque": _per_joint(metrics.torque),
+        "work": _per_joint(metrics.work),
+        "physics": _values(metrics.physics),
+        "ik": _values(metrics.ik),
     }
 
 
 def _tool(tool: ToolTracking) -> Summary:
     """Return the figures of one tool."""
-    return {name: value for name, value in _values(tool).items() if name not in _TIME_HISTORIES}
+    figures = {name: value for name, value in _values(tool).items() if name not in _TIME_HISTORIES}
+    return {**figures, "orientation": _values(tool.orientation)}
 
 
-def _torque(torque: JointTorque) -> Summary:
+def _per_joint(figures: JointTorque | JointWork) -> Summary:
     """Return the figures of every joint by its name."""
-    columns = {item.name: getattr(torque, item.name) for item in fields(torque)[1:]}
+    columns = {item.name: getattr(figures, item.name) for item in fields(figures)[1:]}
     return {
         joint: {name: _plain(values[place]) for name, values in columns.items()}
-        for place, joint in enumerate(torque.joint_names)
+        for place, joint in enumerate(figures.joint_names)
     }
 
 

@@ -10,14 +10,16 @@ from sms_handover.analysis.claims import Claim
 from sms_handover.analysis.comparison import Comparison, compare
 from sms_handover.analysis.grasps import Tolerance
 from sms_handover.analysis.layout import MISSING, WIDTH, Row, Section, layout, number, row
+from sms_handover.analysis.loop_timing import LoopTiming
 from sms_handover.analysis.metrics import PhaseMetrics, RunMetrics
-from sms_handover.analysis.numbers import largest
+from sms_handover.analysis.numbers import largest, lengths
 from sms_handover.analysis.tracking import Motion, ToolTracking
 from sms_handover.run_data import RunData
 from sms_handover.types import GraspAction, GraspCommand, GraspEvent
 from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
 
 _MICRO = 1e6
+_MS_PER_S = 1000.0  # [ms/s]
 _NEVER = "never"
 _cost = partial(row, smaller_is_better=True)
 _VERDICTS = {True: "HOLDS", False: "DOES NOT HOLD"}
@@ -53,6 +55,7 @@ def figure_sections(comparison: Comparison, tolerance: Tolerance | None = None) 
         *(_phase_section(comparison, name) for name in comparison.phase_names),
         Section("Torque over the whole run, peak / RMS [N m]", _torque_rows(runs)),
         Section("Physics and inverse kinematics", _receipt_rows(runs)),
+        *([Section("Wall clock", _loop_rows(runs))] if any(item.loop for item in runs) else []),
     )
 
 
@@ -129,6 +132,7 @@ _HELD: tuple[tuple[str, Callable[[ToolTracking], float]], ...] = (
 _EITHER: tuple[tuple[str, Callable[[ToolTracking], float]], ...] = (
     ("  steady-state error [mm]", lambda tool: tool.steady_state_error * MM_PER_M),
     ("  final error [mm]", lambda tool: tool.final_error * MM_PER_M),
+    ("  largest angle error [deg]", lambda tool: tool.orientation.largest_error * DEG_PER_RAD),
     ("  final angle error [deg]", lambda tool: tool.final_orientation_error * DEG_PER_RAD),
 )
 
@@ -137,6 +141,7 @@ def _tool_rows(arm: str, phases: Sequence[PhaseMetrics | None]) -> list[Row]:
     """Return the rows of one arm in one phase."""
     tools = [item.tools.get(arm) if item else None for item in phases]
     torques = [item.torque.of_arm(arm) if item else None for item in phases]
+    works = [item.work.of_arm(arm) if item else None for item in phases]
     kinds = {tool.motion for tool in tools if tool}
     kind = " or ".join(motion.value for motion in Motion if motion in kinds)
     rows = [Row(f"{arm} ({kind})")]
@@ -145,8 +150,17 @@ def _tool_rows(arm: str, phases: Sequence[PhaseMetrics | None]) -> list[Row]:
     rows += [_cost(label, tools, value) for label, value in (_HELD if kinds == {Motion.HOLD} else _MOVING)]
     rows.append(_cost("  settling time [s]", tools, lambda tool: tool.settling_time, _NEVER))
     rows += [_cost(label, tools, value) for label, value in _EITHER]
+    if any(tool and not isnan(tool.orientation.overshoot) for tool in tools):
+        rows.append(
+            _cost("  angle overshoot [deg]", tools, lambda tool: tool.orientation.overshoot * DEG_PER_RAD)
+        )
+    rows.append(
+        _cost("  angle settling time [s]", tools, lambda tool: tool.orientation.settling_time, _NEVER)
+    )
     rows.append(_cost("  peak torque [N m]", torques, lambda torque: largest(torque.peak)))
+    rows.append(_cost("  RMS torque of the arm [N m]", torques, lambda torque: float(lengths(torque.rms))))
     rows.append(_cost("  control effort [(N m)^2 s]", torques, lambda torque: float(torque.effort.sum())))
+    rows.append(_cost("  absolute work [J]", works, lambda work: float(work.absolute.sum())))
     return rows
 
 
@@ -156,6 +170,7 @@ def _torque_rows(runs: Sequence[RunMetrics]) -> tuple[Row, ...]:
     joints = dict.fromkeys(name for torque in torques for name in torque.joint_names)
     return (
         *(Row(name, tuple(_peak_and_rms(item, name) for item in runs)) for name in joints),
+        _cost("absolute work [J]", runs, lambda item: float(item.work.absolute.sum())),
         _cost("control effort [(N m)^2 s]", torques, lambda torque: float(torque.effort.sum())),
         _cost("ticks asking for more, worst joint", torques, lambda torque: largest(torque.saturated_ticks)),
         _cost("ticks at the peak, worst joint", torques, lambda torque: largest(torque.ticks_at_peak)),
@@ -181,6 +196,24 @@ def _receipt_rows(runs: Sequence[RunMetrics]) -> tuple[Row, ...]:
         row("IK solves", runs, lambda item: float(item.ik.solves)),
         _cost("IK solves that failed", runs, lambda item: float(item.ik.failures)),
     )
+
+
+_LOOP: tuple[tuple[str, Callable[[LoopTiming], float]], ...] = (
+    ("wall time [s]", lambda loop: loop.wall_duration),
+    ("real-time factor [-]", lambda loop: loop.real_time_factor),
+    ("period of the plant, mean [ms]", lambda loop: loop.period_mean * _MS_PER_S),
+    ("  standard deviation [ms]", lambda loop: loop.period_std * _MS_PER_S),
+    ("  largest [ms]", lambda loop: loop.period_max * _MS_PER_S),
+    ("largest lag behind real time [s]", lambda loop: loop.largest_lag),
+    ("late ticks", lambda loop: loop.late_ticks),
+    ("ticks with an old command", lambda loop: loop.held_commands),
+)
+
+
+def _loop_rows(runs: Sequence[RunMetrics]) -> tuple[Row, ...]:
+    """Return how the loop of each run kept time."""
+    loops = [item.loop for item in runs]
+    return tuple(row(label, loops, value) for label, value in _LOOP)
 
 
 def _claim_section(claims: Sequence[Claim]) -> Section:

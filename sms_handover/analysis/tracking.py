@@ -8,14 +8,13 @@ import numpy as np
 
 from sms_handover.analysis.joints import joints_of
 from sms_handover.analysis.numbers import angle_between, complete, largest, lengths, mean
+from sms_handover.analysis.orientation import OrientationTracking, orientation_tracking
 from sms_handover.analysis.phases import PhaseSpan
+from sms_handover.analysis.settling import SETTLING_BAND, settling_time, steady_rows
 from sms_handover.run_data import RunData, Stamps
 from sms_handover.types import Array
-from sms_handover.units import ns_to_seconds
 
-SETTLING_BAND = 0.02  # [-] of the step length, the usual 2 % criterion
 SETTLING_FLOOR = 1e-3  # [m] smallest band, and the shortest way that counts as a motion
-STEADY_PART = 0.1  # [-] of the phase, at its end, over which the steady-state error is taken
 _MOVED = 1e-9  # [rad] a joint reference that changes by less stands still
 
 
@@ -34,8 +33,8 @@ class ToolTracking:
     A row per reference period that was recorded whole: ``stamp_ns`` (R,), ``position_error`` (R,)
     m, ``orientation_error`` (R,) rad. ``step_length`` m is the way from the tool at the start to its
     target. ``overshoot`` m and ``overshoot_ratio`` (of the step length) are not defined for a
-    hold. ``settling_time`` s is NaN if the error is outside ``band`` m at the end. ``docs/metrics.md``
-    has the formulas.
+    hold. ``settling_time`` s is NaN if the error is outside ``band`` m at the end. ``orientation``
+    has the same of the angle. ``docs/metrics.md`` has the formulas.
     """
 
     arm: str
@@ -53,6 +52,7 @@ class ToolTracking:
     steady_state_error: float
     final_error: float
     final_orientation_error: float
+    orientation: OrientationTracking
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
@@ -73,7 +73,6 @@ def tool_tracking(run: RunData, phase: PhaseSpan, arm: str) -> ToolTracking:
     band = largest([SETTLING_BAND * step_length, SETTLING_FLOOR])
     beyond = tool[:, :3] - target[-1, :3] if motion is Motion.SMOOTH else way
     overshoot = nan if motion is Motion.HOLD else max(0.0, largest(beyond @ (step / step_length)))
-    steady = stamp_ns >= phase.end_ns - round(STEADY_PART * (phase.end_ns - phase.start_ns))
     return ToolTracking(
         arm=arm,
         phase=phase,
@@ -87,24 +86,13 @@ def tool_tracking(run: RunData, phase: PhaseSpan, arm: str) -> ToolTracking:
         overshoot_ratio=nan if motion is Motion.HOLD else overshoot / step_length,
         settling_time=settling_time(stamp_ns, lengths(beyond), band, phase.start_ns),
         largest_error=largest(error),
-        steady_state_error=mean(error[steady]),
+        steady_state_error=mean(error[steady_rows(stamp_ns, phase)]),
         final_error=float(error[-1]) if error.size else nan,
         final_orientation_error=float(orientation_error[-1]) if error.size else nan,
+        orientation=orientation_tracking(
+            phase, stamp_ns, tool[:, 3:], target[:, 3:], smooth=motion is Motion.SMOOTH
+        ),
     )
-
-
-def settling_time(stamp_ns: Stamps, error: Array, band: float, start_ns: int) -> float:
-    """Return the time in s from ``start_ns`` after which an error stays within a band; NaN if it does not.
-
-    It is the time of the first sample of the last stay within the band, so it is late by at most one
-    sampling period.
-    """
-    outside = np.flatnonzero(error > band)
-    if not error.size or (outside.size and outside[-1] == error.size - 1):
-        return nan
-    if not outside.size:
-        return 0.0
-    return ns_to_seconds(int(stamp_ns[outside[-1] + 1]) - start_ns)
 
 
 def _motion(run: RunData, phase: PhaseSpan, arm: str, tool: Array, target: Array) -> tuple[Motion, Array]:

@@ -31,7 +31,7 @@ def read_run(path: Path, namespace: str | None = None) -> RunData:
     BagError if there is no bag, it is damaged, was not closed, or holds no run of ours.
     """
     info = read_info(path)
-    collector = RunCollector(info, _find_namespace(info) if namespace is None else namespace.rstrip("/"))
+    collector = RunCollector(info, find_namespace(info) if namespace is None else namespace.rstrip("/"))
     for name in _REQUIRED:
         if collector.full_name(name) not in info.topics:
             raise BagError(
@@ -85,7 +85,7 @@ def _assemble(collector: RunCollector) -> RunData:
     )
 
 
-def _find_namespace(info: BagInfo) -> str:
+def find_namespace(info: BagInfo) -> str:
     """Return the namespace of the only run in a bag, '' for the root."""
     tail = f"/{topics.JOINT_STATES}"
     found = [name.removesuffix(tail) for name in info.topics if name.endswith(tail)]

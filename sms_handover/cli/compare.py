@@ -25,7 +25,9 @@ def command(options: Namespace) -> int:
     """Carry out the command; return the exit code."""
     recorded = read_all(options.runs)
     comparison = compare(
-        {run.name: run.data for run in recorded}, laws={run.name: run.law for run in recorded}
+        {run.name: run.data for run in recorded},
+        laws={run.name: run.law for run in recorded},
+        loops={run.name: run.loop for run in recorded},
     )
     print(render(comparison, common_tolerance(recorded)))
     if options.json:

@@ -5,12 +5,10 @@ from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from pathlib import Path
 
 from sms_handover.analysis.figure_catalogue import FIGURES, chosen_figures, chosen_formats
-from sms_handover.bag.info import BagInfo, read_info
-from sms_handover.bag.reader import read_run
-from sms_handover.cli.folders import bag_of
+from sms_handover.cli.recorded import read_all
 from sms_handover.control.parameters import LAWS
 from sms_handover.errors import ConfigurationError
-from sms_handover.run_data import RunData
+from sms_handover.report.recorded_run import RecordedRun
 from sms_handover.scene.read import deputy_size_in
 from sms_handover.scene.scene import Scene, make_scene
 
@@ -66,10 +64,7 @@ def command(options: Namespace) -> int:
     from sms_handover.analysis.figures.draw import draw_figures, write_figure  # noqa: PLC0415
     from sms_handover.analysis.figures.drawn_run import DrawnRun  # noqa: PLC0415
 
-    runs = []
-    for path in options.runs:
-        name, data, info = path.resolve().name, read_run(bag_of(path)), read_info(bag_of(path))
-        runs.append(DrawnRun(name.upper() if name in LAWS else name, data, _scene(data, info)))
+    runs = [DrawnRun(_label(run.name), run.data, _scene(run)) for run in read_all(options.runs)]
     try:
         options.output.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -82,9 +77,14 @@ def command(options: Namespace) -> int:
     return 0
 
 
-def _scene(run: RunData, info: BagInfo) -> Scene | None:
+def _label(name: str) -> str:
+    """Return the name of a run for a legend: NMPC and PID are written as the paper does."""
+    return name.upper() if name in LAWS else name
+
+
+def _scene(run: RecordedRun) -> Scene | None:
     """Return the moving scene of a run, None if its bag does not describe the robot or the deputy."""
-    if info.urdf_text is None or info.schedule_text is None:
-        print(f"no snapshots of {info.path}: it describes no robot or no deputy", file=sys.stderr)
+    if run.info.urdf_text is None or run.info.schedule_text is None:
+        print(f"no snapshots of {run.name}: its bag describes no robot or no deputy", file=sys.stderr)
         return None
-    return make_scene(run, info.urdf_text, deputy_size_in(info), _FRAME_RATE)
+    return make_scene(run.data, run.info.urdf_text, deputy_size_in(run.info), _FRAME_RATE)

@@ -30,7 +30,11 @@ def report_page(runs: Sequence[RecordedRun]) -> str:
         raise ConfigurationError("a report needs at least one run")
     if len(set(names)) < len(names):
         raise ConfigurationError(f"every run of a report needs a name of its own, these are {names}")
-    comparison = compare({run.name: run.data for run in runs}, {run.name: run.law for run in runs})
+    comparison = compare(
+        {run.name: run.data for run in runs},
+        laws={run.name: run.law for run in runs},
+        loops={run.name: run.loop for run in runs},
+    )
     styles = run_styles(names, [run.law for run in runs])
     infos, data = [run.info for run in runs], [run.data for run in runs]
     groups = plot_groups(data)

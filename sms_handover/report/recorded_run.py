@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sms_handover.bag.info import BagInfo, read_info
+from sms_handover.bag.loop import LoopRecord, read_loop
 from sms_handover.bag.reader import read_run
 from sms_handover.errors import BagError, ConfigurationError
 from sms_handover.plant.deputy import GraspTolerance
@@ -18,10 +19,11 @@ _TOLERANCES = ("grasp_position_tolerance", "grasp_angle_tolerance", "grasp_speed
 
 @dataclass(frozen=True, eq=False)
 class RecordedRun:
-    """The arrays of a run under a name, and what its bag says of itself."""
+    """The arrays of a run under a name, its course in wall time, and what its bag says of itself."""
 
     name: str
     data: RunData
+    loop: LoopRecord
     info: BagInfo
 
     @property
@@ -41,7 +43,7 @@ class RecordedRun:
 def read_recorded(name: str, bag: Path) -> RecordedRun:
     """Return the run in a bag; raises ConfigurationError if the bag cannot be used or is not ours."""
     try:
-        return RecordedRun(name, read_run(bag), read_info(bag))
+        return RecordedRun(name, read_run(bag), read_loop(bag), read_info(bag))
     except BagError as error:
         raise ConfigurationError(str(error)) from error
 

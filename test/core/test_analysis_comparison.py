@@ -153,7 +153,8 @@ def test_the_table_says_what_came_of_everything(pair: dict[str, RunData]) -> Non
 
 def cells(table: str, label: str, place: int = 0) -> list[str]:
     """Return the cells of one of the rows with a label."""
-    return [line.strip().removeprefix(label).split() for line in table.splitlines() if label in line][place]
+    rows = [line.strip() for line in table.splitlines()]
+    return [line.removeprefix(label).split() for line in rows if line.startswith(label)][place]
 
 
 def test_columns_are_aligned(pair: dict[str, RunData]) -> None:

@@ -6,7 +6,8 @@ import pytest
 
 from sms_handover.analysis.numbers import angle_between
 from sms_handover.analysis.phases import phase_spans
-from sms_handover.analysis.tracking import Motion, ToolTracking, settling_time, tool_tracking
+from sms_handover.analysis.settling import settling_time
+from sms_handover.analysis.tracking import Motion, ToolTracking, tool_tracking
 from sms_handover.types import Array
 
 from .test_analysis_runs import (

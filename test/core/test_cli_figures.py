@@ -29,7 +29,9 @@ def test_the_files_are_named_as_they_are_written(
     printed, notes = capsys.readouterr()
     assert printed.splitlines() == [str(out / name) for name in expected]
     assert sorted(path.name for path in out.iterdir()) == sorted(expected)
-    assert [line.split(":")[-1] for line in notes.splitlines()] == [" it describes no robot or no deputy"] * 2
+    assert [line.split(":")[-1] for line in notes.splitlines()] == [
+        " its bag describes no robot or no deputy"
+    ] * 2
     assert main([*arguments, "--only", "momentum"]) == 0, "figures are drawn again over those that are there"
 
 
