@@ -24,6 +24,7 @@ FOUNDATION_MODULES = {
     "topics",
     "parameters",
     "share",
+    "status_line",
     "run_data",
 }
 MIDDLE = {"plant", "trajectory", "ik", "control"}

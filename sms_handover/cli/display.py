@@ -1,14 +1,11 @@
 """How far a run is, on a terminal in one line that is written over, else a line now and then."""
 
-import sys
 from collections.abc import Mapping
 from time import monotonic
 
+from sms_handover.status_line import StatusLine
 from sms_handover.types import GraspEvent
 from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
-
-_TERMINAL_PERIOD_S = 0.2  # [s] of wall time between two updates
-_LOG_PERIOD_S = 5.0  # [s] of wall time between two lines where there is no terminal
 
 
 class Display:
@@ -18,9 +15,7 @@ class Display:
         """Begin to count wall time."""
         self._end_s = ns_to_seconds(end_ns)
         self._begin, self._begin_s = monotonic(), 0.0
-        self._shown = 0.0
-        self._terminal = sys.stderr.isatty()
-        self._width = 0
+        self._line = StatusLine()
 
     def start(self, stamp_ns: int) -> None:
         """Count wall time from now on, with the run at this simulated time."""
@@ -28,29 +23,21 @@ class Display:
 
     def show(self, stamp_ns: int, phase: str, tool_error: Mapping[str, float], *, last: bool = False) -> None:
         """Show simulated time, phase, real-time factor and the tools' distance to their targets in mm."""
-        now = monotonic()
-        period = _TERMINAL_PERIOD_S if self._terminal else _LOG_PERIOD_S
-        if not last and now - self._shown < period:
+        if not last and not self._line.due:
             return
-        self._shown = now
         time_s = ns_to_seconds(stamp_ns)
-        factor = (time_s - self._begin_s) / max(now - self._begin, 1e-9)
+        factor = (time_s - self._begin_s) / max(monotonic() - self._begin, 1e-9)
         errors = "  ".join(f"{arm} {error * MM_PER_M:7.2f} mm" for arm, error in sorted(tool_error.items()))
-        self._write(
-            f"{time_s:6.2f} of {self._end_s:g} s  {phase:<12}  {factor:4.2f} x real time  {errors}", last
+        self._line.show(
+            f"{time_s:6.2f} of {self._end_s:g} s  {phase:<12}  {factor:4.2f} x real time  {errors}"
         )
+        if last:
+            self._line.stay()
 
     def event(self, event: GraspEvent) -> None:
         """Show a grasp event in a line of its own."""
-        self._write(grasp_line(event), True)
-
-    def _write(self, text: str, stays: bool) -> None:
-        """Write a line; on a terminal it is written over unless it stays."""
-        if not self._terminal:
-            print(text, file=sys.stderr, flush=True)
-            return
-        print("\r" + text.ljust(self._width), end="\n" if stays else "", file=sys.stderr, flush=True)
-        self._width = 0 if stays else len(text)
+        self._line.show(grasp_line(event))
+        self._line.stay()
 
 
 def grasp_line(event: GraspEvent) -> str:

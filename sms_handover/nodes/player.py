@@ -20,12 +20,12 @@ from sms_handover.playback.qos import read_overrides
 from sms_handover.playback.report import closing_line, progress_line
 from sms_handover.playback.schedule import PlaybackOptions, PlaybackSchedule
 from sms_handover.playback.source import PlaybackSource, span_of
-from sms_handover.playback.status_line import StatusLine
 from sms_handover.ros.bag_publishers import BagPublisher, make_publishers, without_subscriber
 from sms_handover.ros.convert import stamp_ns_of, time_message
 from sms_handover.ros.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, RunnableNode, Stop, run_node
 from sms_handover.ros.parameters import declare, refuse_unknown
 from sms_handover.ros.qos import LOSSLESS
+from sms_handover.status_line import StatusLine
 from sms_handover.topics import CLOCK, PLAYER
 from sms_handover.units import NS_PER_S
 
@@ -92,7 +92,7 @@ class PlayerNode(RunnableNode):
                     self._line.show(progress_line(self._schedule, self._source.span, monotonic_ns()))
             now_ns = monotonic_ns()
             self._line.show(progress_line(self._schedule, self._source.span, now_ns))
-            self._line.clear()
+            self._line.stay()
             print(closing_line(self._schedule, now_ns))
             missing = self._unconfirmed(stop)
         if missing:
@@ -162,7 +162,7 @@ class PlayerNode(RunnableNode):
             self._refused_since = now
         elif now - self._refused_since > _STUCK_S:
             self._refused_since = now
-            self._line.clear()
+            self._line.stay()
             print(f"a subscriber of {topic} takes nothing; waiting for it", file=sys.stderr)
 
     def _idle_s(self) -> float:

@@ -12,12 +12,12 @@ from rclpy.executors import Executor
 from sms_handover.bag.parameters import TopicRecorderParameters
 from sms_handover.bag.writer import BagWriter
 from sms_handover.errors import BagError, ConfigurationError, SmsHandoverError
-from sms_handover.playback.status_line import StatusLine
 from sms_handover.ros.main import EXIT_FAILED, EXIT_OK, RunnableNode, Stop, run_node
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.parameters import declare, refuse_unknown
 from sms_handover.ros.qos import stored, weakest
 from sms_handover.ros.taps import Taps
+from sms_handover.status_line import StatusLine
 from sms_handover.topics import TOPIC_RECORDER
 
 _POLL_S = 0.005  # [s] of wall time between two batches
@@ -69,7 +69,7 @@ class TopicRecorderNode(RunnableNode):
         finally:
             self._writer.close()
             self._taps.destroy()
-            self._line.clear()
+            self._line.stay()
         for topic, count in self.recorded.items():
             print(f"{count:10d}  {topic}")
         print(f"{sum(self.recorded.values()):10d}  messages in {self._writer.folder}")
@@ -89,7 +89,7 @@ class TopicRecorderNode(RunnableNode):
                 kind = message_class(type_names[0])
                 self._writer.add_topic(name, type_names[0], list(dict.fromkeys(map(stored, offers))))
             except SmsHandoverError as error:
-                self._line.clear()
+                self._line.stay()
                 print(f"not recorded: {name}: {error}", file=sys.stderr)
                 continue
             subscription = self.create_subscription(kind, name, lambda data: None, weakest(offers), raw=True)

@@ -12,6 +12,8 @@ from sms_handover.units import ns_to_seconds
 
 Read = Callable[[int], Iterator[RawMessage]]  # opens the messages from a bag time on, by time
 
+_MOST_BYTES = 64 * 1024 * 1024  # [byte] of messages read ahead, whatever their number
+
 
 @dataclass(frozen=True)
 class PlaybackOptions:
@@ -42,6 +44,7 @@ class PlaybackSchedule:
         self._played_ns = 0
         self._steps = 0
         self._queue: deque[RawMessage] = deque()
+        self._queued_bytes = 0
         self._from_ns = self._last_ns = self._start_ns
         self._messages = read(self._start_ns)
 
@@ -73,7 +76,9 @@ class PlaybackSchedule:
 
     def sent(self, now_ns: int) -> None:
         """Take notice that the message which was due has been sent."""
-        time_ns = self._queue.popleft().log_time_ns
+        message = self._queue.popleft()
+        time_ns = message.log_time_ns
+        self._queued_bytes -= len(message.data)
         self.sent_count += 1
         if self._steps:
             self._steps -= 1
@@ -97,10 +102,11 @@ class PlaybackSchedule:
     def read_ahead(self, at_most: int) -> None:
         """Read some messages that are not due yet, as far as the queue may grow."""
         for _ in range(min(at_most, self._options.read_ahead - len(self._queue))):
-            message = next(self._messages, None)
+            message = next(self._messages, None) if self._queued_bytes < _MOST_BYTES else None
             if message is None:
                 return
             self._queue.append(message)
+            self._queued_bytes += len(message.data)
 
     def pause(self, now_ns: int) -> None:
         """Stand still at what has been sent."""
@@ -145,6 +151,7 @@ class PlaybackSchedule:
         self._from_ns = self._last_ns = bag_ns
         self._steps = 0
         self._queue.clear()
+        self._queued_bytes = 0
         self._messages = self._read(bag_ns)
 
     def _head(self) -> RawMessage | None:

@@ -219,6 +219,26 @@ def test_memory_is_bounded() -> None:
     assert play.bag.read <= 1001 + 100
 
 
+def test_memory_is_bounded_for_large_messages_too() -> None:
+    """Ten images of 32 MiB: two are enough to wait with; the queue counts down as they go."""
+    size, read = 32 * 1024 * 1024, []
+
+    def images(from_ns: int) -> Iterator[RawMessage]:
+        for number in range(10):
+            read.append(number)
+            yield RawMessage("/image", "a/msg/Image", bytes(size), number * S, 0)
+
+    schedule = PlaybackSchedule(images, TimeSpan(0, 9 * S), PlaybackOptions(), 0)
+    schedule.read_ahead(1000)
+    assert len(read) == 2
+    for number in range(10):
+        assert schedule.due(number * S) is not None
+        schedule.sent(number * S)
+        schedule.read_ahead(1000)
+        assert len(read) <= number + 3
+    assert schedule.finished
+
+
 def test_messages_before_the_beginning_are_due_at_once_and_do_not_count_as_late() -> None:
     """Latched messages in force at the beginning have an older time."""
     times = [1 * S, 2 * S, *TIMES]

@@ -3,7 +3,7 @@
 import sys
 from time import monotonic
 
-_TERMINAL_PERIOD_S = 0.1  # [s] of wall time between two updates
+_TERMINAL_PERIOD_S = 0.2  # [s] of wall time between two updates
 _LOG_PERIOD_S = 5.0  # [s] of wall time between two lines where there is no terminal
 
 
@@ -31,8 +31,8 @@ class StatusLine:
         print("\r" + text.ljust(self._width), end="", file=sys.stderr, flush=True)
         self._width = len(text)
 
-    def clear(self) -> None:
+    def stay(self) -> None:
         """Leave the line as it stands and go to the next."""
         if self._width:
             print(file=sys.stderr, flush=True)
-            self._width = 0
+        self._width = 0
