@@ -117,7 +117,7 @@ def energy_residual(run: RunData) -> Signal:
     return _signal("energy residual", "J", run.reference_ns, balance - _first(balance), ("residual",))
 
 
-def signals(run: RunData) -> dict[str, Signal]:
+def signals_of(run: RunData) -> dict[str, Signal]:
     """Return every signal of a run by a key such as ``base_rotation`` or ``arm_a/position_error``."""
     found = {f"{arm}/{one.__name__}": one(run, arm) for arm in run.arms for one in _PER_ARM}
     found.update((one.__name__, one(run)) for one in _OF_ROBOT)

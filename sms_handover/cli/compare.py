@@ -1,13 +1,17 @@
 """``sms-handover compare``: recorded runs side by side, with the paper's claims."""
 
+import csv
 import json
 from argparse import ArgumentParser, Namespace
+from io import StringIO
 from pathlib import Path
 
 from sms_handover.analysis.comparison import compare
+from sms_handover.analysis.records import Record, records_of
 from sms_handover.analysis.summary import summary
 from sms_handover.analysis.table import render
 from sms_handover.cli.recorded import read_all
+from sms_handover.errors import ConfigurationError
 from sms_handover.report.recorded_run import common_tolerance
 
 
@@ -19,6 +23,7 @@ def add_parser(parser: ArgumentParser) -> None:
     )
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="output folder of a run, or a bag")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures to a JSON file too")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="write them to a CSV file too, one per row")
 
 
 def command(options: Namespace) -> int:
@@ -30,6 +35,18 @@ def command(options: Namespace) -> int:
         loops={run.name: run.loop for run in recorded},
     )
     print(render(comparison, common_tolerance(recorded)))
+    if options.csv:
+        table = StringIO()
+        csv.writer(table, lineterminator="\n").writerows([Record._fields, *records_of(comparison)])
+        _write(options.csv, table.getvalue())
     if options.json:
-        options.json.write_text(json.dumps(summary(comparison), indent=2) + "\n", encoding="utf-8")
+        _write(options.json, json.dumps(summary(comparison), indent=2) + "\n")
     return 0
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a text file; raises ConfigurationError if that cannot be done."""
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ConfigurationError(f"{path} cannot be written: {error.strerror}") from error

@@ -89,7 +89,7 @@ _PHYSICS = (
 
 def plot_groups(runs: Sequence[RunData]) -> tuple[PlotGroup, ...]:
     """Return everything that is drawn of the runs."""
-    found = [signals.signals(run) for run in runs]
+    found = [signals.signals_of(run) for run in runs]
     arms = tuple(dict.fromkeys(arm for run in runs for arm in run.arms))
     stretches = [_stretches(run) for run in runs]
 

@@ -15,7 +15,7 @@ from sms_handover.analysis.signals import (
     joint_torque,
     orientation_error,
     position_error,
-    signals,
+    signals_of,
 )
 from sms_handover.errors import ConfigurationError
 from sms_handover.run_data import RunData
@@ -154,7 +154,7 @@ def test_the_energy_residual_is_what_the_work_does_not_account_for() -> None:
 
 
 def test_every_signal_of_a_run_is_listed_once_per_arm() -> None:
-    found = signals(make_run(end=1.0))
+    found = signals_of(make_run(end=1.0))
     assert list(found) == [
         *(
             f"{arm}/{name}"
@@ -177,4 +177,4 @@ def test_a_run_without_a_row_has_empty_signals() -> None:
     empty["target_pose"] = {arm: rows[:0] for arm, rows in made.target_pose.items()}
     empty["tool_pose"] = {arm: rows[:0] for arm, rows in made.tool_pose.items()}
     none: RunData = changed(made, **empty)
-    assert {signal.values.shape[0] for signal in signals(none).values()} == {0}
+    assert {signal.values.shape[0] for signal in signals_of(none).values()} == {0}

@@ -12,7 +12,7 @@ import pytest
 from sms_handover.analysis.comparison import compare
 from sms_handover.analysis.highlights import highlights
 from sms_handover.analysis.layout import row
-from sms_handover.analysis.signals import signals
+from sms_handover.analysis.signals import signals_of
 from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.report.page_data import packed, page_data
 from sms_handover.report.plots import POINTS, TRANSIENT_S, plot_groups, thin
@@ -148,7 +148,7 @@ def test_plots_draw_the_signals_of_every_run() -> None:
     torque = plots["arm_a/joint_torque"]
     assert torque.series == tuple(f"joint {number}" for number in range(1, 8))
     for drawn in torque.lines:
-        expected = signals(runs[drawn.run])["arm_a/joint_torque"].values[:, drawn.series]
+        expected = signals_of(runs[drawn.run])["arm_a/joint_torque"].values[:, drawn.series]
         assert np.array_equal(drawn.values, expected)
     error = plots["arm_b/position_error"]
     expected = np.linalg.norm(runs[0].tool_pose["arm_b"][:, :3] - runs[0].target_pose["arm_b"][:, :3], axis=1)

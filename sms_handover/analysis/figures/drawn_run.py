@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from sms_handover.analysis.phases import PhaseSpan, phase_spans
-from sms_handover.analysis.signals import Signal, signals
+from sms_handover.analysis.signals import Signal, signals_of
 from sms_handover.run_data import RunData
 from sms_handover.scene.scene import Scene
 
@@ -25,5 +25,5 @@ class DrawnRun:
 
     def __post_init__(self) -> None:
         """Derive signals and phases once for all figures."""
-        object.__setattr__(self, "signals", MappingProxyType(signals(self.data)))
+        object.__setattr__(self, "signals", MappingProxyType(signals_of(self.data)))
         object.__setattr__(self, "phases", phase_spans(self.data))
