@@ -23,9 +23,14 @@ _FLOAT64 = np.dtype(np.float64)
 
 
 def read_only(values: npt.ArrayLike) -> Array:
-    """Return ``values`` as a float64 array that cannot be written to, copied unless it is one already."""
-    if type(values) is np.ndarray and values.dtype == _FLOAT64 and _is_frozen(values):
-        return values
+    """Return ``values`` as a float64 array that cannot be written to, copied unless it is one already.
+
+    It is one if nobody can write to its memory, neither through it nor through the array it is a view of.
+    """
+    if type(values) is np.ndarray and values.dtype == _FLOAT64 and not values.flags.writeable:
+        base = values.base
+        if base is None or type(base) is bytes or (isinstance(base, np.ndarray) and not base.flags.writeable):
+            return values
     array = np.array(values, dtype=np.float64)
     array.setflags(write=False)
     return array
@@ -35,16 +40,6 @@ def frozen(array: Array) -> Array:
     """Make an array that nobody else holds read-only, so that it can be passed on without a copy."""
     array.setflags(write=False)
     return array
-
-
-def _is_frozen(array: Array) -> bool:
-    """Tell whether nobody can write to the memory of an array: neither through it nor through its base."""
-    if array.flags.writeable:
-        return False
-    base = array.base
-    if base is None or type(base) is bytes:
-        return True
-    return isinstance(base, np.ndarray) and not base.flags.writeable
 
 
 @dataclass(frozen=True, eq=False)

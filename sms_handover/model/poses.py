@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 
-from sms_handover.types import Array, Pose, Twist
+from sms_handover.types import Array, Pose, Twist, frozen
 
 
 def se3_of(pose: Pose) -> pin.SE3:
@@ -17,7 +17,8 @@ def se3_of(pose: Pose) -> pin.SE3:
 
 def pose_of(transformation: pin.SE3) -> Pose:
     """Return position and quaternion (x y z w) of a homogeneous transformation."""
-    return Pose(transformation.translation, pin.Quaternion(transformation.rotation).coeffs())
+    row = frozen(pin.SE3ToXYZQUAT(transformation))
+    return Pose(row[:3], row[3:])
 
 
 def pose_from_xyz_rpy(xyz: Array, rpy: Array) -> Pose:

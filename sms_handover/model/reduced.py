@@ -49,8 +49,8 @@ def reduced_inverse_dynamics(robot: RobotModel, q: Array, v: Array, joint_accele
     accelerations[BASE_NV:] = joint_acceleration
     forces = pin.rnea(robot.pin, robot.data, q, v, accelerations)
     inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.WORLD)
-    base_acceleration = -eigenpy.LLT(inertia[:BASE_NV, :BASE_NV]).solve(forces[:BASE_NV])
-    efforts: Array = forces[BASE_NV:] + inertia[BASE_NV:, :BASE_NV].dot(base_acceleration)
+    yielding = eigenpy.LLT(inertia[:BASE_NV, :BASE_NV]).solve(forces[:BASE_NV])  # -a_b
+    efforts: Array = forces[BASE_NV:] - inertia[BASE_NV:, :BASE_NV].dot(yielding)
     return efforts
 
 

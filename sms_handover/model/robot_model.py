@@ -83,7 +83,11 @@ class RobotModel:
 
     def tools_in_world(self, base_in_world: Pose, joint_position: Array) -> dict[str, Pose]:
         """Return the pose of every tool frame in ``world``, by forward kinematics."""
-        pin.forwardKinematics(self.pin, self.data, self.configuration(base_in_world, joint_position))
+        return self.tools_at(self.configuration(base_in_world, joint_position))
+
+    def tools_at(self, q: Array) -> dict[str, Pose]:
+        """Return the pose of every tool frame in ``world`` at a configuration (7 + n,)."""
+        pin.forwardKinematics(self.pin, self.data, q)
         return {
             arm: pose_of(pin.updateFramePlacement(self.pin, self.data, frame_id))
             for arm, frame_id in self.tool_frame_id.items()

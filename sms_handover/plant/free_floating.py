@@ -25,6 +25,8 @@ from sms_handover.types import (
 )
 from sms_handover.units import ns_to_seconds
 
+_IN_WORLD = pin.Convention.WORLD  # axes in which Pinocchio works; faster than those of the joints
+
 
 @dataclass(frozen=True, eq=False)
 class InitialState:
@@ -104,8 +106,7 @@ class FreeFloatingPlant:
     @property
     def tools_in_world(self) -> dict[str, Pose]:
         """Return the pose of every tool."""
-        state = self.state
-        return self._robot.tools_in_world(state.base_in_world, state.joint_position)
+        return self._robot.tools_at(self._q)
 
     @property
     def receipt(self) -> PhysicsReceipt:
@@ -132,7 +133,7 @@ class FreeFloatingPlant:
         effort = self._limited(command.effort)
         before = self._q
         q, v = self._integrator.step(self._acceleration, before, self._v)
-        self._q, self._v, self._effort = frozen(q), frozen(v), effort
+        self._q, self._v, self._effort = q, v, effort
         self._work += float(effort.dot(q[BASE_NQ:] - before[BASE_NQ:]))
         self._tick += 1
         if not self._deputy.holder:
@@ -151,7 +152,7 @@ class FreeFloatingPlant:
     def _acceleration(self, q: Array, v: Array) -> Array:
         """Return v' (6 + n,) under the efforts of this tick."""
         robot = self._robot
-        acceleration: Array = pin.aba(robot.pin, robot.data, q, v, self._generalized, pin.Convention.WORLD)
+        acceleration: Array = pin.aba(robot.pin, robot.data, q, v, self._generalized, _IN_WORLD)
         return acceleration
 
     def _deputy_follow(self) -> None:

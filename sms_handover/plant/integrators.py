@@ -3,11 +3,12 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from sms_handover.types import Array
+from sms_handover.types import Array, frozen
 
 Acceleration = Callable[[Array, Array], Array]
 
@@ -40,17 +41,16 @@ TABLEAUS: Mapping[str, Tableau] = MappingProxyType(
 )
 
 
-@dataclass(frozen=True, eq=False)
-class _Stage:
+class _Stage(NamedTuple):
     """One stage: ``weights`` (2, i + 1) take the rows ``known`` to its motion and its velocity."""
 
     weights: Array
     known: Array
-    combined: Array
+    combined: Array  # rows motion and velocity
     motion: Array
     velocity: Array
     origin: int
-    acceleration: Array
+    result: Array
 
 
 class LieGroupIntegrator:
@@ -80,24 +80,22 @@ class LieGroupIntegrator:
         )
         ends = [_of_velocities(weights, a, h) for weights in b]
         self._end_weights = np.array([*ends, np.concatenate([[1.0], h * b.sum(axis=0)])])
-        self._ends = np.zeros((len(self._end_weights), model.nv))
 
     def step(self, acceleration: Acceleration, q: Array, v: Array) -> tuple[Array, Array]:
-        """Return configuration (7 + n,) and velocity (6 + n,) after one step, as new arrays."""
+        """Return configuration (7 + n,) and velocity (6 + n,) after one step, as read-only arrays."""
         model, rows = self._model, self._rows
         rows[0] = v
         rows[1] = acceleration(q, v)
         configurations = [q]
-        for stage in self._stages:
-            stage.weights.dot(stage.known, stage.combined)
-            q_stage = pin.integrate(model, configurations[stage.origin], stage.motion)
+        for weights, known, combined, motion, velocity, origin, result in self._stages:
+            weights.dot(known, combined)
+            q_stage = pin.integrate(model, configurations[origin], motion)
             configurations.append(q_stage)
-            stage.acceleration[:] = acceleration(q_stage, stage.velocity)
-        self._end_weights.dot(rows, self._ends)
-        *motions, v_next = self._ends
+            result[:] = acceleration(q_stage, velocity)
+        *motions, v_next = frozen(self._end_weights.dot(rows))
         for motion in motions:
             q = pin.integrate(model, q, motion)
-        return q, v_next.copy()
+        return frozen(q), v_next
 
     def _stage(self, index: int, origin: int, motion_weights: Array, a: Array, h: float) -> _Stage:
         """Return a stage with its weights and its places in the work space."""

@@ -83,7 +83,7 @@ class TrajectoryGenerator:
         if entered:
             self._index = index
             self._joints_at_start = state.joint_position
-            self._tools_at_start = self._robot.tools_in_world(state.base_in_world, state.joint_position)
+            self._tools_at_start = self._robot.tools_at(state.q)
         task = TaskPhase(state.stamp_ns, index, phase.name, phase.commands if entered else ())
         return task, self._targets_of(phase, state, deputy_in_world)
 

@@ -95,8 +95,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "quaternion in the order w x y z",
         "model/poses",
-        "pin.Quaternion(transformation.rotation).coeffs())",
-        "np.roll(pin.Quaternion(transformation.rotation).coeffs(), 1))",
+        "return Pose(row[:3], row[3:])",
+        "return Pose(row[:3], np.roll(row[3:], 1))",
         "poses",
     ),
     _core(
@@ -130,7 +130,7 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "reaction of the base left out of the efforts",
         "model/reduced",
-        "forces[BASE_NV:] + inertia[BASE_NV:, :BASE_NV].dot(base_acceleration)",
+        "forces[BASE_NV:] - inertia[BASE_NV:, :BASE_NV].dot(yielding)",
         "forces[BASE_NV:]",
         "nmpc",
     ),
@@ -144,8 +144,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "block of the mass matrix transposed",
         "model/reduced",
-        "inertia[BASE_NV:, :BASE_NV].dot(base_acceleration)",
-        "inertia[BASE_NV:, :BASE_NV].T.reshape(-1, BASE_NV).dot(base_acceleration)",
+        "inertia[BASE_NV:, :BASE_NV].dot(yielding)",
+        "inertia[BASE_NV:, :BASE_NV].T.reshape(-1, BASE_NV).dot(yielding)",
         "nmpc",
     ),
     _core(
@@ -194,8 +194,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "joint damping of 0.04 N m s/rad",
         "plant/free_floating",
-        "q, v, self._generalized, pin",
-        "q, v, self._generalized - 0.04 * np.r_[np.zeros(BASE_NV), v[BASE_NV:]], pin",
+        "q, v, self._generalized, _IN_WORLD",
+        "q, v, self._generalized - 0.04 * np.r_[np.zeros(BASE_NV), v[BASE_NV:]], _IN_WORLD",
         "plant",
     ),
     _core(
@@ -222,8 +222,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "state reports the effort asked for, not the one given",
         "plant/free_floating",
-        "frozen(q), frozen(v), effort",
-        "frozen(q), frozen(v), command.effort",
+        "self._q, self._v, self._effort = q, v, effort",
+        "self._q, self._v, self._effort = q, v, command.effort",
         "plant",
     ),
     _core(
