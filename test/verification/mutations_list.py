@@ -255,6 +255,13 @@ BREAKS: tuple[Break, ...] = (
         "integrators",
     ),
     _core(
+        "forward dynamics worked out once more than a step needs",
+        "plant/integrators",
+        "rows[1] = acceleration(q, v)",
+        "rows[1] = 0.5 * (acceleration(q, v) + acceleration(q, v))",
+        "work_counts",
+    ),
+    _core(
         "grasp tolerance ignored",
         "plant/grasping",
         "if not errors.within(tolerance):",
