@@ -12,7 +12,8 @@ from sms_handover.report.recorded_run import RecordedRun, read_recorded
 
 from ..core.report_bags import write_handovers
 from ..core.test_report_page import EVIL, evil_bag
-from .conftest import NARROW, WIDE, Browsing, Visit
+from .chromium import NARROW, WIDE
+from .conftest import Browsing, Visit
 
 pytestmark = pytest.mark.browser
 
@@ -174,6 +175,27 @@ def test_pointing_at_one_plot_shows_values_and_time_in_all(opened: Open) -> None
     assert cursors == [[True, "visible"]] * len(cursors)
 
 
+def test_a_finger_scrolls_over_a_plot_and_taps_for_its_values(opened: Open) -> None:
+    visit = opened(size=NARROW, touch=True, mobile=True)
+    page = visit.page
+    box = frame_of(page, "arm_a/position_error")
+    devices = page.context.new_cdp_session(page)
+    before = page.evaluate("scrollY")
+    touches = [{"x": box["x"] + 150, "y": box["middle"] - 15 * step} for step in range(8)]
+    for touch in touches:
+        kind = "touchStart" if touch is touches[0] else "touchMove"
+        devices.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [touch]})
+    devices.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    until(page, f"scrollY > {before + 50}")
+    assert ranges(page)[0] == page.evaluate("report.span")
+    box = frame_of(page, "arm_a/position_error")
+    page.touchscreen.tap(box["x"] + 150, box["middle"])
+    until(page, "plots.plots[0].frame.querySelector('.hoverlayer .legend')")
+    time = page.evaluate("plots.plots[0].timeAt(150)")
+    assert page.locator("#cursor-time").inner_text() == f"t = {time:.3f} s"
+    assert visit.errors == []
+
+
 def test_runs_and_lines_can_be_hidden(opened: Open) -> None:
     page = opened().page
     drawn = "plots.plots[4].frame.querySelectorAll('.scatterlayer .trace').length"
@@ -213,7 +235,7 @@ def test_the_animation_moves_and_shares_its_time_with_the_plots(opened: Open) ->
         pictures.append(page.locator("iframe").screenshot())
     assert max(abs(a - b) for a, b in zip(*poses, strict=True)) > 1e-3  # m
     assert pictures[0] != pictures[1]
-    assert page.evaluate("plots.animationTime") == pytest.approx(end)
+    assert page.evaluate("plots.chosen") == pytest.approx(end)
     box = frame_of(page, "base_speed")
     page.mouse.click(box["x"] + 300, box["middle"])
     time = page.evaluate("plots.plots.find((plot) => plot.plot.key === 'base_speed').timeAt(300)")
