@@ -1,6 +1,7 @@
 """The report in a real browser: drawn, linked, safe, without a network, and whole on a telephone."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -95,6 +96,19 @@ def test_it_opens_whole_and_without_a_network(
     # position and orientation error of two arms, torques and errors of their joints, base, conservation
     per_run = [1, 1, 1, 1, 7, 7, 7, 7, 3, 3, 1, 1, 1, 1, 2, 1]
     assert traces == [len(runs) * count for count in per_run]
+
+
+def test_many_runs_with_long_names_fit_a_telephone(opened: Open, runs: list[RecordedRun]) -> None:
+    """Tables that are too wide scroll by themselves; the page does not."""
+    names = [f"{run.law} with a rather long name, number {number}" for number in range(3) for run in runs]
+    many = [replace(runs[place % 2], name=name) for place, name in enumerate(names)]
+    visit = opened(report_page(many), size=NARROW, touch=True)
+    assert visit.page.evaluate("document.documentElement.scrollWidth") == NARROW[0]
+    wide = (
+        "[...document.querySelectorAll('.scroll')].filter((box) => box.scrollWidth > box.clientWidth).length"
+    )
+    assert visit.page.evaluate(wide) > 0
+    assert visit.errors == []
 
 
 def test_colours_follow_the_scheme_of_the_system(opened: Open) -> None:
