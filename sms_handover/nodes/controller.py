@@ -1,15 +1,14 @@
 """The controller node."""
 
 from collections.abc import Sequence
-from typing import Any
 
-from sms_handover.bag.decode import task_phase
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.control.parameters import ControllerParameters
 from sms_handover.frames import BASE, WORLD
-from sms_handover.ros.convert import stamp_ns_of
 from sms_handover.ros.graph_node import GraphNode
+from sms_handover.ros.inputs import Receive
 from sms_handover.ros.main import run_node
+from sms_handover.ros.phase_wire import PhaseWire
 from sms_handover.ros.stamp_sync import StampSync
 from sms_handover.ros.wire import JointStateWire, StateWire
 from sms_handover.simulation.parameters import LOCKSTEP
@@ -26,7 +25,7 @@ from sms_handover.topics import (
 from sms_handover.types import JointReference
 
 _STATE = (JOINT_STATES, BASE_ODOMETRY)
-_STATE_AND_REFERENCE = (*_STATE, JOINT_REFERENCE, TASK_PHASE)
+_STATE_AND_REFERENCE = (*_STATE, TASK_PHASE, JOINT_REFERENCE)
 
 
 class ControllerNode(GraphNode[ControllerParameters]):
@@ -45,12 +44,13 @@ class ControllerNode(GraphNode[ControllerParameters]):
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
         self._reference_wire = JointStateWire(self.robot.joint_names, ("position", "velocity"))
         self._command_wire = JointStateWire(self.robot.joint_names, ("effort",))
-        self._inputs: StampSync[Any] = StampSync()
+        self._phase_wire = PhaseWire()
+        self._inputs: StampSync[bytes] = StampSync()
         self._answered_ns = 0
+        self._answer_bytes = b""
         self._command = self.endpoints.publisher(JOINT_COMMAND)
-        for topic in (*_STATE, JOINT_REFERENCE):
-            self.endpoints.subscribe(topic, self._taker(topic), raw=True)
-        self.endpoints.subscribe(TASK_PHASE, self._on_phase)
+        for topic in (TASK_PHASE, JOINT_REFERENCE, *_STATE):
+            self.endpoints.receive(topic, self.inputs, self._taker(topic))
 
     def diagnostic_values(self) -> dict[str, object]:
         """Return what has been answered and what came too late."""
@@ -60,46 +60,57 @@ class ControllerNode(GraphNode[ControllerParameters]):
         """Return the stamp of the last state answered."""
         return self._answered_ns
 
-    def _taker(self, topic: str) -> Any:
+    @property
+    def awaited(self) -> str:
+        """Return what comes last of the inputs of the next state."""
+        stamp = self._inputs.oldest_ns
+        if stamp is None:
+            stamp = self._answered_ns + self.common.tick_ns if self._command.count else 0
+        return self._inputs.missing(stamp, self._needed(stamp)) or BASE_ODOMETRY
+
+    def _needed(self, stamp: int) -> tuple[str, ...]:
+        """Return the inputs that belong to a stamp, the last one to come last."""
+        return _STATE_AND_REFERENCE if self._lockstep and stamp % self.common.reference_ns == 0 else _STATE
+
+    def _taker(self, topic: str) -> Receive:
         """Return the callback of a topic of raw messages."""
-        return lambda data: self._take(topic, stamp_ns(data), data)
+        return lambda data, sent_ns: self._take(topic, stamp_ns(data), data)
 
-    def _on_phase(self, message: Any) -> None:
-        """Take the phase of the task."""
-        self._take(TASK_PHASE, stamp_ns_of(message.header.stamp), message)
-
-    def _take(self, topic: str, stamp: int, value: Any) -> None:
+    def _take(self, topic: str, stamp: int, data: bytes) -> None:
         """Take one input; a state of time zero behind an answered one begins the run anew."""
         if self._inputs.begins_anew(stamp):
             self._inputs.reset()
             self._controller.reset()
         if not self._lockstep and topic in (JOINT_REFERENCE, TASK_PHASE):
-            self._use(topic, value)
+            self._use(topic, data)
             return
-        self._inputs.add(stamp, topic, value)
+        if topic == BASE_ODOMETRY and stamp == self._answered_ns and self._lockstep and self._answer_bytes:
+            self._command.publish(self._answer_bytes)  # the plant asks again: it has missed the answer
+        self._inputs.add(stamp, topic, data)
         self._answer(stamp)
 
     def _answer(self, stamp: int) -> None:
         """Publish the command of a state as soon as everything that belongs to it has come."""
-        with_reference = self._lockstep and stamp % self.common.reference_ns == 0
-        inputs = self._inputs.take(stamp, _STATE_AND_REFERENCE if with_reference else _STATE)
+        needed = self._needed(stamp)
+        inputs = self._inputs.take(stamp, needed)
         if inputs is None:
             return
-        if with_reference:
+        if needed is _STATE_AND_REFERENCE:
             self._use(TASK_PHASE, inputs[TASK_PHASE])
             self._use(JOINT_REFERENCE, inputs[JOINT_REFERENCE])
         state = self._state_wire.read(inputs[JOINT_STATES], inputs[BASE_ODOMETRY])
         command = self._controller.step(state)
-        self._command.publish(self._command_wire.pack(stamp, effort=command.effort))
+        self._answer_bytes = self._command_wire.pack(stamp, effort=command.effort)
+        self._command.publish(self._answer_bytes)
         self._answered_ns = stamp
 
-    def _use(self, topic: str, value: Any) -> None:
+    def _use(self, topic: str, data: bytes) -> None:
         """Give a phase or a reference to the controller."""
         if topic == TASK_PHASE:
-            self._controller.enter(task_phase(value))
+            self._controller.enter(self._phase_wire.read(data))
         else:
-            blocks = self._reference_wire.read(value)
-            reference = JointReference(stamp_ns(value), blocks["position"], blocks["velocity"])
+            blocks = self._reference_wire.read(data)
+            reference = JointReference(stamp_ns(data), blocks["position"], blocks["velocity"])
             self._controller.track(reference)
 
 

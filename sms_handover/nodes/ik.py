@@ -30,7 +30,12 @@ class IkNode(GraphNode[IkParameters]):
         super().__init__(IK, IkParameters)
         self._solved = dict.fromkeys(IkStatus, 0)
         self._refused = 0
-        self.create_service(SolveIK, SOLVE_IK, self._on_request)
+        self.inputs.serve(SolveIK, SOLVE_IK, self._on_request)
+
+    @property
+    def awaited(self) -> str:
+        """Return the service: nothing else is waited for."""
+        return SOLVE_IK
 
     def diagnostic_values(self) -> dict[str, object]:
         """Return how many requests ended in which way."""

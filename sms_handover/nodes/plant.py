@@ -11,7 +11,6 @@ from sms_handover_interfaces.srv import StepTicks
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
-from sms_handover.bag.decode import task_phase
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.frames import BASE, WORLD
 from sms_handover.model.poses import pose_row
@@ -19,13 +18,13 @@ from sms_handover.plant.parameters import PlantParameters
 from sms_handover.ros.convert import (
     event_message,
     header,
-    stamp_ns_of,
     time_message,
 )
 from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.loop_clock import LoopClock
 from sms_handover.ros.main import EXIT_OK, Stop, run_node
 from sms_handover.ros.marker import deputy_marker
+from sms_handover.ros.phase_wire import PhaseWire
 from sms_handover.ros.stamp_sync import StampSync
 from sms_handover.ros.wire import JointStateWire, StateWire, energy_wire, pose_wire, vector_wire
 from sms_handover.simulation.parameters import LOCKSTEP
@@ -55,6 +54,8 @@ from sms_handover.topics import (
 )
 from sms_handover.types import JointCommand
 
+_COMMAND = (JOINT_COMMAND,)
+_PHASE_AND_COMMAND = (TASK_PHASE, JOINT_COMMAND)
 _TIMING_PERIOD_S = 1.0  # [s] of wall time
 
 
@@ -77,7 +78,8 @@ class PlantNode(GraphNode[PlantParameters]):
         self._command_wire = JointStateWire(self.robot.joint_names, ("effort",))
         self._pose_wire, self._vector_wire = pose_wire(WORLD), vector_wire(WORLD)
         self._energy_wire = energy_wire(WORLD)
-        self._inputs: StampSync[Any] = StampSync()
+        self._phase_wire = PhaseWire()
+        self._inputs: StampSync[bytes] = StampSync()
         self._loop_clock = LoopClock(self.common.tick_ns, paced=not self._lockstep)
         self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
         self._run_state = RunState.WAITING
@@ -85,7 +87,10 @@ class PlantNode(GraphNode[PlantParameters]):
         self._reset_asked = False
         self._waiting_for = set(self.common.peers) - {PLANT}
         self._make_endpoints()
+        self._silent_tick = -1
         self.create_timer(_TIMING_PERIOD_S, self._publish_timing)
+        if self._lockstep:
+            self.create_timer(self.parameters.resend_after, self._send_again)
 
     def on_matched(self) -> None:
         """Say what robot and deputy these are; the run begins when the other nodes are ready too."""
@@ -107,10 +112,20 @@ class PlantNode(GraphNode[PlantParameters]):
         if self._lockstep:
             return super().run(executor, stop)
         while not stop.asked:
-            executor.spin_once(timeout_sec=self._loop_clock.wait_s())
+            self.inputs.spin_once(executor, self._loop_clock.wait_s(), JOINT_COMMAND)
             if self._loop_clock.due():
                 self._tick_now()
         return EXIT_OK
+
+    @property
+    def awaited(self) -> str:
+        """Return what comes last of what completes the tick."""
+        return self._inputs.missing(self._plant.stamp_ns, self._needed) or JOINT_COMMAND
+
+    @property
+    def _needed(self) -> tuple[str, ...]:
+        """Return the inputs that complete this tick, the last one to come last."""
+        return _COMMAND if self._plant.tick % self.common.ticks_per_reference else _PHASE_AND_COMMAND
 
     def _make_endpoints(self) -> None:
         """Make publishers, subscriptions and services."""
@@ -119,8 +134,8 @@ class PlantNode(GraphNode[PlantParameters]):
         names += [SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY]
         names += [tool_pose(arm) for arm in self.robot.arms]
         self._publish = {name: self.endpoints.publisher(name) for name in names}
-        self.endpoints.subscribe(JOINT_COMMAND, self._on_command, raw=True)
-        self.endpoints.subscribe(TASK_PHASE, self._on_phase)
+        self.endpoints.receive(TASK_PHASE, self.inputs, self._on_phase)
+        self.endpoints.receive(JOINT_COMMAND, self.inputs, self._on_command)
         self.endpoints.subscribe(RUN_READY, self._on_ready)
         self.create_service(SetBool, "~/pause", self._on_pause)
         self.create_service(StepTicks, "~/step", self._on_step)
@@ -150,17 +165,33 @@ class PlantNode(GraphNode[PlantParameters]):
         plant, publish = self._plant, self._publish
         now_ns = plant.stamp_ns
         reference = plant.tick % self.common.ticks_per_reference == 0
-        joints, odometry = self._state_wire.pack(plant.state)
-        if reference:
-            publish[SAMPLED_JOINT_STATES].publish(joints)
-            publish[SAMPLED_BASE_ODOMETRY].publish(odometry)
-            publish[DEPUTY_POSE].publish(self._pose_wire.pack(now_ns, pose_row(plant.deputy.deputy_in_world)))
-        publish[JOINT_STATES].publish(joints)
-        publish[BASE_ODOMETRY].publish(odometry)
+        self._publish_loop(reference)
         if reference:
             self._publish_period(now_ns)
         if now_ns % CLOCK_PERIOD_NS == 0:
             publish[CLOCK].publish(Clock(clock=time_message(now_ns)))
+
+    def _publish_loop(self, reference: bool) -> None:
+        """Publish what the other nodes of the loop wait for."""
+        publish = self._publish
+        joints, odometry = self._state_wire.pack(self._plant.state)
+        if reference:
+            deputy = pose_row(self._plant.deputy.deputy_in_world)
+            publish[SAMPLED_JOINT_STATES].publish(joints)
+            publish[SAMPLED_BASE_ODOMETRY].publish(odometry)
+            publish[DEPUTY_POSE].publish(self._pose_wire.pack(self._plant.stamp_ns, deputy))
+        publish[JOINT_STATES].publish(joints)
+        publish[BASE_ODOMETRY].publish(odometry)
+
+    def _send_again(self) -> None:
+        """Publish the state of this tick once more if nothing has answered it for a while (lock step).
+
+        Whoever has answered it sends the same bytes again; whoever has missed it answers now.
+        """
+        tick = self._plant.tick
+        if tick == self._silent_tick and (self._run_state == RunState.RUNNING or self._steps_left):
+            self._publish_loop(tick % self.common.ticks_per_reference == 0)
+        self._silent_tick = tick
 
     def _publish_period(self, now_ns: int) -> None:
         """Publish tool poses, momenta and energy of a reference period."""
@@ -172,7 +203,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self._publish[ANGULAR_MOMENTUM].publish(vector.pack(now_ns, receipt.angular_momentum))
         self._publish[ENERGY].publish(self._energy_wire.pack(now_ns, energy))
 
-    def _on_command(self, data: bytes) -> None:
+    def _on_command(self, data: bytes, sent_ns: int) -> None:
         """Take a command; in lock step it may complete the tick."""
         if self._lockstep:
             self._inputs.add(stamp_ns(data), JOINT_COMMAND, data)
@@ -180,27 +211,26 @@ class PlantNode(GraphNode[PlantParameters]):
         else:
             self._command = self._read_command(data)
 
-    def _on_phase(self, message: Any) -> None:
+    def _on_phase(self, data: bytes, sent_ns: int) -> None:
         """Take the phase of the task; in lock step it may complete the tick."""
         if self._lockstep:
-            self._inputs.add(stamp_ns_of(message.header.stamp), TASK_PHASE, message)
+            self._inputs.add(stamp_ns(data), TASK_PHASE, data)
             self._advance()
         else:
-            self._execute(message)
+            self._execute(data)
 
     def _advance(self) -> None:
         """Integrate one tick if its command has come and nothing holds the plant back (lock step)."""
         if self._run_state == RunState.PAUSED and self._steps_left == 0 and not self._reset_asked:
             return
-        with_phase = self._plant.tick % self.common.ticks_per_reference == 0
-        names = (JOINT_COMMAND, TASK_PHASE) if with_phase else (JOINT_COMMAND,)
-        inputs = self._inputs.take(self._plant.stamp_ns, names)
+        needed = self._needed
+        inputs = self._inputs.take(self._plant.stamp_ns, needed)
         if inputs is None or self.finished:
             return
         if self._reset_asked:
             self._begin_anew()
             return
-        if with_phase:
+        if needed is _PHASE_AND_COMMAND:
             self._execute(inputs[TASK_PHASE])
         if self._plant.tick == self._last_tick:
             self._finish("the whole run is done")
@@ -227,9 +257,9 @@ class PlantNode(GraphNode[PlantParameters]):
         """Return the command in a message."""
         return JointCommand(stamp_ns(data), self._command_wire.read(data)["effort"])
 
-    def _execute(self, phase: Any) -> None:
+    def _execute(self, phase: bytes) -> None:
         """Carry out the grasp commands of a phase and tell what came of them."""
-        for event in self._plant.execute(task_phase(phase).commands):
+        for event in self._plant.execute(self._phase_wire.read(phase).commands):
             self._publish[GRASP_EVENT].publish(event_message(event))
             self.get_logger().info(f"{event.command.action.value}: {event.status.value}, {event.detail}")
 

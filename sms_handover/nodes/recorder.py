@@ -23,12 +23,12 @@ from sms_handover.frames import BASE, DEPUTY, WORLD
 from sms_handover.model.link_tree import LinkTree
 from sms_handover.ros.convert import pose_of_message
 from sms_handover.ros.graph_node import GraphNode
+from sms_handover.ros.inputs import Receive
 from sms_handover.ros.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, Stop, run_node
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.peer_parameters import PeerParameters
 from sms_handover.ros.qos import LOSSLESS, profile_of, stored, weakest
 from sms_handover.ros.stamp_sync import StampSync
-from sms_handover.ros.taps import Receive, Taps
 from sms_handover.ros.wire import StateWire
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import load_task
@@ -80,7 +80,6 @@ class RecorderNode(GraphNode[RecorderParameters]):
         frames = [*self._links.frames, (WORLD, DEPUTY)]
         self._tf_wire = TransformsWire(self._recording.writer.types, frames)
         self._topics: set[str] = set()
-        self._taps = Taps(self)
         for topic in self.endpoints.topics:
             self._record(topic)
         self._recording.add_topic(TF, TF_TYPE, (stored(LOSSLESS),), self.common.reference_ns)
@@ -104,9 +103,14 @@ class RecorderNode(GraphNode[RecorderParameters]):
     def on_end(self) -> None:
         """Do nothing: the recorder ends when everything has come."""
 
+    @property
+    def counts(self) -> dict[str, int]:
+        """Return the number of messages recorded so far, by topic."""
+        return self._recording.writer.message_counts
+
     def diagnostic_values(self) -> dict[str, object]:
         """Return how much has been recorded."""
-        counts = self._recording.writer.message_counts
+        counts = self.counts
         return {"messages": sum(counts.values()), "topics": len(counts)}
 
     def diagnostic_stamp_ns(self) -> int:
@@ -118,13 +122,13 @@ class RecorderNode(GraphNode[RecorderParameters]):
         try:
             while not stop.asked and not self._drained():
                 executor.spin_once(timeout_sec=_POLL_S)
-                if not self._taps.empty():
+                if not self.inputs.poll() and monotonic() - self._last_message > _POLL_S:
                     self._recording.writer.flush()  # nothing may wait for a message that does not come
             if stop.asked:
                 self._take_the_rest(executor)
         finally:
             self._recording.close()
-            self._taps.destroy()
+            self.inputs.destroy()
         ledger = self._recording.ledger
         print(ledger_table(ledger))
         if not self.finished:
@@ -142,7 +146,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
     def _take_the_rest(self, executor: Executor) -> None:
         """Take what is on the way when the recorder is asked to stop; a graph that goes on is left alone."""
         begin = self._last_message = monotonic()
-        while self._taps.empty() or monotonic() - self._last_message < _QUIET_S:
+        while self.inputs.poll() or monotonic() - self._last_message < _QUIET_S:
             if monotonic() - begin > _REST_S:
                 break
             executor.spin_once(timeout_sec=_POLL_S)
@@ -165,8 +169,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
             receive = partial(self._receive_counts, name)
         elif topic.rate is Rate.WALL:
             receive = partial(self._receive_anyway, name)
-        subscription = self.endpoints.subscribe(topic.name, lambda data: None, raw=True)
-        self._taps.take_over(subscription, receive)
+        self.endpoints.receive(topic.name, self.inputs, receive)
 
     def _open(self, name: str, type_name: str, profile: QoSProfile, period_ns: int) -> None:
         """Open a topic in the bag."""

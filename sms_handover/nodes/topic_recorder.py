@@ -12,11 +12,11 @@ from rclpy.executors import Executor
 from sms_handover.bag.parameters import TopicRecorderParameters
 from sms_handover.bag.writer import BagWriter
 from sms_handover.errors import BagError, ConfigurationError, SmsHandoverError
+from sms_handover.ros.direct_inputs import DirectInputs
 from sms_handover.ros.main import EXIT_FAILED, EXIT_OK, RunnableNode, Stop, run_node
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.parameters import declare, refuse_unknown
 from sms_handover.ros.qos import stored, weakest
-from sms_handover.ros.taps import Taps
 from sms_handover.status_line import StatusLine
 from sms_handover.topics import TOPIC_RECORDER
 
@@ -47,7 +47,7 @@ class TopicRecorderNode(RunnableNode):
         except BagError as error:
             raise ConfigurationError(str(error)) from error
         self._seen: set[str] = set()
-        self._taps = Taps(self)
+        self._inputs = DirectInputs(self)
         self._line = StatusLine()
         self.create_timer(_LOOK_S, self.look_for_topics)
 
@@ -68,7 +68,7 @@ class TopicRecorderNode(RunnableNode):
             self._take_the_rest(executor)
         finally:
             self._writer.close()
-            self._taps.destroy()
+            self._inputs.destroy()
             self._line.stay()
         for topic, count in self.recorded.items():
             print(f"{count:10d}  {topic}")
@@ -92,8 +92,7 @@ class TopicRecorderNode(RunnableNode):
                 self._line.stay()
                 print(f"not recorded: {name}: {error}", file=sys.stderr)
                 continue
-            subscription = self.create_subscription(kind, name, lambda data: None, weakest(offers), raw=True)
-            self._taps.take_over(subscription, partial(self._receive, name))
+            self._inputs.subscribe(kind, name, weakest(offers), partial(self._receive, name))
 
     def _receive(self, name: str, data: bytes, sent_ns: int) -> None:
         """Record one message that was sent at a wall-clock time."""
@@ -101,7 +100,7 @@ class TopicRecorderNode(RunnableNode):
 
     def _take(self) -> int:
         """Take every message that has come, and show how many there are; return how many came."""
-        taken = self._taps.empty()
+        taken = self._inputs.poll()
         if self._line.due:
             counts = self.recorded
             self._line.show(f"{sum(counts.values())} messages of {len(counts)} topics")

@@ -14,15 +14,14 @@ from sms_handover.model.poses import pose_row
 from sms_handover.ros.convert import (
     joint_positions_message,
     joints_in_order,
-    phase_message,
     pose_message,
-    pose_of_message,
-    stamp_ns_of,
 )
 from sms_handover.ros.graph_node import GraphNode
+from sms_handover.ros.inputs import Receive
 from sms_handover.ros.main import run_node
+from sms_handover.ros.phase_wire import PhaseWire
 from sms_handover.ros.stamp_sync import StampSync
-from sms_handover.ros.wire import JointStateWire, StateWire, pose_wire
+from sms_handover.ros.wire import JointStateWire, StateWire, pose_wire, read_pose
 from sms_handover.simulation.feasibility import check_feasibility
 from sms_handover.simulation.scenario import ParameterSet, Scenario, load_parameters, load_task
 from sms_handover.topics import (
@@ -57,22 +56,23 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._generator = TrajectoryGenerator(self.robot, schedule, self.parameters)
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
         self._reference_wire = JointStateWire(self.robot.joint_names, ("position", "velocity"))
-        self._pose_wire = pose_wire(WORLD)
-        self._inputs: StampSync[Any] = StampSync()
-        self._stamp_ns = 0
+        self._pose_wire, self._phase_wire = pose_wire(WORLD), PhaseWire()
+        self._inputs: StampSync[bytes] = StampSync()
+        self._stamp_ns = self._newest_ns = 0
+        self._answer: tuple[bytes, bytes] | None = None
         self._failures = 0
-        self._solver = self.create_client(SolveIK, SOLVE_IK)
+        self._solver = self.inputs.asker(SolveIK, SOLVE_IK, self._on_solution)
+        self._asked: tuple[RobotState, TaskPhase, Targets] | None = None
         self._phase = self.endpoints.publisher(TASK_PHASE)
         self._ik_status = self.endpoints.publisher(IK_STATUS)
         self._reference = self.endpoints.publisher(JOINT_REFERENCE)
         self._targets = {arm: self.endpoints.publisher(target_pose(arm)) for arm in self.robot.arms}
-        for topic in (SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY):
-            self.endpoints.subscribe(topic, self._taker(topic), raw=True)
-        self.endpoints.subscribe(DEPUTY_POSE, self._on_deputy)
+        for topic in _INPUTS:
+            self.endpoints.receive(topic, self.inputs, self._taker(topic))
 
     def prepared(self) -> bool:
         """Tell whether the IK service is there."""
-        return bool(self._solver.service_is_ready())
+        return self._solver.ready()
 
     def diagnostic_values(self) -> dict[str, object]:
         """Return how many references were given and how many IK requests did not converge."""
@@ -82,26 +82,38 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         """Return the stamp of the last reference."""
         return self._stamp_ns
 
-    def _taker(self, topic: str) -> Any:
-        """Return the callback of a topic of raw messages."""
-        return lambda data: self._take(topic, stamp_ns(data), data)
+    @property
+    def awaited(self) -> str:
+        """Return the answer of the service while there is a request, else what comes last of a state."""
+        if self._asked is not None:
+            return SOLVE_IK
+        stamp = self._inputs.oldest_ns
+        return (self._inputs.missing(stamp, _INPUTS) if stamp is not None else "") or DEPUTY_POSE
 
-    def _on_deputy(self, message: Any) -> None:
-        """Take the pose of the deputy."""
-        self._take(DEPUTY_POSE, stamp_ns_of(message.header.stamp), message)
+    def _taker(self, topic: str) -> Receive:
+        """Return the callback of a topic."""
+        return lambda data, sent_ns: self._take(topic, stamp_ns(data), data)
 
-    def _take(self, topic: str, stamp: int, value: Any) -> None:
+    def _take(self, topic: str, stamp: int, data: bytes) -> None:
         """Take one input; time zero behind a later time begins the run anew."""
         if self._inputs.begins_anew(stamp):
             self._inputs.reset()
             self._generator.reset()
-        self._inputs.add(stamp, topic, value)
+        if topic == DEPUTY_POSE and stamp == self._stamp_ns and self._asked is None:
+            self._publish_again()
+        self._inputs.add(stamp, topic, data)
+        self._newest_ns = stamp
+        if self._asked is None:
+            self._proceed(stamp)
+
+    def _proceed(self, stamp: int) -> None:
+        """Work on the state of a stamp if all of it is there."""
         inputs = self._inputs.take(stamp, _INPUTS)
         if inputs is None:
             return
         self._stamp_ns = stamp
         state = self._state_wire.read(inputs[SAMPLED_JOINT_STATES], inputs[SAMPLED_BASE_ODOMETRY])
-        phase, targets = self._generator.targets(state, pose_of_message(inputs[DEPUTY_POSE].pose))
+        phase, targets = self._generator.targets(state, read_pose(self._pose_wire, inputs[DEPUTY_POSE]))
         if targets.tool_in_world:
             self._ask(state, phase, targets)
         else:
@@ -116,30 +128,39 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
             arms=list(question.tool_in_world),
             tool_in_world=[pose_message(pose) for pose in question.tool_in_world.values()],
         )
-        future = self._solver.call_async(request)
-        future.add_done_callback(lambda done: self._on_solution(state, phase, targets, done.result()))
+        self._asked = state, phase, targets
+        self._solver.ask(request)
 
-    def _on_solution(self, state: RobotState, phase: TaskPhase, targets: Targets, answer: Any) -> None:
+    def _on_solution(self, answer: Any) -> None:
         """Publish the reference that follows from a solution, converged or not."""
+        if self._asked is None:
+            return
+        asked, self._asked = self._asked, None
         if not answer.valid:
             raise GraphError(f"the IK service refused a request: {answer.message}")
         self._failures += answer.status.status != answer.status.CONVERGED
         solution = answer.solution
         joints = joints_in_order(self.robot.joint_names, solution.name, solution.position)
-        self._publish(state, phase, targets, joints)
+        self._publish(*asked, joints)
         self._ik_status.publish(answer.status)
+        self._proceed(self._newest_ns)
 
     def _publish(self, state: RobotState, phase: TaskPhase, targets: Targets, joints: Array) -> None:
         """Publish phase, reference and targets of one period; what the loop waits for goes first."""
         reference, targets_in_world = self._generator.reference(state, targets, joints)
-        self._phase.publish(phase_message(phase))
-        self._reference.publish(
-            self._reference_wire.pack(
-                state.stamp_ns, position=reference.position, velocity=reference.velocity
-            )
-        )
+        position, velocity = reference.position, reference.velocity
+        packed = self._reference_wire.pack(state.stamp_ns, position=position, velocity=velocity)
+        self._answer = self._phase_wire.pack(phase), packed
+        self._publish_again()
         for arm, pose in targets_in_world.items():
             self._targets[arm].publish(self._pose_wire.pack(state.stamp_ns, pose_row(pose)))
+
+    def _publish_again(self) -> None:
+        """Publish phase and reference, for the first time or because the plant asks again."""
+        if self._answer:
+            phase, reference = self._answer
+            self._phase.publish(phase)
+            self._reference.publish(reference)
 
 
 def _for_any_plant(parameters: ParameterSet) -> ParameterSet:

@@ -23,6 +23,12 @@ class PlantParameters:
         unit="m/s",
         minimum=0.0,
     )
+    resend_after: float = parameter(
+        "lock step: wall time without an answer after which a state is published once more",
+        unit="s",
+        minimum=0.05,
+        maximum=3600.0,
+    )
 
     @property
     def grasp_tolerance(self) -> GraspTolerance:

@@ -11,6 +11,7 @@ from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from sms_handover.errors import GraphError
+from sms_handover.ros.inputs import Inputs, Receive
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.qos import profile_of, serves
 from sms_handover.topics import RECORDER, Topic
@@ -38,6 +39,13 @@ class Endpoints:
         publisher = self._node.create_publisher(message_class(topic.type), topic.name, profile_of(topic))
         self._publishers[name] = CountedPublisher(publisher)
         return self._publishers[name]
+
+    def receive(self, name: str, inputs: Inputs, receive: Receive) -> None:
+        """Hand every message of a topic of the table to ``receive`` by the inputs of a node's loop."""
+        topic = self._topics[name]
+        self._subscriptions[name] = inputs.subscribe(
+            message_class(topic.type), topic.name, profile_of(topic), receive
+        )
 
     def subscribe(self, name: str, callback: Callable[[Any], None], *, raw: bool = False) -> Subscription:
         """Call ``callback`` with every message of a topic of the table, as CDR bytes if ``raw``."""

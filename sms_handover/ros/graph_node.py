@@ -1,24 +1,29 @@
 """What every node of the graph does alike: parameters, matching, readiness, counts, diagnostics."""
 
 from collections.abc import Callable
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.executors import Executor
+from rclpy.node import Node
 from sms_handover_interfaces.msg import PublishedCounts, RunState
 from std_msgs.msg import String
 
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.parameters import EVERY_NODE
-from sms_handover.ros.convert import stamp_ns_of, time_message
+from sms_handover.ros.convert import time_message
+from sms_handover.ros.direct_inputs import DirectInputs
 from sms_handover.ros.endpoints import Endpoints
-from sms_handover.ros.main import EXIT_OK, RunnableNode, Stop, spin
+from sms_handover.ros.inputs import ExecutorInputs, Inputs
+from sms_handover.ros.main import EXIT_OK, WAIT_S, RunnableNode, Stop
 from sms_handover.ros.parameters import declare, refuse_unknown
-from sms_handover.simulation.parameters import CommonParameters
+from sms_handover.simulation.parameters import DIRECT, EXECUTOR, CommonParameters
 from sms_handover.simulation.scenario import load_robot_model
 from sms_handover.topics import DIAGNOSTICS, PLANT, RUN_PUBLISHED, RUN_READY, RUN_STATE, graph_topics
 
 P = TypeVar("P")
+
+INPUTS: dict[str, Callable[[Node], Inputs]] = {DIRECT: DirectInputs, EXECUTOR: ExecutorInputs}
 
 _DIAGNOSTICS_PERIOD_S = 1.0  # [s] of wall time
 _MATCHING_PERIOD_S = 0.02  # [s] of wall time between two looks at who has matched
@@ -39,6 +44,7 @@ class GraphNode(RunnableNode, Generic[P]):
         refuse_unknown(self, CommonParameters, group)
         self.robot: RobotModel = load_robot_model(self.common)
         self.endpoints = Endpoints(self, graph_topics(self.robot.arms), self.common.peers)
+        self.inputs: Inputs = INPUTS[self.common.transport](self)
         self.finished = False
         self._counts = self.endpoints.publisher(RUN_PUBLISHED)
         self._diagnostics = self.endpoints.publisher(DIAGNOSTICS)
@@ -50,8 +56,19 @@ class GraphNode(RunnableNode, Generic[P]):
 
     def run(self, executor: Executor, stop: Stop) -> int:
         """Handle events until asked to stop, and return the exit code; a node may override this."""
-        spin(executor, stop)
+        while not stop.asked:
+            self.inputs.spin_once(executor, WAIT_S, self.awaited)
         return EXIT_OK
+
+    @property
+    def awaited(self) -> str:
+        """Return the input that the loop waits for, "" if it has none; a node may override this."""
+        return ""
+
+    def destroy_node(self) -> None:
+        """Destroy the node with its inputs."""
+        self.inputs.destroy()
+        super().destroy_node()
 
     def prepared(self) -> bool:
         """Tell whether this node has what it needs besides its topics; a node may override this."""
@@ -109,12 +126,3 @@ class GraphNode(RunnableNode, Generic[P]):
         message = DiagnosticArray(status=[status])
         message.header.stamp = time_message(self.diagnostic_stamp_ns())
         self._diagnostics.publish(message)
-
-
-def by_stamp(take: Callable[[int, Any], None]) -> Callable[[Any], None]:
-    """Return a callback that hands on a message with the stamp of its header in ns."""
-
-    def callback(message: Any) -> None:
-        take(stamp_ns_of(message.header.stamp), message)
-
-    return callback

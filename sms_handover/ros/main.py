@@ -15,6 +15,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from sms_handover.errors import ConfigurationError, SmsHandoverError
+from sms_handover.share import config_file
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
 EXIT_LOSS = 3  # the recorder: the bag is whole, but messages are missing in it
@@ -22,7 +23,9 @@ EXIT_STOPPED = 130  # the recorder: the bag is whole, but the run was not over w
 
 LAUNCHER_PID = "SMS_HANDOVER_LAUNCHER_PID"  # environment variable, set for the nodes that a launcher starts
 
-_WAIT_S = 0.2  # [s] longest wait for an event, so that a signal is noticed
+_FAST_DDS_FILE = "FASTRTPS_DEFAULT_PROFILES_FILE"  # environment variable that Fast DDS reads
+
+WAIT_S = 0.2  # [s] longest wait for an event, so that a signal is noticed
 
 
 class Stop:
@@ -93,14 +96,9 @@ def run_node(
 
 def _init(args: list[str]) -> None:
     """Start ROS with the arguments of a command line; raises ConfigurationError where it cannot read them."""
+    os.environ.setdefault(_FAST_DDS_FILE, str(config_file("fastdds.xml")))
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
         reason = str(error).split(", at /", 1)[0]  # the rest tells where in the sources of rcl
         raise ConfigurationError(" ".join(reason.split())) from error
-
-
-def spin(executor: Executor, stop: Stop) -> None:
-    """Handle events until asked to stop."""
-    while not stop.asked:
-        executor.spin_once(timeout_sec=_WAIT_S)

@@ -20,8 +20,11 @@ class StampSync(Generic[V]):
         self.dropped = 0
 
     def begins_anew(self, stamp_ns: int) -> bool:
-        """Tell whether a stamp is the start of a run after one whose inputs have been taken."""
-        return stamp_ns == 0 and self._taken_ns >= 0
+        """Tell whether a stamp is the start of a run behind inputs taken of a later time.
+
+        The start behind the start alone is the same state once more, to which the same answer belongs.
+        """
+        return stamp_ns == 0 and self._taken_ns > 0
 
     def reset(self) -> None:
         """Forget everything, as at the start of a run."""
@@ -36,6 +39,16 @@ class StampSync(Generic[V]):
         self._waiting.setdefault(stamp_ns, {})[name] = value
         if len(self._waiting) > _LONGEST:
             self.dropped += len(self._waiting.pop(min(self._waiting)))
+
+    @property
+    def oldest_ns(self) -> int | None:
+        """Return the oldest stamp of which something waits, None if nothing does."""
+        return min(self._waiting) if self._waiting else None
+
+    def missing(self, stamp_ns: int, names: tuple[str, ...]) -> str:
+        """Return the last of the names of which nothing is there for a stamp, "" if there is none."""
+        inputs = self._waiting.get(stamp_ns, {})
+        return next((name for name in reversed(names) if name not in inputs), "")
 
     def take(self, stamp_ns: int, names: tuple[str, ...]) -> dict[str, V] | None:
         """Return the inputs of a stamp if all the named ones are there, else None."""

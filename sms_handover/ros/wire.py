@@ -10,6 +10,7 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import numpy as np
+from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
@@ -110,6 +111,14 @@ class StampedWire:
         self._template = types.serialize(message)
         self._at = self._template.index(numbers[:1].tobytes())
 
+    def read(self, data: bytes) -> Array | None:
+        """Return the numbers in the bytes of a message, or None if it is of another layout."""
+        if len(data) != len(self._template) or not data.startswith(_LITTLE_ENDIAN):
+            return None
+        if not data.startswith(self._template[_BODY_AT : self._at], _BODY_AT):
+            return None
+        return np.frombuffer(data, "<f8", offset=self._at)
+
     def pack(self, stamp_ns: int, numbers: Array) -> bytes:
         """Return the bytes of a message with a stamp and all its numbers in the order of the fields."""
         buffer = bytearray(self._template)
@@ -123,6 +132,14 @@ class StampedWire:
 def pose_wire(frame: str) -> StampedWire:
     """Return what packs PoseStamped: position, then quaternion x y z w."""
     return StampedWire("geometry_msgs/msg/PoseStamped", frame, lambda types, n: {"pose": _pose(types, n)})
+
+
+def read_pose(wire: StampedWire, data: bytes) -> Pose:
+    """Return the pose in the bytes of a PoseStamped of any layout."""
+    numbers = wire.read(data)
+    if numbers is None:
+        return pose_of_message(deserialize_message(data, PoseStamped).pose)
+    return Pose(numbers[:3], numbers[3:])
 
 
 def vector_wire(frame: str) -> StampedWire:

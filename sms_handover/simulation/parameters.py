@@ -9,6 +9,8 @@ from sms_handover.units import seconds_to_ns
 
 LOCKSTEP, REALTIME = "lockstep", "realtime"
 MODES = (LOCKSTEP, REALTIME)
+DIRECT, EXECUTOR = "direct", "executor"
+TRANSPORTS = (DIRECT, EXECUTOR)
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,11 @@ class CommonParameters:
 
     mode: str = parameter(
         "lockstep: every tick waits for its command; realtime: paced by the wall clock", choices=MODES
+    )
+    transport: str = parameter(
+        "how a node gets the inputs of its loop; direct: from the middleware itself; executor: by rclpy's "
+        "executor, which is slower and all public",
+        choices=TRANSPORTS,
     )
     peers: tuple[str, ...] = parameter("nodes of the graph; the run starts when all have matched")
 

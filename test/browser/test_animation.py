@@ -14,8 +14,7 @@ from sms_handover.simulation.simulate import simulate
 from sms_handover.types import Array
 
 from ..ros.short_handover import short_handover
-from .chromium import NARROW, WIDE
-from .conftest import Browsing, Visit
+from .conftest import NARROW, WIDE, Browsing, Visit
 
 pytestmark = pytest.mark.browser
 

@@ -14,6 +14,7 @@ from sms_handover.nodes.plant import PlantNode
 from sms_handover.nodes.trajectory import TrajectoryNode
 from sms_handover.ros.endpoints import Endpoints
 from sms_handover.ros.graph_node import GraphNode
+from sms_handover.simulation.parameters import EXECUTOR
 from sms_handover.topics import CONTROLLER, IK, PLANT, RECORDER, RUN_READY, TRAJECTORY, Topic, graph_topics
 
 from .bench import Bench, Parameters
@@ -66,6 +67,7 @@ class Graph:
         parameters["common"] = {
             "peers": self.peers,
             "schedule": str(path),
+            "transport": EXECUTOR,  # every node has its turn, and a test can act while the graph runs
             **parameters.get("common", {}),
         }
         self.bench = bench

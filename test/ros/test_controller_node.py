@@ -169,12 +169,21 @@ def test_between_references_the_state_is_enough(bench: Bench) -> None:
 
 
 def test_an_answered_stamp_is_not_answered_again(bench: Bench) -> None:
-    rest = Rest(bench)
-    messages = [rest.messages(*inputs(rest, k * REFERENCE_NS, k)) for k in range(3)]
-    for message in (*messages[:2], messages[1], messages[2]):
-        rest.send(message, *INPUTS)
-    rest.wait_for(3)
-    assert [stamp_ns(data) for data in rest.commands] == [0, REFERENCE_NS, 2 * REFERENCE_NS]
+    """Whoever asks again gets the same bytes, and the law is not stepped: the integral of PID stays."""
+    rest = Rest(bench, law="pid")
+    expected = rest.by_hand()
+    stamps = [0, REFERENCE_NS, REFERENCE_NS, 2 * REFERENCE_NS]
+    for number, stamp in enumerate(stamps):
+        rest.send(rest.messages(*inputs(rest, stamp, stamp)), *INPUTS)
+        rest.wait_for(number + 1)
+    assert [stamp_ns(data) for data in rest.commands] == stamps
+    assert rest.commands[1] == rest.commands[2]
+    for stamp in sorted(set(stamps)):
+        state, reference, phase = inputs(rest, stamp, stamp)
+        expected.enter(phase)
+        expected.track(reference)
+        wanted = expected.step(state).effort
+    assert rest.efforts()[-1].tobytes() == wanted.tobytes()
     assert rest.node.diagnostic_values()["late"] == 4
 
 
@@ -182,9 +191,9 @@ def test_an_answered_stamp_is_not_answered_again(bench: Bench) -> None:
 def test_time_zero_begins_anew(bench: Bench, law: str) -> None:
     """After a whole run the same inputs give the same bits: nothing of the first one is left."""
     rest = Rest(bench, law=law)
-    for number in (*range(20), *range(20)):
+    for count, number in enumerate((*range(20), *range(20))):
         rest.send(rest.messages(*inputs(rest, number * REFERENCE_NS, number)), *INPUTS)
-    rest.wait_for(40)
+        rest.wait_for(count + 1)
     assert rest.commands[20:] == rest.commands[:20]
     assert rest.node.diagnostic_values()["late"] == 0
 

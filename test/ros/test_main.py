@@ -12,7 +12,6 @@ from rclpy.executors import Executor
 from sms_handover.errors import BagError, ConfigurationError, GraphError
 from sms_handover.nodes import controller, ik, plant, recorder, trajectory
 from sms_handover.ros.main import EXIT_FAILED, EXIT_OK, EXIT_USAGE, LAUNCHER_PID, RunnableNode, Stop, run_node
-from sms_handover.ros.main import spin as spin_until_stopped
 
 from .bench import Bench
 
@@ -113,7 +112,8 @@ def test_a_spinning_node_ends_on_a_signal() -> None:
             self.create_timer(0.01, lambda: os.kill(os.getpid(), signal.SIGTERM))
 
         def run(self, executor: Executor, stop: Stop) -> int:
-            spin_until_stopped(executor, stop)
+            while not stop.asked:
+                executor.spin_once(timeout_sec=0.2)
             return EXIT_OK
 
     assert run_node(Spinner, []) == EXIT_OK

@@ -11,6 +11,7 @@ from visualization_msgs.msg import Marker
 from sms_handover.bag.decode import header_ns
 from sms_handover.frames import DEPUTY
 from sms_handover.ros.convert import stamp_ns_of
+from sms_handover.simulation.parameters import TRANSPORTS
 from sms_handover.topics import (
     BASE_ODOMETRY,
     CLOCK,
@@ -45,7 +46,9 @@ def graph(bench: Bench) -> Graph:
     return Graph(bench)
 
 
-def test_every_stamp_comes_once_and_in_order(graph: Graph) -> None:
+@pytest.mark.parametrize("transport", TRANSPORTS)
+def test_every_stamp_comes_once_and_in_order(bench: Bench, transport: str) -> None:
+    graph = Graph(bench, {"common": {"transport": transport}})
     graph.run()
     ticks = [k * TICK_NS for k in range(TICKS)]
     for topic in TOPICS:
@@ -102,6 +105,19 @@ def test_the_deputy_is_a_box_that_stays_with_its_frame(graph: Graph) -> None:
     assert [marker.scale.x, marker.scale.y, marker.scale.z] == [0.1, 0.34, 0.1]
     assert marker.color.a == 1.0 and marker.pose.orientation.w == 1.0
     assert (marker.lifetime.sec, marker.lifetime.nanosec) == (0, 0)
+
+
+@pytest.mark.parametrize("law", ["nmpc", "pid"])
+def test_the_transport_changes_no_bit(bench: Bench, law: str) -> None:
+    heard: dict[str, list[list[bytes]]] = {name: [] for name in (*REGULAR, GRASP_EVENT)}
+    for transport in TRANSPORTS:
+        graph = Graph(bench, {"common": {"transport": transport}, "controller": {"law": law}})
+        graph.run()
+        for name, runs in heard.items():
+            runs.append(Messages().last_run(graph, name))
+        bench.close()
+    for name, (direct, by_executor) in heard.items():
+        assert direct and direct == by_executor, name
 
 
 # Reset

@@ -84,8 +84,23 @@ def test_time_zero_begins_a_run_only_after_another() -> None:
     sync.add(0, "a", 0)
     assert not sync.begins_anew(0)  # the other inputs of the first stamp
     sync.take(0, ("a",))
+    assert not sync.begins_anew(0)  # the same once more
+    sync.add(1, "a", 1)
+    sync.take(1, ("a",))
     assert sync.begins_anew(0)
     assert not sync.begins_anew(1)
+
+
+def test_what_is_missing_is_told_from_the_last() -> None:
+    sync: StampSync[int] = StampSync()
+    assert sync.oldest_ns is None
+    assert sync.missing(3, ("a", "b")) == "b"
+    sync.add(3, "b", 0)
+    sync.add(5, "a", 0)
+    assert sync.oldest_ns == 3
+    assert sync.missing(3, ("a", "b")) == "a"
+    sync.add(3, "a", 0)
+    assert sync.missing(3, ("a", "b")) == ""
 
 
 def test_a_run_that_begins_anew_takes_the_same_stamps_again() -> None:

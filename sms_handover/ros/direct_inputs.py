@@ -1,0 +1,195 @@
+"""Takes what a node's loop waits for from the middleware itself, without an executor between.
+
+An executor hands over each message by itself: it costs the 1 kHz loop more time than the loop's own
+work. Here the node sleeps on the one message that it cannot go on without, and then takes all there
+are. This file alone uses names that rclpy keeps for its own executors: the lists of a node's
+entities, ``WaitSet``, ``take_message``, ``take_response``, ``send_request``, ``service_take_request``.
+and ``service_send_response``. Where they change, the parameter ``transport`` offers the public way.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from time import monotonic, time_ns
+from typing import Any
+
+from rclpy.executors import Executor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
+
+from sms_handover.ros.inputs import Answer, Asker, Inputs, Receive
+from sms_handover.units import NS_PER_S
+
+_SENT = "source_timestamp"  # [ns] of wall time, when the message was published
+_BATCH = 4096  # taken of one input at most before another has its turn
+_SERVE_S = 0.02  # [s] of wall time at most between two turns of the executor while the loop runs
+_HOT_S = 0.1  # [s] of wall time without anything for the loop after which the executor does the waiting
+_IDLE_S = 0.005  # [s] of wall time between two looks for the loop then
+
+
+class DirectInputs(Inputs):
+    """Takes messages, requests and answers of one node; the node must not be with an executor yet."""
+
+    def __init__(self, node: Node) -> None:
+        """Serve a node."""
+        self._node = node
+        self._sources: dict[str, _Source] = {}
+        self._serve_at = self._hot_until = 0.0
+        self.sleeps = 0
+
+    def subscribe(self, kind: Any, topic: str, profile: QoSProfile, receive: Receive) -> Subscription:
+        """Hand every message of a topic to ``receive``."""
+        subscription = self._node.create_subscription(kind, topic, _never, profile, raw=True)
+        self._node._subscriptions.remove(subscription)
+        self._sources[topic] = _Messages(self._node, subscription, receive)
+        return subscription
+
+    def asker(self, kind: Any, service: str, receive: Callable[[Any], None]) -> Asker:
+        """Return what asks a service, and hand every answer to ``receive``."""
+        client = self._node.create_client(kind, service)
+        self._node._clients.remove(client)
+        answers = self._sources[service] = _Answers(self._node, client, receive)
+        return answers
+
+    def serve(self, kind: Any, service: str, answer: Answer) -> None:
+        """Offer a service."""
+        entity = self._node.create_service(kind, service, _never)
+        self._node._services.remove(entity)
+        self._sources[service] = _Requests(self._node, entity, answer)
+
+    def poll(self) -> int:
+        """Hand over everything that has come, in the order in which the inputs were made."""
+        return sum([source.take_all() for source in self._sources.values()])
+
+    def spin_once(self, executor: Executor, timeout_s: float, awaited: str = "") -> None:
+        """Handle what has come; else sleep until ``awaited`` comes, with turns of the executor between."""
+        found = self.poll()
+        now = monotonic()
+        if found:
+            self._hot_until = now + _HOT_S
+        elif now > self._hot_until or awaited not in self._sources:
+            executor.spin_once(timeout_sec=min(timeout_s, _IDLE_S))
+            return
+        else:
+            self.sleeps += 1
+            self._sources[awaited].wait(min(timeout_s, _SERVE_S))
+        if now >= self._serve_at:
+            self._serve_at = now + _SERVE_S
+            executor.spin_once(timeout_sec=0.0)
+
+    def destroy(self) -> None:
+        """Give everything back to the middleware."""
+        for source in self._sources.values():
+            source.destroy()
+        self._sources.clear()
+
+
+class _Source(ABC):
+    """One kind of input: it can be slept on and emptied."""
+
+    def __init__(self, node: Node, entity: Any, counts: tuple[int, int, int]) -> None:
+        """Take an entity that the node no longer knows; ``counts`` of subscriptions, clients, services."""
+        subscriptions, clients, services = counts
+        self._entity = entity
+        self._wait_set = rclpy_implementation.WaitSet(
+            subscriptions, 0, 0, clients, services, 0, node.context.handle
+        )
+
+    @abstractmethod
+    def _watch(self) -> None:
+        """Put the entity into the wait set."""
+
+    @abstractmethod
+    def take_all(self) -> int:
+        """Hand over what has come, ``_BATCH`` at most, and return how many there were."""
+
+    def wait(self, timeout_s: float) -> None:
+        """Sleep until something comes."""
+        self._wait_set.clear_entities()
+        self._watch()
+        self._wait_set.wait(int(timeout_s * NS_PER_S))
+
+    def destroy(self) -> None:
+        """Give the entity back to the middleware."""
+        self._entity.destroy()
+
+
+class _Messages(_Source):
+    """The messages of a topic."""
+
+    def __init__(self, node: Node, subscription: Subscription, receive: Receive) -> None:
+        """Take over a raw subscription."""
+        super().__init__(node, subscription, (1, 0, 0))
+        self._take = subscription.handle.take_message
+        self._kind = subscription.msg_type
+        self._receive = receive
+
+    def _watch(self) -> None:
+        self._wait_set.add_subscription(self._entity.handle)
+
+    def take_all(self) -> int:
+        """Hand over what has come."""
+        for taken in range(_BATCH):
+            message = self._take(self._kind, True)
+            if message is None:
+                return taken
+            self._receive(message[0], message[1].get(_SENT) or time_ns())
+        return _BATCH
+
+
+class _Answers(_Source, Asker):
+    """Asks a service, and takes its answers."""
+
+    def __init__(self, node: Node, client: Any, receive: Callable[[Any], None]) -> None:
+        """Take over a client."""
+        super().__init__(node, client, (0, 1, 0))
+        self._response = client.srv_type.Response
+        self._receive = receive
+
+    def ready(self) -> bool:
+        """Tell whether the service is there."""
+        return bool(self._entity.service_is_ready())
+
+    def ask(self, request: Any) -> None:
+        """Send a request and return at once."""
+        self._entity.handle.send_request(request)
+
+    def _watch(self) -> None:
+        self._wait_set.add_client(self._entity.handle)
+
+    def take_all(self) -> int:
+        """Hand over what has come."""
+        for taken in range(_BATCH):
+            header, response = self._entity.handle.take_response(self._response)
+            if header is None:
+                return taken
+            self._receive(response)
+        return _BATCH
+
+
+class _Requests(_Source):
+    """Takes the requests of a service, and answers them."""
+
+    def __init__(self, node: Node, service: Any, answer: Answer) -> None:
+        """Take over a service."""
+        super().__init__(node, service, (0, 0, 1))
+        self._kind = service.srv_type
+        self._answer = answer
+
+    def _watch(self) -> None:
+        self._wait_set.add_service(self._entity.handle)
+
+    def take_all(self) -> int:
+        """Answer what has come."""
+        for taken in range(_BATCH):
+            request, header = self._entity.handle.service_take_request(self._kind.Request)
+            if header is None:
+                return taken
+            response = self._answer(request, self._kind.Response())
+            self._entity.send_response(response, header)
+        return _BATCH
+
+
+def _never(*arguments: object) -> None:
+    """Stand in for a callback that no executor ever calls."""
