@@ -35,7 +35,7 @@ def highlights(comparison: Comparison) -> Section:
     with_tools = [run if _tools(run) else None for run in runs]
     drifts = [comparison.drift[name] for name in comparison.runs]
     return Section(
-        "Worst of the whole run",
+        "Worst value of the run",
         (
             Row("grasp commands that succeeded", tuple(_succeeded(run) for run in runs)),
             _cost("largest distance at a grasp [mm]", runs, _worst_grasp),

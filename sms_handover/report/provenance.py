@@ -12,6 +12,7 @@ NOT_RECORDED = "-"
 EVERY_NODE = "every node"
 
 _WHERE_RECORDED = {("recorder", "folder")}  # tells where the bag was put, not how the run was made
+_START = "start"  # of a run, never the same
 _HASH_LENGTH = 12  # [characters] of a hash that a reader sees
 _SHARED_BY = 2  # [nodes] from which on a parameter is one of the graph, not of a node
 
@@ -31,12 +32,12 @@ class ComparedValue:
 
 
 def compared_versions(infos: Sequence[BagInfo]) -> tuple[ComparedValue, ...]:
-    """Return versions, revision, seed, start and robot description of every bag."""
+    """Return versions, revision, seed, robot description and schedule of every bag, but not its start."""
     records = [
         {**info.provenance, "robot description": _hash(info.urdf_text), "schedule": _hash(info.schedule_text)}
         for info in infos
     ]
-    names = dict.fromkeys(name for record in records for name in record)
+    names = dict.fromkeys(name for record in records for name in record if name != _START)
     return tuple(
         ComparedValue("", _readable(name), tuple(record.get(name, NOT_RECORDED) for record in records))
         for name in names

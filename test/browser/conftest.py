@@ -1,25 +1,13 @@
 """A real Chromium for the tests of pages, and what it complained about."""
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page, sync_playwright
 
-CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
-WIDE, NARROW = (1280, 800), (390, 760)  # [px] of a desk and of a telephone
-_ARGUMENTS = (
-    "--no-sandbox",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--use-angle=swiftshader",  # WebGL on the processor
-    "--enable-unsafe-swiftshader",
-    "--ignore-gpu-blocklist",
-)
+from .chromium import ARGUMENTS, WIDE, absence, find_chromium, is_needed
+
 _OWN_SCHEMES = ("data:", "blob:", "about:")
 
 
@@ -58,6 +46,7 @@ class Browsing:
         dark: bool = False,
         before: str = "",
         touch: bool = False,
+        mobile: bool = False,
     ) -> Visit:
         """Open a page from a file of its own, as a user does; ``before`` is a script that runs first."""
         file = self._folder / f"page_{len(self._opened)}.html"
@@ -66,6 +55,7 @@ class Browsing:
             viewport={"width": size[0], "height": size[1]},
             color_scheme="dark" if dark else "light",
             has_touch=touch,
+            is_mobile=mobile,
             offline=True,
         )
         visit = Visit(context.new_page())
@@ -85,11 +75,13 @@ class Browsing:
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     """A headless Chromium that draws 3D on the processor."""
-    executable = next((path for path in map(shutil.which, CHROMIUM) if path), None)
+    executable = find_chromium()
+    if executable is None and is_needed():
+        pytest.fail(absence())
     if executable is None:
-        pytest.skip(f"no Chromium on this machine: looked for {', '.join(CHROMIUM)}")
+        pytest.skip(absence())
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=executable, args=list(_ARGUMENTS))
+        chromium = playwright.chromium.launch(executable_path=executable, args=list(ARGUMENTS))
         yield chromium
         chromium.close()
 

@@ -14,7 +14,8 @@ from sms_handover.simulation.simulate import simulate
 from sms_handover.types import Array
 
 from ..ros.short_handover import short_handover
-from .conftest import NARROW, WIDE, Browsing, Visit
+from .chromium import NARROW, WIDE
+from .conftest import Browsing, Visit
 
 pytestmark = pytest.mark.browser
 

@@ -1,6 +1,7 @@
 """The report in a real browser: drawn, linked, safe, without a network, and whole on a telephone."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,8 @@ from sms_handover.report.recorded_run import RecordedRun, read_recorded
 
 from ..core.report_bags import write_handovers
 from ..core.test_report_page import EVIL, evil_bag
-from .conftest import NARROW, WIDE, Browsing, Visit
+from .chromium import NARROW, WIDE
+from .conftest import Browsing, Visit
 
 pytestmark = pytest.mark.browser
 
@@ -96,6 +98,19 @@ def test_it_opens_whole_and_without_a_network(
     assert traces == [len(runs) * count for count in per_run]
 
 
+def test_many_runs_with_long_names_fit_a_telephone(opened: Open, runs: list[RecordedRun]) -> None:
+    """Tables that are too wide scroll by themselves; the page does not."""
+    names = [f"{run.law} with a rather long name, number {number}" for number in range(3) for run in runs]
+    many = [replace(runs[place % 2], name=name) for place, name in enumerate(names)]
+    visit = opened(report_page(many), size=NARROW, touch=True)
+    assert visit.page.evaluate("document.documentElement.scrollWidth") == NARROW[0]
+    wide = (
+        "[...document.querySelectorAll('.scroll')].filter((box) => box.scrollWidth > box.clientWidth).length"
+    )
+    assert visit.page.evaluate(wide) > 0
+    assert visit.errors == []
+
+
 def test_colours_follow_the_scheme_of_the_system(opened: Open) -> None:
     page = opened().page
     line = "plots.plots[0].frame.querySelector('.scatterlayer .trace path').style.stroke"
@@ -174,6 +189,27 @@ def test_pointing_at_one_plot_shows_values_and_time_in_all(opened: Open) -> None
     assert cursors == [[True, "visible"]] * len(cursors)
 
 
+def test_a_finger_scrolls_over_a_plot_and_taps_for_its_values(opened: Open) -> None:
+    visit = opened(size=NARROW, touch=True, mobile=True)
+    page = visit.page
+    box = frame_of(page, "arm_a/position_error")
+    devices = page.context.new_cdp_session(page)
+    before = page.evaluate("scrollY")
+    touches = [{"x": box["x"] + 150, "y": box["middle"] - 15 * step} for step in range(8)]
+    for touch in touches:
+        kind = "touchStart" if touch is touches[0] else "touchMove"
+        devices.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [touch]})
+    devices.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    until(page, f"scrollY > {before + 50}")
+    assert ranges(page)[0] == page.evaluate("report.span")
+    box = frame_of(page, "arm_a/position_error")
+    page.touchscreen.tap(box["x"] + 150, box["middle"])
+    until(page, "plots.plots[0].frame.querySelector('.hoverlayer .legend')")
+    time = page.evaluate("plots.plots[0].timeAt(150)")
+    assert page.locator("#cursor-time").inner_text() == f"t = {time:.3f} s"
+    assert visit.errors == []
+
+
 def test_runs_and_lines_can_be_hidden(opened: Open) -> None:
     page = opened().page
     drawn = "plots.plots[4].frame.querySelectorAll('.scatterlayer .trace').length"
@@ -213,7 +249,7 @@ def test_the_animation_moves_and_shares_its_time_with_the_plots(opened: Open) ->
         pictures.append(page.locator("iframe").screenshot())
     assert max(abs(a - b) for a, b in zip(*poses, strict=True)) > 1e-3  # m
     assert pictures[0] != pictures[1]
-    assert page.evaluate("plots.animationTime") == pytest.approx(end)
+    assert page.evaluate("plots.chosen") == pytest.approx(end)
     box = frame_of(page, "base_speed")
     page.mouse.click(box["x"] + 300, box["middle"])
     time = page.evaluate("plots.plots.find((plot) => plot.plot.key === 'base_speed').timeAt(300)")

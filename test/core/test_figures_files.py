@@ -97,7 +97,9 @@ def test_another_process_with_other_settings_gives_the_same_bytes(
     folder = tmp_path / "elsewhere"
     folder.mkdir()
     settings = tmp_path / "matplotlibrc"
-    settings.write_text("lines.linewidth: 9\nfont.family: monospace\nsavefig.dpi: 33\n", encoding="utf-8")
+    settings.write_text(
+        "axes.facecolor: red\nxtick.top: True\nsavefig.bbox: tight\nlines.linewidth: 9\n", encoding="utf-8"
+    )
     environment = {
         **os.environ,
         "PYTHONHASHSEED": "7",

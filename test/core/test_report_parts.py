@@ -113,6 +113,7 @@ def test_a_bag_that_carries_nothing_differs_in_everything(infos: list[BagInfo]) 
     assert compared_parameters([infos[2]]) == ()
     assert all(item.differs for item in compared_parameters([infos[0], infos[2]]))
     versions = {item.name: item.values for item in compared_versions([infos[0], infos[2]])}
+    assert set(versions) == {"robot description", "schedule"}
     assert versions["schedule"][0].startswith("sha256 ") and versions["schedule"][1] == NOT_RECORDED
 
 

@@ -13,6 +13,7 @@ from sms_handover.types import Array
 
 _SIDES = 20  # of a cylinder
 _LARGEST = 0.12  # [m] edge of a part of a box's face; small parts can be put in the order of depth
+_EDGE_ON = 1e-9  # [-] cosine to the line of sight, below which rounding decides whether a face is seen
 _AMBIENT = 0.55  # [-] brightness of a face that the light does not reach
 
 
@@ -55,9 +56,10 @@ def picture_of(solids: Sequence[Sequence[Array]], camera: Camera, light: Array) 
     for number, faces in enumerate(solids):
         for face in faces:
             normal = np.cross(face[1] - face[0], face[2] - face[1])
-            if normal @ view[2] <= 0.0:
+            normal /= np.linalg.norm(normal)
+            if normal @ view[2] <= _EDGE_ON:
                 continue
-            lit = max(0.0, float(normal @ light) / float(np.linalg.norm(normal)))
+            lit = max(0.0, float(normal @ light))
             depth = float(face.mean(axis=0) @ view[2])
             seen.append((depth, camera.seen(face), _AMBIENT + (1.0 - _AMBIENT) * lit, number))
     seen.sort(key=lambda item: item[0])

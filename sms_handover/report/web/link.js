@@ -23,8 +23,8 @@ class LinkedPlots {
     });
     plot.frame.on("plotly_doubleclick", () => this.zoom(report.span));
     plot.frame.addEventListener("pointermove", (event) => this.point(plot, this.timeOf(plot, event)));
-    plot.frame.addEventListener("pointerleave", () => this.point(plot, null));
-    plot.frame.addEventListener("click", (event) => this.onSeek?.(this.timeOf(plot, event)));
+    plot.frame.addEventListener("pointerleave", (event) => event.pointerType === "mouse" && this.point(plot, null));
+    plot.frame.addEventListener("click", (event) => this.seek(this.timeOf(plot, event)));
   }
 
   timeOf(plot, event) {
@@ -36,10 +36,17 @@ class LinkedPlots {
   point(source, time) {
     this.pointed ??= requestAnimationFrame(() => {
       this.pointed = undefined;
-      this.showTime(this.wanted.time ?? this.animationTime ?? null);
+      this.showTime(this.wanted.time ?? this.chosen ?? null);
       for (const plot of this.inSight) if (plot !== this.wanted.source) plot.showValues(this.wanted.time);
     });
     this.wanted = { source, time };
+  }
+
+  // Choose a time: the plots mark it while none is pointed at, and the animation goes there.
+  seek(time) {
+    this.chosen = time;
+    this.onSeek?.(time);
+    this.showTime(time);
   }
 
   showTime(time) {

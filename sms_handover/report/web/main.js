@@ -63,8 +63,8 @@ function linkAnimation() {
   if (!frame) return;
   addEventListener("message", (event) => {
     if (event.source !== frame.contentWindow || event.data?.type !== "time") return;
-    plots.animationTime = Number(event.data.t);
-    plots.showTime(plots.animationTime);
+    plots.chosen = Number(event.data.t);
+    plots.showTime(plots.chosen);
   });
   plots.onSeek = (time) => frame.contentWindow.postMessage({ type: "time", t: time }, "*");
 }
