@@ -27,6 +27,7 @@ from sms_handover.ros.qos import LATCHED, LOSSLESS
 from sms_handover.topics import PLAYER
 
 from .bench import Bench
+from .script import Script, Stop
 
 pytestmark = pytest.mark.ros
 
@@ -34,7 +35,6 @@ TEXT = "std_msgs/msg/String"
 MS = 1_000_000  # ns
 COUNT = 200
 TYPES = MessageTypes()
-Script = Generator[None, None, None]
 
 
 def string(content: str) -> bytes:
@@ -87,25 +87,6 @@ class Ears:
     def texts(self) -> list[str]:
         """Return what was heard."""
         return [text for _, text in self.heard]
-
-
-class Stop:
-    """Asks to stop when a script has come to its end; each look at it goes one step on."""
-
-    def __init__(self, script: Script | None = None) -> None:
-        """Take the script; without one nothing is asked."""
-        self._script = script
-        self.asked_before = False
-
-    @property
-    def asked(self) -> bool:
-        """Go one step on, and tell whether to stop."""
-        if self._script is not None and not self.asked_before:
-            try:
-                next(self._script)
-            except StopIteration:
-                self.asked_before = True
-        return self.asked_before
 
 
 class Player:

@@ -1,0 +1,153 @@
+"""The stand-in for controller and trajectory: what it answers a plant, and what it makes of the states."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from rclpy.serialization import serialize_message
+from sms_handover_interfaces.msg import RunState, TaskPhase
+
+from sms_handover.bag.stamp import stamp_ns
+from sms_handover.bag.ticks import RecordedTick
+from sms_handover.frames import BASE, WORLD
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.ros.command_replay import PEERS, CommandReplay
+from sms_handover.ros.convert import header
+from sms_handover.ros.endpoints import Endpoints
+from sms_handover.ros.wire import JointStateWire, StateWire
+from sms_handover.topics import (
+    BASE_ODOMETRY,
+    CONTROLLER,
+    JOINT_COMMAND,
+    JOINT_STATES,
+    PLANT,
+    RUN_READY,
+    RUN_STATE,
+    TASK_PHASE,
+    graph_topics,
+)
+from sms_handover.types import Pose, RobotState, Twist
+
+from .bench import Bench
+
+pytestmark = pytest.mark.ros
+
+TICK_NS = 1_000_000
+ROBOT = RobotModel.load()
+COMMANDS = JointStateWire(ROBOT.joint_names, ("effort",))
+STATES = StateWire(ROBOT.joint_names, WORLD, BASE)
+
+
+def state(tick: int, angle: float = 0.0) -> tuple[bytes, bytes]:
+    """Return the messages of a state in which every joint is at an angle."""
+    zero, n = np.zeros(3), ROBOT.n_joints
+    pose, twist = Pose(zero, np.array([0.0, 0.0, 0.0, 1.0])), Twist(zero, zero)
+    return STATES.pack(
+        RobotState.of(tick * TICK_NS, pose, twist, np.full(n, angle), np.zeros(n), np.zeros(n))
+    )
+
+
+def command(tick: int) -> bytes:
+    """Return a command whose efforts tell the tick."""
+    return COMMANDS.pack(tick * TICK_NS, effort=np.full(ROBOT.n_joints, float(tick)))
+
+
+def recorded(ticks: Sequence[int], *, without_command: Sequence[int] = ()) -> list[RecordedTick]:
+    """Return recorded ticks; every second one has a phase."""
+    found = []
+    for tick in ticks:
+        phase = serialize_message(TaskPhase(header=header(tick * TICK_NS), name=f"phase {tick}"))
+        answer = None if tick in without_command else command(tick)
+        found.append(RecordedTick(tick * TICK_NS, *state(tick), answer, phase if tick % 2 == 0 else None))
+    return found
+
+
+class FakePlant:
+    """Publishes the states that the test says, and keeps the answers."""
+
+    def __init__(self, bench: Bench, ticks: list[RecordedTick]) -> None:
+        """Start a replay of these ticks, and wait until it is ready."""
+        bench.start()
+        self._bench = bench
+        self._endpoints = Endpoints(bench.plain(PLANT), graph_topics(ROBOT.arms), PEERS)
+        self._publish = {n: self._endpoints.publisher(n) for n in (JOINT_STATES, BASE_ODOMETRY, RUN_STATE)}
+        self.commands: list[bytes] = []
+        self.phases: list[TaskPhase] = []
+        self.ready: list[str] = []
+        self._endpoints.subscribe(JOINT_COMMAND, self.commands.append, raw=True)
+        self._endpoints.subscribe(TASK_PHASE, self.phases.append)
+        self._endpoints.subscribe(RUN_READY, lambda message: self.ready.append(message.data))
+        self.replay = CommandReplay(bench.plain(CONTROLLER), iter(ticks), ROBOT)
+        bench.until(lambda: self.ready == [CONTROLLER], "the stand-in")
+        bench.until(lambda: not self._endpoints.unmatched, "the endpoints")
+
+    def tick(self, tick: int, angle: float = 0.0) -> None:
+        """Publish a state and wait until it has been seen."""
+        joints, odometry = state(tick, angle)
+        self._publish[BASE_ODOMETRY].publish(odometry)
+        self._publish[JOINT_STATES].publish(joints)
+        self._bench.until(lambda: self.replay.stamp_ns == tick * TICK_NS, f"tick {tick}")
+
+    def end(self) -> None:
+        """Say that the run is over."""
+        self._publish[RUN_STATE].publish(RunState(state=RunState.FINISHED))
+        self._bench.until(lambda: self.replay.done, "the end")
+
+    def efforts(self, count: int) -> list[tuple[int, float]]:
+        """Wait for so many commands and return the tick and the effort of each."""
+        self._bench.until(lambda: len(self.commands) >= count, f"{count} commands")
+        return [
+            (stamp_ns(data) // TICK_NS, float(COMMANDS.read(data)["effort"][0])) for data in self.commands
+        ]
+
+
+def test_every_state_is_answered_with_what_was_recorded(bench: Bench) -> None:
+    plant = FakePlant(bench, recorded(range(4)))
+    for tick in range(4):
+        plant.tick(tick)
+    assert plant.efforts(4) == [(0, 0.0), (1, 1.0), (2, 2.0), (3, 3.0)]
+    assert plant.commands == [command(tick) for tick in range(4)]
+    assert [phase.name for phase in plant.phases] == ["phase 0", "phase 2"]
+    plant.end()
+    deviation = plant.replay.deviation
+    assert (deviation.compared, deviation.first, plant.replay.held) == (4, None, 0)
+
+
+def test_a_missing_command_is_held_with_the_stamp_of_the_state(bench: Bench) -> None:
+    plant = FakePlant(bench, recorded(range(4), without_command=(2,)))
+    for tick in range(4):
+        plant.tick(tick)
+    assert plant.efforts(4) == [(0, 0.0), (1, 1.0), (2, 1.0), (3, 3.0)]
+    assert plant.replay.held == 1
+
+
+def test_a_tick_that_was_not_recorded_is_answered_and_not_compared(bench: Bench) -> None:
+    plant = FakePlant(bench, recorded((0, 1, 3)))
+    for tick in range(4):
+        plant.tick(tick)
+    assert plant.efforts(4) == [(0, 0.0), (1, 1.0), (2, 1.0), (3, 3.0)]
+    assert (plant.replay.held, plant.replay.deviation.compared) == (1, 3)
+
+
+def test_a_recording_that_begins_later_is_waited_for(bench: Bench) -> None:
+    plant = FakePlant(bench, recorded((2, 3)))
+    plant.tick(2)
+    assert plant.efforts(1) == [(2, 2.0)]
+
+
+def test_behind_the_recording_it_is_over(bench: Bench) -> None:
+    plant = FakePlant(bench, recorded(range(2)))
+    for tick in range(3):
+        plant.tick(tick)
+    assert plant.replay.done
+    assert plant.replay.deviation.compared == 2
+
+
+def test_what_deviates_is_noted_with_its_time(bench: Bench) -> None:
+    plant = FakePlant(bench, recorded(range(4)))
+    for tick, angle in enumerate((0.0, 0.0, 1e-9, 1e-12)):
+        plant.tick(tick, angle)
+    deviation = plant.replay.deviation
+    assert deviation.compared == 4
+    assert deviation.first is not None and deviation.first.stamp_ns == 2 * TICK_NS
+    assert deviation.joint is not None and deviation.joint.joint_angle == 1e-9
