@@ -17,13 +17,20 @@ from sms_handover.errors import BagError
 TOPICS = ("/a", "/b", "/c")
 
 
-def write(path: Path, times: Sequence[int], *, chunking: bool = True, index: bool = True) -> None:
+def write(
+    path: Path,
+    times: Sequence[int],
+    *,
+    chunking: bool = True,
+    index: bool = True,
+    compression: CompressionType = CompressionType.ZSTD,
+) -> None:
     """Write messages at times, in that order, topic by topic in turn, in small chunks."""
     with path.open("wb") as stream:
         writer = Writer(
             stream,
             chunk_size=400,
-            compression=CompressionType.ZSTD,
+            compression=compression,
             use_chunking=chunking,
             index_types=IndexType.ALL if index else IndexType.NONE,
         )
@@ -42,10 +49,13 @@ def shuffled(seed: int, count: int = 500, spread: int = 60) -> list[int]:
     return [max(0, 5 * n + random.randrange(-spread, spread)) // 4 for n in range(count)]
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_the_order_is_that_of_the_mcap_library(tmp_path: Path, seed: int) -> None:
+EQUAL_ACROSS_CHUNKS = [50] * 12 + [30] * 3 + [50] * 12  # a chunk that begins earlier lies behind
+
+
+@pytest.mark.parametrize("times", [*(shuffled(seed) for seed in range(5)), EQUAL_ACROSS_CHUNKS])
+def test_the_order_is_that_of_the_mcap_library(tmp_path: Path, times: list[int]) -> None:
     file = tmp_path / "bag_0.mcap"
-    write(file, shuffled(seed))
+    write(file, times)
     with file.open("rb") as stream:
         expected = [
             (channel.topic, message.log_time, message.publish_time, message.data)
@@ -115,9 +125,11 @@ def test_without_an_index_the_window_puts_in_order_what_it_can(tmp_path: Path) -
     assert found == sorted(found)
 
 
-def test_a_damaged_chunk_is_told(tmp_path: Path) -> None:
+@pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4, CompressionType.NONE])
+def test_a_damaged_chunk_is_told(tmp_path: Path, compression: CompressionType) -> None:
+    """Without compression only the checksum tells."""
     file = tmp_path / "bag_0.mcap"
-    write(file, range(1000))
+    write(file, range(1000), compression=compression)
     data = bytearray(file.read_bytes())
     with file.open("rb") as stream:
         summary = make_reader(stream).get_summary()

@@ -141,6 +141,17 @@ def test_a_pause_while_late_does_not_let_the_late_ones_burst_out() -> None:
     assert play.times == TIMES[:2]
 
 
+def test_a_new_rate_while_late_makes_up_for_nothing() -> None:
+    play = Play(TIMES)
+    play.send()
+    play.now = 3 * S  # nothing could be sent meanwhile
+    play.schedule.set_rate(2.0, play.now)
+    play.send()
+    assert play.times == TIMES[:2]
+    play.run(60 * S)
+    assert play.sent[-1][0] == pytest.approx(3 * S + 4.9 * S / 2, abs=100)
+
+
 def test_steps_send_one_by_one_and_only_while_paused() -> None:
     play = Play(TIMES, paused=True)
     play.run(10 * S)
