@@ -22,6 +22,7 @@ FOUNDATION_MODULES = {
     "units",
     "frames",
     "topics",
+    "services",
     "parameters",
     "share",
     "status_line",

@@ -1,26 +1,58 @@
 """What a release must keep in step: the version in every file, and entry points that exist."""
 
 import ast
+import re
+import sys
+from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 from xml.etree import ElementTree
 
+import pytest
+
 import sms_handover
 
-ROOT = Path(__file__).resolve().parent.parent
+from .workspace import ROOT, entry_points
+
+# What package.xml calls what is imported here under another name: rosdep keys and ROS packages, as listed in
+# rosdep/python.yaml and jazzy/distribution.yaml of ros/rosdistro. A module without a key of its own names one
+# that brings it.
+KEYS = {
+    "eigenpy": "pinocchio",
+    "jinja2": "python3-jinja2",
+    "launch": "launch",
+    "launch_ros": "launch_ros",
+    "lz4": "mcap-ros2-support",
+    "matplotlib": "python3-matplotlib",
+    "mcap": "mcap-ros2-support",
+    "mpl_toolkits": "python3-matplotlib",
+    "numpy": "python3-numpy",
+    "pinocchio": "pinocchio",
+    "rosbags": "python3-rosbags-pip",
+    "yaml": "python3-yaml",
+    "zstandard": "mcap-ros2-support",
+}
+# Extras that a user installs with pip: rosdep has no key for them.
+BY_PIP_ONLY = {"playwright", "plotly", "pyarrow"}
+ROS_PACKAGE = re.compile(r"rclpy|rosidl_\w+|ament_index_python|tf2_\w+|\w+_(msgs|srvs|interfaces)")
 
 
 def declared_version(package_xml: Path) -> str | None:
     return ElementTree.parse(package_xml).findtext("version")
 
 
-def entry_points() -> list[str]:
-    """Return every ``name = module:function`` that setup.py lists."""
-    lists = {"USER_COMMANDS", "ROS_EXECUTABLES"}
-    tree = ast.parse((ROOT / "setup.py").read_text(encoding="utf-8"))
-    assignments = [node for node in tree.body if isinstance(node, ast.Assign)]
-    found = [a for a in assignments if isinstance(a.targets[0], ast.Name) and a.targets[0].id in lists]
-    return [entry for assignment in found for entry in ast.literal_eval(assignment.value)]
+def imported_modules() -> Iterator[str]:
+    """Yield the top-level name of every module that the package or its launch files import from elsewhere."""
+    files = [*(ROOT / "sms_handover").rglob("*.py"), *(ROOT / "launch").glob("*.py")]
+    for file in files:
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                yield from (alias.name.partition(".")[0] for alias in node.names)
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                yield node.module.partition(".")[0]
+
+
+OUTSIDE = sorted(set(imported_modules()) - {"sms_handover"} - set(sys.stdlib_module_names))
 
 
 def test_every_file_names_the_same_version() -> None:
@@ -29,7 +61,7 @@ def test_every_file_names_the_same_version() -> None:
 
 
 def test_every_executable_exists() -> None:
-    entries = entry_points()
+    entries = entry_points("USER_COMMANDS", "ROS_EXECUTABLES")
     assert {entry.split(" = ")[0] for entry in entries} >= {"sms-handover", "handover", "plant"}
     for entry in entries:
         module, function = entry.split(" = ")[1].split(":")
@@ -37,3 +69,14 @@ def test_every_executable_exists() -> None:
         assert spec is not None and spec.origin is not None, entry
         tree = ast.parse(Path(spec.origin).read_text(encoding="utf-8"))
         assert function in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}, entry
+
+
+@pytest.mark.parametrize("module", OUTSIDE)
+def test_what_is_imported_is_declared_to_rosdep(module: str) -> None:
+    """``rosdep install`` must bring everything that the code imports."""
+    if module in BY_PIP_ONLY:
+        return
+    key = module if ROS_PACKAGE.fullmatch(module) else KEYS.get(module)
+    assert key is not None, f"{module} is imported, but KEYS in this file names no rosdep key for it"
+    package = ElementTree.parse(ROOT / "package.xml").getroot()
+    assert key in {item.text for tag in ("depend", "exec_depend") for item in package.findall(tag)}

@@ -116,7 +116,7 @@ class ControllerNode(GraphNode[ControllerParameters]):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_node(ControllerNode, args)
+    return run_node(ControllerNode, args, name=CONTROLLER)
 
 
 if __name__ == "__main__":

@@ -85,7 +85,7 @@ def _pose(message: Any, name: str) -> Pose:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_node(IkNode, args)
+    return run_node(IkNode, args, name=IK)
 
 
 if __name__ == "__main__":

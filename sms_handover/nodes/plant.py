@@ -346,7 +346,7 @@ class PlantNode(GraphNode[PlantParameters]):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_node(PlantNode, args)
+    return run_node(PlantNode, args, name=PLANT)
 
 
 if __name__ == "__main__":

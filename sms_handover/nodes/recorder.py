@@ -234,7 +234,7 @@ def _pose(data: bytes) -> Pose:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_node(RecorderNode, args)
+    return run_node(RecorderNode, args, name=RECORDER)
 
 
 if __name__ == "__main__":

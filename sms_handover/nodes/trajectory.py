@@ -173,7 +173,7 @@ def _for_any_plant(parameters: ParameterSet) -> ParameterSet:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_node(TrajectoryNode, args)
+    return run_node(TrajectoryNode, args, name=TRAJECTORY)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """Runs one node as a process: start, spin, orderly end, and one line of text for every error."""
 
+import atexit
 import gc
 import os
 import signal
@@ -23,6 +24,7 @@ EXIT_STOPPED = 130  # the recorder: the bag is whole, but the run was not over w
 
 LAUNCHER_PID = "SMS_HANDOVER_LAUNCHER_PID"  # environment variable, set for the nodes that a launcher starts
 
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _FAST_DDS_FILE = "FASTRTPS_DEFAULT_PROFILES_FILE"  # environment variable that Fast DDS reads
 
 WAIT_S = 0.2  # [s] longest wait for an event, so that a signal is noticed
@@ -35,7 +37,7 @@ class Stop:
         """Install the handlers."""
         self._signalled = False
         self._launcher = int(os.environ.get(LAUNCHER_PID, "0"))
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        for number in _SIGNALS:
             signal.signal(number, self._on_signal)
 
     @property
@@ -65,15 +67,22 @@ def run_node(
 ) -> int:
     """Run the node that ``make`` returns until a signal ends it; return the exit code.
 
-    ``name`` stands before an error as long as there is no node.
+    ``name`` stands before an error as long as there is no node. ``--help`` tells what the node is for.
 
     The executor is only ever used with a timeout: without one, EventsExecutor does not return in
     the wheels of rclpy 7.1.
     """
+    arguments = list(sys.argv if args is None else args)
+    if {"-h", "--help"} & set(arguments[1:]):
+        from sms_handover.ros.help import show_help  # noqa: PLC0415  (loads what no node needs to run)
+
+        show_help(name, make)
+        return EXIT_OK
     stop = Stop()
+    atexit.register(_ignore_signals)
     node = None
     try:
-        _init(list(sys.argv if args is None else args))
+        _init(arguments)
         node = make()
         name = node.get_name()
         executor = EventsExecutor()
@@ -94,8 +103,19 @@ def run_node(
         rclpy.try_shutdown()
 
 
+def _ignore_signals() -> None:
+    """Keep the exit code: a second signal while the interpreter ends would otherwise kill the process."""
+    for number in _SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+
 def _init(args: list[str]) -> None:
     """Start ROS with the arguments of a command line; raises ConfigurationError where it cannot read them."""
+    before_ros = args[1 : args.index("--ros-args")] if "--ros-args" in args else args[1:]
+    if before_ros:
+        raise ConfigurationError(
+            f"unknown argument {before_ros[0]!r}; give a parameter as --ros-args -p NAME:=VALUE, see --help"
+        )
     os.environ.setdefault(_FAST_DDS_FILE, str(config_file("fastdds.xml")))
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)

@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -146,6 +148,40 @@ def test_a_bad_parameter_ends_a_node_with_one_line(
     assert [line for line in lines if "error:" in line] == lines[-1:]
     assert text in lines[-1]
     assert not [path for path in tmp_path.iterdir() if path.name.startswith("handover")]  # no bag was begun
+
+
+def test_an_argument_that_ros_does_not_know_is_refused(capfd: pytest.CaptureFixture[str]) -> None:
+    """A parameter without ``--ros-args -p`` would otherwise change nothing, silently."""
+    assert MAINS["plant"](["plant", "integrator:=midpoint"]) == EXIT_USAGE
+    assert capfd.readouterr().err.startswith("plant: error: unknown argument 'integrator:=midpoint'; give")
+    assert not rclpy.ok()
+
+
+IMPATIENT = """
+from sms_handover.ros.main import RunnableNode, run_node
+
+class Worker(RunnableNode):
+    def __init__(self):
+        super().__init__("worker", start_parameter_services=False)
+
+    def run(self, executor, stop):
+        print("up", flush=True)
+        while not stop.asked:
+            executor.spin_once(timeout_sec=0.01)
+        return 3
+
+raise SystemExit(run_node(Worker, ["worker"]))
+"""
+
+
+def test_a_signal_on_the_way_out_keeps_the_exit_code() -> None:
+    """A terminal and a launcher may both send SIGINT, so that one comes while the interpreter ends."""
+    with subprocess.Popen([sys.executable, "-c", IMPATIENT], stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"up\n"
+        while process.poll() is None:
+            process.send_signal(signal.SIGINT)
+        assert process.returncode == 3
 
 
 @pytest.mark.parametrize("name", list(MAINS))

@@ -1,0 +1,143 @@
+"""The help and the reference of a node tell what the node really has, and their examples work."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from inspect import getdoc
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+from rclpy.parameter import Parameter
+
+from sms_handover.nodes.controller import ControllerNode
+from sms_handover.nodes.ik import IkNode
+from sms_handover.nodes.plant import PlantNode
+from sms_handover.nodes.recorder import RecorderNode
+from sms_handover.nodes.trajectory import TrajectoryNode
+from sms_handover.parameters import build, read_parameter_files
+from sms_handover.ros.graph_node import GraphNode
+from sms_handover.ros.help import EXAMPLES, node_help
+from sms_handover.ros.reference import (
+    ANY_ARM,
+    OWN_GROUPS,
+    groups_of,
+    parameter_rows,
+    qos_text,
+    services_of,
+    topics_of,
+)
+from sms_handover.share import config_file
+from sms_handover.topics import CLOCK, NODES, RUN_STATE, TF, Rate, graph_topics
+
+from .bench import Bench
+
+pytestmark = pytest.mark.ros
+
+GRAPH: dict[str, Callable[[], GraphNode[Any]]] = {
+    "plant": PlantNode,
+    "trajectory": TrajectoryNode,
+    "ik": IkNode,
+    "controller": ControllerNode,
+    "recorder": RecorderNode,
+}
+ROS_OWN = {"/rosout", "/parameter_events"}
+ROS_SERVICES = ("parameter", "type_description")
+
+
+def absolute(names: set[str]) -> set[str]:
+    """Return relative names as they are in the root namespace."""
+    return {name if name.startswith("/") else f"/{name}" for name in names}
+
+
+def expanded(names: set[str]) -> set[str]:
+    """Return the names with the arms of the shipped robot for any arm."""
+    return {name.replace(ANY_ARM, arm) for name in names for arm in ("arm_a", "arm_b")}
+
+
+@pytest.mark.parametrize("name", list(GRAPH))
+def test_the_reference_is_what_the_node_has(
+    name: str, bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every publisher, subscription, service and parameter of the running node is told, and no other."""
+    monkeypatch.chdir(tmp_path)
+    bench.start()
+    node = bench.add(GRAPH[name])
+    published, subscribed = topics_of(name)
+    theirs = node.get_publisher_names_and_types_by_node(name, "/")
+    told = {topic.name: topic.type for topic in published}
+    assert {topic for topic, _ in theirs} - ROS_OWN == absolute(expanded(set(told)))
+    for topic, (type_name,) in theirs:
+        assert topic in ROS_OWN or type_name in told.values()
+    theirs = node.get_subscriber_names_and_types_by_node(name, "/")
+    assert {topic for topic, _ in theirs} - ROS_OWN == absolute(expanded({t.name for t in subscribed}))
+    offered, called = services_of(name)
+    own = {s: t for s, t in node.get_service_names_and_types_by_node(name, "/")}
+    own = {service: types for service, types in own.items() if not any(r in service for r in ROS_SERVICES)}
+    assert own == {f"/{service.relative_name}": [service.type] for service in offered}
+    clients = dict(node.get_client_names_and_types_by_node(name, "/"))
+    clients = {
+        service: types for service, types in clients.items() if not any(r in service for r in ROS_SERVICES)
+    }
+    assert clients == {f"/{service.relative_name}": [service.type] for service in called}
+
+
+@pytest.mark.parametrize("name", list(OWN_GROUPS))
+def test_help_names_everything(name: str) -> None:
+    cls = getattr(import_module(f"sms_handover.nodes.{name}"), name.title().replace("_", "") + "Node")
+    text = node_help(name, cls)
+    assert str(getdoc(cls)) in text
+    rows = [row for group in groups_of(name) for row in parameter_rows(group)]
+    assert len(rows) == len({row.name for row in rows}) > 0
+    for row in rows:
+        assert f"  {row.name} = {row.default}" in text
+    for topic in (*topics_of(name)[0], *topics_of(name)[1]):
+        assert f"  {topic.name}  {topic.type}" in text
+    for service in (*services_of(name)[0], *services_of(name)[1]):
+        assert f"  {service.relative_name}  {service.type}" in text
+    assert all(len(line) <= 120 for line in text.splitlines())
+
+
+@pytest.mark.parametrize("name", list(EXAMPLES))
+def test_examples_are_accepted(name: str) -> None:
+    """The node would take the values, and each differs from the default."""
+    group = OWN_GROUPS[name]
+    defaults = read_parameter_files([config_file(group.file)], group.section)
+    build(group.cls, {**defaults, **EXAMPLES[name]}, name)
+    assert all(defaults[key] != value for key, value in EXAMPLES[name].items())
+
+
+def test_a_node_shows_its_help_without_starting_ros(capfd: pytest.CaptureFixture[str]) -> None:
+    main = import_module("sms_handover.nodes.plant").main
+    assert main(["plant", "--help"]) == 0
+    assert main(["plant", "--ros-args", "-p", "integrator:=nothing", "-h"]) == 0
+    assert not rclpy.ok()
+    assert capfd.readouterr().out == 2 * (node_help("plant", PlantNode) + "\n")
+
+
+def test_a_reader_need_not_take_the_whole_help() -> None:
+    command = [sys.executable, "-u", "-m", "sms_handover.nodes.ik", "--help"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None and process.stderr is not None
+        process.stdout.close()
+        assert (process.wait(), process.stderr.read()) == (0, b"")
+
+
+def test_quality_of_service_is_told_as_it_is() -> None:
+    table = {topic.name: topic for topic in graph_topics([ANY_ARM])}
+    assert qos_text(table[CLOCK]) == "reliable, volatile, keep all"
+    assert table[RUN_STATE].rate is Rate.CHANGE
+    assert qos_text(table[RUN_STATE]) == "reliable, transient local, keep last 100"
+    assert TF not in table and set(NODES) <= set(OWN_GROUPS)
+
+
+def test_types_are_those_that_ros_gives() -> None:
+    """The names of types are those of rclpy for the default values."""
+    for group in OWN_GROUPS.values():
+        defaults = read_parameter_files([config_file(group.file)], group.section)
+        for row in parameter_rows(group):
+            value = defaults[row.name]
+            if value != []:  # an empty list has any type
+                assert Parameter(row.name, value=value).type_.name.lower() == row.type, row
