@@ -82,10 +82,12 @@ setup(
             "matplotlib>=3.10,<4",
             "plotly>=7,<8",  # of it only plotly.js is used
         ],
+        "parquet": ["pyarrow>=18,<27"],
         "test": [
             "mcap-ros2-support>=0.5.7,<1",
             "mypy>=1.15",
             "playwright>=1.50,<2",  # drives a Chromium that the machine has
+            "pyarrow>=18,<27",
             "pytest>=8.4",
             "ruff>=0.6",
             "types-PyYAML",

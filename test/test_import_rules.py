@@ -29,7 +29,7 @@ FOUNDATION_MODULES = {
     "run_data",
 }
 MIDDLE = {"plant", "trajectory", "ik", "control"}
-CORE = {"model", *MIDDLE, "simulation", "bag", "analysis", "scene", "playback", "report"}
+CORE = {"model", *MIDDLE, "simulation", "bag", "analysis", "scene", "playback", "report", "export"}
 EDGE = {"ros", "nodes", "cli"}
 
 # What a layer may import besides itself and the foundation.
@@ -42,6 +42,7 @@ ALLOWED: dict[str, set[str]] = {
     "analysis": {"model", "simulation", "bag", "scene"},
     "scene": {"model", "bag"},
     "playback": {"bag"},
+    "export": {"bag"},
     "report": {"plant", "bag", "analysis", "scene"},
     "ros": CORE,
     "nodes": CORE | {"ros"},

@@ -12,7 +12,7 @@ from mcap.exceptions import McapError
 
 from sms_handover.bag.damage import Damage
 from sms_handover.bag.frames import MAGIC
-from sms_handover.bag.scan import FileScan, ScannedMessage
+from sms_handover.bag.scan import FileScan, Found, ScannedMessage
 from sms_handover.errors import BagError
 
 _CONVERSIONS = {  # by the end of a file's name, what a user can do
@@ -73,17 +73,21 @@ def read_messages(path: Path, topics: Collection[str] | None = None) -> Iterator
     Raises BagError at the first damage.
     """
     for file in bag_files(path):
-        with damage_reported(file):
-            for found in FileScan(file):
-                if isinstance(found, ScannedMessage):
-                    source = found.source
-                    if topics is None or source.topic in topics:
-                        yield RawMessage(source.topic, source.schema.name, *found[1:4])
-                elif isinstance(found, Damage) and not found.of_index:
-                    raise BagError(
-                        f"{file} is damaged: bytes {found.begin} to {found.end}: {found.reason}; "
-                        f"{recover_hint(path)}"
-                    )
+        for found in strict_scan(FileScan(file), path):
+            if isinstance(found, ScannedMessage):
+                source = found.source
+                if topics is None or source.topic in topics:
+                    yield RawMessage(source.topic, source.schema.name, *found[1:4])
+
+
+def strict_scan(scan: FileScan, bag: Path) -> Iterator[Found]:
+    """Yield what is in a file of a bag; raises BagError at the first damage."""
+    with damage_reported(scan.file):
+        for found in scan:
+            if isinstance(found, Damage):
+                where = f"bytes {found.begin} to {found.end}: {found.reason}"
+                raise BagError(f"{scan.file} is damaged: {where}; {recover_hint(bag)}")
+            yield found
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from sms_handover import topics
 from sms_handover.bag.collector import BASE_POSE, BASE_TWIST, EFFORT, POSITION, VELOCITY, RunCollector
 from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.series import Series
+from sms_handover.bag.writer import is_of_ours
 from sms_handover.errors import BagError
 from sms_handover.run_data import Array, RunData, Stamps
 from sms_handover.types import TaskPhase
@@ -83,6 +84,15 @@ def _assemble(collector: RunCollector) -> RunData:
         phases=_last_run(collector.phases),
         grasp_events=tuple(collector.events),
     )
+
+
+def holds_run(info: BagInfo) -> bool:
+    """Tell whether a bag is one of ours and holds one run."""
+    try:
+        find_namespace(info)
+    except BagError:
+        return False
+    return any(map(is_of_ours, info.records))
 
 
 def find_namespace(info: BagInfo) -> str:

@@ -7,6 +7,7 @@ _COMMANDS = {
     "info": "what a bag holds: topics, times, controller, versions, loss ledger",
     "check": "whether a bag is complete, and what is missing",
     "recover": "make a whole bag of a truncated or damaged one",
+    "export": "tables as CSV or Parquet",
 }
 
 

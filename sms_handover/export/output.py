@@ -1,0 +1,50 @@
+"""The tables of an export as they are written to a folder, and what tells of their columns."""
+
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from sms_handover.bag.info import BagInfo
+from sms_handover.export.table import Column, Format, TableFile, kind_text
+
+TABLES_FILE = "tables.json"  # names, kinds and units of all columns
+
+
+class Tables:
+    """The tables of an export as they are written."""
+
+    def __init__(self, folder: Path, file_format: Format) -> None:
+        """Begin without a table."""
+        self.rows: dict[str, int] = {}
+        self.skipped: dict[str, str] = {}
+        self._folder, self._format = folder, file_format
+        self._columns: dict[str, Sequence[Column]] = {}
+        self._topics: dict[str, str] = {}
+
+    def open(self, name: str, columns: Sequence[Column], topic: str = "") -> tuple[str, TableFile]:
+        """Open a table; return the name of its file without suffix too, which is unique."""
+        stem = re.sub(r"[^A-Za-z0-9_.-]+", "_", name.strip("/").replace("/", ".")) or "root"
+        taken = {known.lower() for known in self._columns}
+        while stem.lower() in taken:
+            stem += "_"
+        self._columns[stem], self._topics[stem] = columns, topic
+        self.rows[stem] = 0
+        return stem, self._format.open(stem, columns)
+
+    def describe(self, info: BagInfo) -> None:
+        """Write what every column is."""
+        tables = {
+            f"{stem}{self._format.suffix}": {
+                **({"topic": self._topics[stem]} if self._topics[stem] else {}),
+                "rows": self.rows[stem],
+                "columns": [
+                    {"name": column.name, "kind": kind_text(column.kind), "unit": column.unit}
+                    for column in columns
+                ],
+            }
+            for stem, columns in self._columns.items()
+        }
+        content = {"bag": info.path.name, "tables": tables, "skipped": self.skipped}
+        text = json.dumps(content, indent=1, ensure_ascii=False)
+        (self._folder / TABLES_FILE).write_text(text + "\n", encoding="utf-8")
