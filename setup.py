@@ -17,6 +17,7 @@ ROS_EXECUTABLES = [
     "ik = sms_handover.nodes.ik:main",
     "controller = sms_handover.nodes.controller:main",
     "recorder = sms_handover.nodes.recorder:main",
+    "viewer = sms_handover.nodes.viewer:main",
     "player = sms_handover.nodes.player:main",
     "topic_recorder = sms_handover.nodes.topic_recorder:main",
 ]

@@ -15,6 +15,7 @@ IK = "ik"
 CONTROLLER = "controller"
 RECORDER = "recorder"
 PLAYER = "player"  # stands outside the graph: it plays what was recorded
+VIEWER = "viewer"  # stands outside the graph: it shows what goes on
 TOPIC_RECORDER = "topic_recorder"  # stands outside the graph: it records any topics
 LOOP_NODES = (PLANT, TRAJECTORY, IK, CONTROLLER)
 NODES = (*LOOP_NODES, RECORDER)

@@ -14,6 +14,7 @@ _COMMANDS = {
     "compare": "print recorded runs side by side, with the paper's claims",
     "figures": "draw the paper's figures from recorded runs",
     "report": "write an HTML page on recorded runs: figures, plots, claims, provenance, 3D",
+    "view": "show recorded runs, or a running graph, in 3D in a browser",
     "bag": "look into a bag, check it, recover it, take tables out of it",
     "reproduce": "run a bag's scenario again in one process and compare bit by bit",
     "play": "publish the messages of any MCAP bag again, with keys to control it",

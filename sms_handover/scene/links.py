@@ -4,6 +4,7 @@ import numpy as np
 import pinocchio as pin
 
 from sms_handover.errors import RobotDescriptionError, UnknownNameError
+from sms_handover.frames import tool_frame
 from sms_handover.model.poses import pose_of, pose_row
 from sms_handover.model.robot_model import BASE_NQ
 from sms_handover.types import Array
@@ -20,6 +21,12 @@ class DescribedRobot:
             raise RobotDescriptionError(f"the robot description cannot be read: {error}") from error
         self._frames = [i for i, f in enumerate(self.pin.frames) if f.type == pin.FrameType.BODY]
         self.links: tuple[str, ...] = tuple(self.pin.frames[index].name for index in self._frames)
+
+    @property
+    def arms(self) -> tuple[str, ...]:
+        """Return the arms: every link that is a tool frame belongs to one."""
+        ending = tool_frame("")
+        return tuple(link.removesuffix(ending) for link in self.links if link.endswith(ending))
 
     def poses(self, base_in_world: Array, joint_position: Array, joint_names: tuple[str, ...]) -> Array:
         """Return the pose in ``world`` of every link, (T, L, 7) in the order of ``links``.

@@ -22,19 +22,37 @@ function numbers(text, Type) {
 class Motion {
   constructor(data) {
     this.bodies = data.bodies;
-    this.times = numbers(data.times, Float64Array); // s
+    this.times = numbers(data.times, Float64Array); // s; of these and of the poses the first count are in use
     this.poses = numbers(data.poses, Float32Array); // per instant and body x y z, quaternion x y z w
+    this.count = this.times.length;
     this.other = { position: new THREE.Vector3(), quaternion: new THREE.Quaternion() };
   }
 
   get start() { return this.times[0]; }
 
-  get end() { return this.times[this.times.length - 1]; }
+  get end() { return this.times[this.count - 1]; }
+
+  /** Add instants that have come since. */
+  append(data) {
+    const times = numbers(data.times, Float64Array);
+    const width = this.bodies.length * 7;
+    if (this.count + times.length > this.times.length) {
+      const room = 2 * (this.count + times.length);
+      const [oldTimes, oldPoses] = [this.times, this.poses];
+      this.times = new Float64Array(room);
+      this.poses = new Float32Array(room * width);
+      this.times.set(oldTimes.subarray(0, this.count));
+      this.poses.set(oldPoses.subarray(0, this.count * width));
+    }
+    this.times.set(times, this.count);
+    this.poses.set(numbers(data.poses, Float32Array), this.count * width);
+    this.count += times.length;
+  }
 
   /** The last recorded instant not after t. */
   index(t) {
     let low = 0;
-    let high = this.times.length - 1;
+    let high = this.count - 1;
     while (low < high) {
       const middle = Math.ceil((low + high) / 2);
       if (this.times[middle] <= t) low = middle; else high = middle - 1;
@@ -52,7 +70,7 @@ class Motion {
   at(t, body, position, quaternion) {
     const index = this.index(t);
     this.read(index, body, position, quaternion);
-    if (index + 1 < this.times.length && t > this.times[index]) {
+    if (index + 1 < this.count && t > this.times[index]) {
       const { position: p, quaternion: q } = this.other;
       this.read(index + 1, body, p, q);
       const part = (t - this.times[index]) / (this.times[index + 1] - this.times[index]);
@@ -66,7 +84,7 @@ class Motion {
   path(body) {
     const points = [];
     const rows = [];
-    for (let i = 0; i < this.times.length; i += 1) {
+    for (let i = 0; i < this.count; i += 1) {
       const at = (i * this.bodies.length + body) * 7;
       if (!Number.isNaN(this.poses[at])) {
         points.push(this.poses[at], this.poses[at + 1], this.poses[at + 2]);
@@ -79,33 +97,42 @@ class Motion {
 
 /** A line that is drawn as far as time has come, and faintly to its end. */
 class Trace {
-  constructor({ points, rows }, group, width) {
-    this.rows = rows;
-    this.drawn = points.length >= 6;
-    if (!this.drawn) return;
-    this.past = this.line(points, width, 0.95);
-    this.whole = this.line(points, width * 0.5, 0.28);
+  constructor(motion, body, group) {
+    this.motion = motion;
+    this.body = body;
+    this.past = this.line(TRACE_WIDTH, 0.95);
+    this.whole = this.line(TRACE_WIDTH * 0.5, 0.28);
     group.add(this.whole, this.past);
+    this.lay();
   }
 
-  line(points, width, opacity) {
-    const geometry = new THREE.LineGeometry();
-    geometry.setPositions(points);
+  line(width, opacity) {
     const material = new THREE.LineMaterial({ linewidth: width, transparent: true, opacity, depthWrite: false });
-    const line = new THREE.Line2(geometry, material);
+    const line = new THREE.Line2(new THREE.LineGeometry(), material);
     line.frustumCulled = false;
     return line;
   }
 
+  /** Lay both lines along the path as far as it is known. */
+  lay() {
+    const { points, rows } = this.motion.path(this.body);
+    this.rows = rows;
+    [this.past, this.whole].forEach((line) => {
+      line.visible = rows.length > 1;
+      line.geometry.dispose();
+      line.geometry = new THREE.LineGeometry();
+      if (line.visible) line.geometry.setPositions(points);
+    });
+  }
+
   show(index) {
-    if (!this.drawn) return;
+    if (!this.past.visible) return;
     let count = 0;
     while (count < this.rows.length && this.rows[count] <= index) count += 1;
     this.past.geometry.instanceCount = Math.max(0, count - 1);
   }
 
   colour(value) {
-    if (!this.drawn) return;
     this.past.material.color.set(value);
     this.whole.material.color.set(value);
   }
@@ -128,7 +155,7 @@ class RunBody {
     data.shapes.forEach((shape) => this.addShape(shape));
     this.addDeputy(data.deputy_size);
     this.traces = data.arms.map((arm, index) => this.addArm(arm, index));
-    this.basePath = new Trace(this.motion.path(0), this.traceGroup, TRACE_WIDTH);
+    this.basePath = new Trace(this.motion, 0, this.traceGroup);
     this.drawStart();
   }
 
@@ -190,7 +217,7 @@ class RunBody {
     const ball = new THREE.Mesh(new THREE.SphereGeometry(0.014, 20, 14), new THREE.MeshStandardMaterial({ roughness: 0.6 }));
     frame.add(ball);
     this.painted.push({ role: "target", arm: index, material: ball.material, mesh: ball });
-    return new Trace(this.motion.path(this.body(`${arm}_tool`)), this.traceGroup, TRACE_WIDTH);
+    return new Trace(this.motion, this.body(`${arm}_tool`), this.traceGroup);
   }
 
   /** The outline of the spacecraft where it was at the start: what it has moved by since. */
@@ -229,8 +256,16 @@ class RunBody {
     this.startLines.color.set(colours.start);
     this.startGroup.visible = !ghost;
     [...this.traces, this.basePath].forEach((trace) => {
-      if (trace.drawn) trace.past.material.linewidth = ghost ? TRACE_WIDTH * 0.6 : TRACE_WIDTH;
+      trace.past.material.linewidth = ghost ? TRACE_WIDTH * 0.6 : TRACE_WIDTH;
     });
+  }
+
+  /** Take instants, phases and grasps that have come since. */
+  extend(data) {
+    this.motion.append(data);
+    this.data.phases = data.phases;
+    this.data.events = data.events;
+    [...this.traces, this.basePath].forEach((trace) => trace.lay());
   }
 
   /** Put everything where it was at time t (s). */

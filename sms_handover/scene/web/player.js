@@ -7,8 +7,7 @@ const element = (id) => document.getElementById(id);
 class Player {
   constructor(data) {
     this.runs = data.runs.map((run) => new RunBody(run));
-    this.start = Math.min(...this.runs.map((run) => run.motion.start));
-    this.end = Math.max(...this.runs.map((run) => run.motion.end));
+    this.live = Boolean(data.live); // then the end moves on, and playing goes on at it
     this.t = this.start;
     this.playing = false;
     this.runs.forEach((run) => run.place(this.t));
@@ -18,7 +17,21 @@ class Player {
     this.connect();
     this.arrange(0);
     this.takeTheme();
-    this.seek(Math.min(Math.max(data.start, this.start), this.end));
+    this.seek(this.live ? this.end : data.start);
+    if (this.live) this.play();
+  }
+
+  get start() { return Math.min(...this.runs.map((run) => run.motion.start)); }
+
+  get end() { return Math.max(...this.runs.map((run) => run.motion.end)); }
+
+  /** Take what has come since of a run that goes on; who looks at its end stays there. */
+  extend(data) {
+    const following = this.playing && this.t >= this.end;
+    this.runs[0].extend(data);
+    this.drawBar();
+    if (following) this.seek(this.end); else this.show();
+    this.picture.ask();
   }
 
   /** One over the other, side by side, each alone. */
@@ -35,8 +48,6 @@ class Player {
 
   connect() {
     const time = element("time");
-    time.min = this.start;
-    time.max = this.end;
     time.addEventListener("input", () => { this.pause(); this.seek(Number(time.value)); });
     time.addEventListener("keydown", (event) => this.step(event));
     element("play").addEventListener("click", () => this.toggle());
@@ -57,6 +68,9 @@ class Player {
   drawBar() {
     const { phases, events } = this.runs[0].data;
     const length = this.end - this.start || 1;
+    Object.assign(element("time"), { min: this.start, max: this.end });
+    element("phases").replaceChildren();
+    element("marks").replaceChildren();
     this.phaseButtons = phases.map((phase, index) => {
       const end = index + 1 < phases.length ? phases[index + 1].start : this.end;
       const button = document.createElement("button");
@@ -103,7 +117,7 @@ class Player {
   toggle() { if (this.playing) this.pause(); else this.play(); }
 
   play() {
-    if (this.t >= this.end) this.seek(this.start);
+    if (this.t >= this.end && !this.live) this.seek(this.start);
     this.playing = true;
     this.button();
     let before = performance.now();
@@ -111,8 +125,8 @@ class Player {
       if (!this.playing) return;
       const passed = Math.min(now - before, 250) / 1000; // s; a page that was hidden does not jump
       before = now;
-      this.seek(Math.min(this.end, this.t + passed * Number(element("speed").value)));
-      if (this.t >= this.end) this.pause(); else requestAnimationFrame(tick);
+      if (this.t < this.end) this.seek(this.t + passed * Number(element("speed").value));
+      if (this.t >= this.end && !this.live) this.pause(); else requestAnimationFrame(tick);
     };
     requestAnimationFrame(tick);
   }
@@ -249,12 +263,4 @@ class Player {
 /** A name as people say it: arm_a is Arm A. */
 function label(name) {
   return name.replace(/_/g, " ").replace(/^./, (first) => first.toUpperCase()).replace(/ (\w)$/, (_, last) => ` ${last.toUpperCase()}`);
-}
-
-try {
-  window.player = new Player(JSON.parse(element("data").textContent));
-} catch (error) {
-  element("trouble").hidden = false;
-  element("trouble").textContent = `This browser cannot draw the 3D view: ${error.message}`;
-  throw error;
 }

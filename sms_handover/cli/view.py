@@ -1,0 +1,94 @@
+"""``sms-handover view``: recorded runs, or a running graph, in 3D in a browser."""
+
+import os
+import tempfile
+import webbrowser
+from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from importlib import import_module
+from pathlib import Path
+
+from sms_handover.cli.folders import bag_of
+from sms_handover.errors import BagError, ConfigurationError
+from sms_handover.scene.page import animation_html
+from sms_handover.scene.read import read_scene
+from sms_handover.scene.scene import FRAME_RATE, Scene
+
+
+def add_parser(parser: ArgumentParser) -> None:
+    """Describe the command."""
+    parser.formatter_class = RawDescriptionHelpFormatter
+    parser.description = (
+        "Show runs in 3D. With bags: write one page that plays them and needs no network, and open it;\n"
+        "of several runs the first is solid and the others are translucent over it. With --live: show a\n"
+        "graph that runs, or that 'sms-handover play' plays back, as it goes; it never holds the graph up."
+    )
+    parser.epilog = (
+        "examples:\n"
+        "  sms-handover view runs/nmpc runs/pid\n"
+        "  sms-handover view runs/nmpc -o handover.html\n"
+        "  sms-handover view --live --domain-id 42      and in another shell, before or after:\n"
+        "  sms-handover run --domain-id 42\n\n"
+        "exit codes: 0 shown; 1 the robot cannot be drawn; 2 wrong input"
+    )
+    parser.add_argument("runs", nargs="*", type=Path, metavar="RUN", help="output folder of a run, or a bag")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the page there")
+    parser.add_argument(
+        "--no-browser", action="store_true", help="open no browser, only tell where the page is"
+    )
+    parser.add_argument(
+        "--frame-rate",
+        type=float,
+        metavar="HZ",
+        help=f"frames per s of simulation time (default: {FRAME_RATE:g})",
+    )
+    live = parser.add_argument_group("a running graph")
+    live.add_argument("--live", action="store_true", help="show what goes on instead of what was recorded")
+    live.add_argument(
+        "--port", type=int, metavar="N", help="port of the page (default: 8017; 0: any free one)"
+    )
+    live.add_argument("--domain-id", type=int, metavar="N", help="ROS domain (default: ROS_DOMAIN_ID)")
+
+
+def command(options: Namespace) -> int:
+    """Carry out the command; return the exit code."""
+    if options.live:
+        if options.runs or options.output:
+            raise ConfigurationError("--live shows a running graph: give no RUN and no --output with it")
+        return int(import_module("sms_handover.cli.view_live").follow(options))  # bags need no ROS
+    if not options.runs:
+        raise ConfigurationError("nothing to show: give the output folder of a run, or --live")
+    page = animation_html(
+        _scenes(options), title=f"Handover: {', '.join(p.resolve().name for p in options.runs)}"
+    )
+    file = _write(page, options.output)
+    print(f"{file}: {len(page.encode()) / 1e6:.1f} MB")
+    if not options.no_browser and not webbrowser.open(file.resolve().as_uri()):
+        print("no browser could be opened; open the file in one")
+    return 0
+
+
+def _scenes(options: Namespace) -> dict[str, Scene]:
+    """Return the scenes of the runs, by the names of their folders."""
+    scenes: dict[str, Scene] = {}
+    for path in options.runs:
+        name = path.resolve().name
+        if name in scenes:
+            raise ConfigurationError(f"two runs are named {name!r}; rename one folder")
+        try:
+            scenes[name] = read_scene(bag_of(path), options.frame_rate or FRAME_RATE)
+        except BagError as error:
+            raise ConfigurationError(str(error)) from error  # exit code 2: what was given cannot be used
+    return scenes
+
+
+def _write(page: str, path: Path | None) -> Path:
+    """Write the page to ``path``, or to a file of its own among the temporary ones."""
+    if path is None:
+        handle, name = tempfile.mkstemp(prefix="handover_", suffix=".html")
+        os.close(handle)
+        path = Path(name)
+    try:
+        path.write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise ConfigurationError(f"{path} cannot be written: {error.strerror}") from error
+    return path

@@ -1,0 +1,81 @@
+"""A scene as JSON values, for the scripts of the page."""
+
+import base64
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from sms_handover.frames import DEPUTY
+from sms_handover.model.poses import pose_row
+from sms_handover.run_data import Stamps
+from sms_handover.scene.scene import Scene
+from sms_handover.scene.shapes import Shape
+from sms_handover.types import Array, GraspAction, GraspEvent, TaskPhase
+from sms_handover.units import NS_PER_S, ns_to_seconds
+
+Document = dict[str, object]
+
+
+def scene_document(name: str, scene: Scene) -> Document:
+    """Return a whole scene under the name of its run."""
+    blocks = [scene.link_in_world, scene.deputy_in_world[:, None]]
+    blocks += [scene.target_in_world[arm][:, None] for arm in scene.arms]
+    return {
+        **still_document(name, scene.shapes, scene.links, scene.arms, scene.deputy_size),
+        **moving_document(scene.stamp_ns, np.concatenate(blocks, axis=1)),
+        **task_document(scene.phases, scene.grasp_events),
+    }
+
+
+def still_document(
+    name: str, shapes: Sequence[Shape], links: Sequence[str], arms: Sequence[str], deputy_size: Array
+) -> Document:
+    """Return what does not change: which bodies there are, in the order of their poses, and their shapes."""
+    return {
+        "name": name,
+        "arms": list(arms),
+        "bodies": [*links, DEPUTY, *(f"{arm}/target" for arm in arms)],
+        "shapes": [_shape(shape) for shape in shapes],
+        "deputy_size": deputy_size.tolist(),
+    }
+
+
+def moving_document(stamp_ns: Stamps, poses: Array) -> Document:
+    """Return instants (T,) and the poses of all bodies (T, bodies, 7), these in single precision."""
+    return {"times": _base64(stamp_ns / NS_PER_S, "<f8"), "poses": _base64(poses, "<f4")}
+
+
+def task_document(phases: Sequence[TaskPhase], events: Sequence[GraspEvent]) -> Document:
+    """Return where phases begin, and what came of grasp commands."""
+    return {
+        "phases": [{"name": phase.name, "start": ns_to_seconds(phase.stamp_ns)} for phase in phases],
+        "events": [{"time": ns_to_seconds(event.stamp_ns), "text": _told(event)} for event in events],
+    }
+
+
+def _shape(shape: Shape) -> Document:
+    """Return a shape."""
+    return {
+        "link": shape.link,
+        "kind": shape.kind,
+        "size": shape.size,
+        "pose": pose_row(shape.pose_in_link).tolist(),
+        "rgba": [round(part, 6) for part in shape.rgba],
+    }
+
+
+def _told(event: GraspEvent) -> str:
+    """Return what came of a grasp command in one line."""
+    command = event.command
+    what = f"{command.arm} lets go"
+    if command.action is not GraspAction.RELEASE:
+        what = f"{command.arm} takes {command.grasp_frame}"
+    if command.action is GraspAction.TRANSFER:
+        what += f" from {command.from_arm}"
+    return f"{ns_to_seconds(event.stamp_ns):g} s: {what}: {event.status.value}"
+
+
+def _base64(values: npt.ArrayLike, kind: str) -> str:
+    """Return numbers as base64 of their little-endian bytes."""
+    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

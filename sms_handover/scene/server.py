@@ -1,0 +1,102 @@
+"""Serves a live scene to browsers on this machine: the page, and its frames as server-sent events."""
+
+import json
+from collections.abc import Callable
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from threading import Thread
+from time import sleep
+
+from sms_handover.errors import ConfigurationError
+from sms_handover.scene.document import Document
+from sms_handover.scene.live import LiveScene, Seen
+from sms_handover.scene.page import STREAM, live_html
+
+_HOST = "127.0.0.1"  # a page for this machine alone: nobody is asked who he is
+_LOOK_S = 1.0  # [s] of wall time after which a silent stream sends a sign of life
+
+FindScene = Callable[[], LiveScene | str]  # the scene, or what is still waited for
+
+
+class SceneServer:
+    """Serves from threads of its own until it is closed."""
+
+    def __init__(self, find: FindScene, port: int, title: str) -> None:
+        """Begin to serve on ``port``, 0 for any free one; raises ConfigurationError if it is taken."""
+        page = live_html(title=title).encode()
+
+        class Handler(_Handler):
+            """Answers for this server."""
+
+            scene = staticmethod(find)
+            content = page
+
+        try:
+            self._server = ThreadingHTTPServer((_HOST, port), Handler)
+        except OSError as error:
+            raise ConfigurationError(
+                f"port {port} cannot be served: {error.strerror}; choose another, 0 takes any free one"
+            ) from error
+        self._server.daemon_threads = True
+        self.address = f"http://{_HOST}:{self._server.server_port}/"
+        Thread(target=self._server.serve_forever, daemon=True).start()
+
+    def close(self) -> None:
+        """Serve no longer."""
+        self._server.shutdown()
+        self._server.server_close()
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """Answers the two requests there are."""
+
+    scene: FindScene
+    content: bytes
+
+    def do_GET(self) -> None:
+        """Send the page, or frames as they come."""
+        if self.path == "/":
+            self._head("text/html; charset=utf-8")
+            self.wfile.write(self.content)
+        elif self.path == f"/{STREAM}":
+            self._head("text/event-stream")
+            try:
+                self._stream()
+            except OSError:  # the browser has gone
+                return
+        else:
+            self.send_error(404)
+
+    def log_message(self, format: str, *arguments: object) -> None:
+        """Say nothing: requests are no news."""
+
+    def _head(self, kind: str) -> None:
+        """Begin an answer."""
+        self.send_response(200)
+        self.send_header("Content-Type", kind)
+        self.send_header("Cache-Control", "no-store")
+        self.end_headers()
+
+    def _stream(self) -> None:
+        """Send what is new, whenever something is."""
+        before, seen = None, Seen()
+        while True:
+            scene = self.scene()
+            if isinstance(scene, str):
+                self._send("waiting", {"text": scene})
+                sleep(_LOOK_S)
+                continue
+            if scene is not before:
+                before, seen = scene, Seen()
+            news = scene.news(seen, _LOOK_S)
+            if news is None:
+                self._send("waiting", {"text": "" if seen.frames else "Waiting for a run to begin"})
+                continue
+            document, now = news
+            self._send("scene" if "shapes" in document else "frames", document)
+            seen = now
+
+    def _send(self, event: str, document: Document) -> None:
+        """Send one event."""
+        text = json.dumps(document, allow_nan=False, separators=(",", ":"))
+        self.wfile.write(f"event: {event}\ndata: {text}\n\n".encode())
+        self.wfile.flush()

@@ -1,0 +1,169 @@
+"""A live scene tells everybody who looks what the whole one would, each instant once."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from threading import Thread
+from typing import Any
+from urllib.error import HTTPError
+from urllib.request import urlopen
+
+import numpy as np
+import pytest
+
+from sms_handover.errors import ConfigurationError
+from sms_handover.run_data import RunData
+from sms_handover.scene.document import scene_document
+from sms_handover.scene.live import LiveScene, Seen
+from sms_handover.scene.page import STREAM
+from sms_handover.scene.scene import Scene, make_scene
+from sms_handover.scene.server import SceneServer
+from sms_handover.simulation.scenario import Scenario
+from sms_handover.simulation.simulate import simulate
+
+from .conftest import MakeScenario
+from .scene_documents import frames, play, times
+
+PATIENCE_S = 60.0  # s of wall time after which a wait has failed
+
+
+@pytest.fixture
+def scenario(make_scenario: MakeScenario) -> Scenario:
+    return make_scenario(common={"duration": 0.6})
+
+
+@pytest.fixture
+def run(scenario: Scenario) -> RunData:
+    return simulate(scenario)
+
+
+@pytest.fixture
+def scene(scenario: Scenario, run: RunData) -> Scene:
+    return make_scene(run, scenario.robot.urdf, scenario.schedule.deputy.size)
+
+
+@pytest.fixture
+def live(scenario: Scenario) -> LiveScene:
+    return LiveScene(scenario.robot.urdf, scenario.schedule.deputy.size)
+
+
+def test_in_the_end_it_is_the_scene_of_the_run(live: LiveScene, run: RunData, scene: Scene) -> None:
+    play(live, run, scene)
+    news = live.news(Seen(), 0.0)
+    assert news is not None
+    expected = scene_document("live", replace(scene, grasp_events=()))
+    assert json.loads(json.dumps(news[0])) == json.loads(json.dumps(expected))
+
+
+def test_what_is_new_is_told_once(live: LiveScene, run: RunData, scene: Scene) -> None:
+    play(live, run, scene, slice(0, 5))
+    first = live.news(Seen(), 0.0)
+    assert first is not None and "shapes" in first[0]
+    assert live.news(first[1], 0.0) is None
+    play(live, run, scene, slice(5, 8))
+    second = live.news(first[1], 0.0)
+    assert second is not None and "shapes" not in second[0]
+    told = np.concatenate([times(first[0]), times(second[0])])
+    assert np.array_equal(told, scene.stamp_ns[:8] / 1e9)
+
+
+def test_instants_between_frames_are_left_out(scenario: Scenario, run: RunData, scene: Scene) -> None:
+    slow = LiveScene(scenario.robot.urdf, scenario.schedule.deputy.size, frame_rate=5.0)
+    play(slow, run, scene)
+    news = slow.news(Seen(), 0.0)
+    assert news is not None
+    assert times(news[0]).tolist() == [0.0, 0.2, 0.4, 0.6]
+
+
+def test_a_stamp_that_goes_back_begins_another_run(live: LiveScene, run: RunData, scene: Scene) -> None:
+    play(live, run, scene)
+    before = live.news(Seen(), 0.0)
+    assert before is not None
+    live.tell(scene.grasp_events[0])
+    play(live, run, scene, slice(0, 2))
+    again = live.news(before[1], 0.0)
+    assert again is not None and "shapes" in again[0]
+    assert times(again[0]).tolist() == (scene.stamp_ns[:2] / 1e9).tolist()
+    assert again[0]["events"] == []
+    assert [phase["name"] for phase in again[0]["phases"]] == ["approach"]  # type: ignore[attr-defined]
+
+
+def test_who_waits_is_woken(live: LiveScene, run: RunData, scene: Scene) -> None:
+    told: list[Any] = []
+    waiting = Thread(target=lambda: told.append(live.news(Seen(), PATIENCE_S)))
+    waiting.start()
+    live.add(frames(run, scene)[0])
+    waiting.join(PATIENCE_S)
+    assert told and told[0] is not None and told[0][1].frames == 1
+
+
+def test_a_long_run_keeps_its_newest_frames(
+    live: LiveScene, run: RunData, scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sms_handover.scene.live._MOST_FRAMES", 8)
+    play(live, run, scene, slice(0, 8))
+    seen = live.news(Seen(), 0.0)
+    assert seen is not None
+    play(live, run, scene, slice(8, 9))
+    news = live.news(seen[1], 0.0)
+    assert news is not None and "shapes" in news[0]
+    assert times(news[0]).tolist() == (scene.stamp_ns[4:9] / 1e9).tolist()
+
+
+@pytest.mark.parametrize("frame_rate", [0.0, -5.0, float("nan")])
+def test_a_rate_that_is_not_positive_is_refused(scenario: Scenario, frame_rate: float) -> None:
+    with pytest.raises(ConfigurationError, match=r"frame rate is .* 1/s, it must be positive"):
+        LiveScene(scenario.robot.urdf, scenario.schedule.deputy.size, frame_rate)
+
+
+# Served
+
+
+@pytest.fixture
+def server(live: LiveScene) -> Iterator[SceneServer]:
+    serving = SceneServer(lambda: live, 0, "a live run")
+    yield serving
+    serving.close()
+
+
+def events(stream: Any) -> Iterator[tuple[str, Any]]:
+    """Yield name and data of server-sent events."""
+    while True:
+        name, data, _ = (stream.readline().decode().rstrip("\n") for _ in range(3))
+        yield name.removeprefix("event: "), json.loads(data.removeprefix("data: "))
+
+
+def test_a_stream_begins_with_the_scene_and_goes_on_with_frames(
+    server: SceneServer, live: LiveScene, run: RunData, scene: Scene
+) -> None:
+    play(live, run, scene, slice(0, 3))
+    with urlopen(server.address + STREAM, timeout=PATIENCE_S) as stream:
+        assert stream.headers["Content-Type"] == "text/event-stream"
+        coming = events(stream)
+        name, document = next(coming)
+        assert name == "scene" and len(times(document)) == 3
+        live.add(frames(run, scene)[3])
+        name, document = next(event for event in coming if event[0] != "waiting")
+        assert name == "frames" and times(document).tolist() == [scene.stamp_ns[3] / 1e9]
+
+
+def test_the_page_is_there_and_nothing_else(server: SceneServer) -> None:
+    with urlopen(server.address, timeout=PATIENCE_S) as answer:
+        assert b"<title>a live run</title>" in answer.read()
+    with pytest.raises(HTTPError, match="404"):
+        urlopen(server.address + "etc/passwd", timeout=PATIENCE_S)
+
+
+def test_as_long_as_there_is_no_scene_it_says_what_is_missing() -> None:
+    server = SceneServer(lambda: "waiting for the robot", 0, "")
+    try:
+        with urlopen(server.address + STREAM, timeout=PATIENCE_S) as stream:
+            assert next(events(stream)) == ("waiting", {"text": "waiting for the robot"})
+    finally:
+        server.close()
+
+
+def test_a_port_that_is_taken_is_named(server: SceneServer, live: LiveScene) -> None:
+    port = int(server.address.rstrip("/").rpartition(":")[2])
+    with pytest.raises(ConfigurationError, match=f"port {port} cannot be served: .* choose another"):
+        SceneServer(lambda: live, port, "")

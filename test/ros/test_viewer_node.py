@@ -1,0 +1,80 @@
+"""The viewer shows what the graph publishes, and the graph does not wait for it."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sms_handover.bag.decode import pose_values
+from sms_handover.bag.message_types import MessageTypes
+from sms_handover.bag.stamp import stamp_ns
+from sms_handover.nodes.viewer import ViewerNode
+from sms_handover.scene.live import LiveScene, Seen
+from sms_handover.topics import DEPUTY_POSE, target_pose, tool_pose
+
+from ..core.scene_documents import poses, times
+from .bench import Bench
+from .graph import ARMS, Graph
+from .short_handover import END_S
+
+pytestmark = pytest.mark.ros
+
+QUIET: dict[str, object] = {"port": 0, "browser": False, "frame_rate": 50.0}
+TYPES = MessageTypes()
+
+
+@pytest.fixture
+def graph(bench: Bench) -> Graph:
+    return Graph(bench, {"viewer": QUIET})
+
+
+def shown(viewer: ViewerNode) -> Any:
+    """Return all that the viewer shows; None as long as there is nothing."""
+    scene = viewer.find_scene()
+    news = scene.news(Seen(), 0.0) if isinstance(scene, LiveScene) else None
+    return news and news[0]
+
+
+def heard(graph: Graph, topic: str) -> dict[float, np.ndarray]:
+    """Return the poses that were published, by their time in s."""
+    kind = "geometry_msgs/msg/PoseStamped"
+    messages = [(stamp_ns(data), TYPES.deserialize(data, kind)) for data in graph.heard[topic]]
+    return {stamp / 1e9: np.array(pose_values(message)) for stamp, message in messages}
+
+
+def test_it_shows_every_body_where_it_was_published(graph: Graph) -> None:
+    viewer = graph.bench.add(ViewerNode)
+    assert viewer.find_scene() == "Waiting for /robot_description and /deputy/marker"
+    graph.run()
+    graph.bench.until(lambda: shown(viewer) and len(shown(viewer)["events"]) == 2, "both grasps")
+    document = shown(viewer)
+    viewer.server.close()
+    bodies = document["bodies"]
+    drawn = dict(zip(times(document).tolist(), poses(document, len(bodies)), strict=True))
+    assert 0 < max(drawn) <= END_S
+    topics = {"deputy": DEPUTY_POSE}
+    for arm in ARMS:
+        topics |= {f"{arm}_tool": tool_pose(arm), f"{arm}/target": target_pose(arm)}
+    for body, topic in topics.items():
+        published = heard(graph, topic)
+        for time, rows in drawn.items():
+            assert np.abs(rows[bodies.index(body)][:3] - published[time][:3]).max() < 1e-6, body
+    assert document["deputy_size"] == [0.1, 0.34, 0.1]
+
+
+def test_who_comes_late_sees_the_robot_and_what_came_of_the_grasps(graph: Graph) -> None:
+    graph.run()
+    viewer = graph.bench.add(ViewerNode)
+    graph.bench.until(lambda: isinstance(viewer.find_scene(), LiveScene), "robot and deputy")
+    viewer.server.close()
+
+
+def test_the_graph_ends_while_a_viewer_takes_nothing(graph: Graph, tmp_path: Path) -> None:
+    """Its subscriptions are there, but nobody handles what comes: the loop must not wait for them."""
+    viewer = ViewerNode()  # never spun
+    try:
+        graph.run()
+    finally:
+        viewer.server.close()
+        viewer.destroy_node()
