@@ -43,7 +43,11 @@ _GLANCE = QoSProfile(  # a slow viewer loses messages; it never holds the graph 
 
 
 class ViewerNode(RunnableNode):
-    """Shows a graph that runs or is played back in a browser; nothing in the graph waits for it."""
+    """Shows a graph that runs or is played back in a browser; nothing in the graph waits for it.
+
+    It listens to robot_description, deputy/marker, the sampled states, deputy/pose, the target poses,
+    task/phase and task/grasp_event, best effort where they are many.
+    """
 
     def __init__(self) -> None:
         """Serve the page; raises ConfigurationError on a bad parameter or a port that is taken."""

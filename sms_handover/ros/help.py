@@ -26,6 +26,7 @@ from sms_handover.topics import (
     RECORDER,
     TOPIC_RECORDER,
     TRAJECTORY,
+    VIEWER,
     Topic,
 )
 
@@ -43,6 +44,7 @@ EXAMPLES: dict[str, dict[str, object]] = {
     RECORDER: {"folder": "runs/mine", "record_all": False},
     PLAYER: {"bag": "runs/nmpc/bag", "rate": 2.0},
     TOPIC_RECORDER: {"topics": ["/joint_states", "/tf"]},
+    VIEWER: {"port": 8080, "frame_rate": 50.0},
 }
 
 

@@ -14,6 +14,7 @@ from sms_handover.parameters import EVERY_NODE, ParameterSpec, read_parameter_fi
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.playback.parameters import PlayerParameters
 from sms_handover.ros.qos import profile_of, stored
+from sms_handover.scene.parameters import ViewerParameters
 from sms_handover.services import SERVICES, Service
 from sms_handover.share import config_file
 from sms_handover.simulation.parameters import CommonParameters
@@ -26,6 +27,7 @@ from sms_handover.topics import (
     RECORDER,
     TOPIC_RECORDER,
     TRAJECTORY,
+    VIEWER,
     Topic,
     graph_topics,
 )
@@ -77,6 +79,7 @@ OWN_GROUPS = {
         RECORDER: RecorderParameters,
         PLAYER: PlayerParameters,
         TOPIC_RECORDER: TopicRecorderParameters,
+        VIEWER: ViewerParameters,
     }.items()
 }
 
