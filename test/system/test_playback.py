@@ -147,7 +147,8 @@ def test_record_asks_what_to_record(tmp_path: Path) -> None:
 def test_record_ends_by_itself_and_takes_what_was_asked_for(tmp_path: Path) -> None:
     foreign_bag(tmp_path / "robot")
     with running("play", "robot", "--loop", cwd=tmp_path) as player:
-        done = sms_handover("record", "--topics", "imu", "-o", "again", "--duration", "3", cwd=tmp_path)
+        player.until(lambda: "rate 1.00" in player.text, "the player")
+        done = sms_handover("record", "--topics", "imu", "-o", "again", "--duration", "8", cwd=tmp_path)
         assert done.code == 0, done
         assert player.process.poll() is None
     assert list(by_topic(tmp_path / "again")) == ["/imu"]
