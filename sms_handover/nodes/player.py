@@ -1,16 +1,13 @@
 """The player node."""
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from time import monotonic, monotonic_ns
-from typing import Any
 
 from rclpy.duration import Duration
 from rclpy.executors import Executor
 from rosgraph_msgs.msg import Clock
-from sms_handover_interfaces.srv import Seek, SetRate
-from std_srvs.srv import Trigger
 
 from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.errors import BagError, ConfigurationError, GraphError
@@ -21,10 +18,10 @@ from sms_handover.playback.report import closing_line, progress_line
 from sms_handover.playback.schedule import PlaybackOptions, PlaybackSchedule
 from sms_handover.playback.source import PlaybackSource, span_of
 from sms_handover.ros.bag_publishers import BagPublisher, make_publishers, without_subscriber
-from sms_handover.ros.convert import stamp_ns_of, time_message
+from sms_handover.ros.convert import time_message
 from sms_handover.ros.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, RunnableNode, Stop, run_node
 from sms_handover.ros.parameters import declare, refuse_unknown
-from sms_handover.ros.qos import LOSSLESS
+from sms_handover.ros.playback_services import offer_services
 from sms_handover.status_line import StatusLine
 from sms_handover.topics import CLOCK, PLAYER
 from sms_handover.units import NS_PER_S
@@ -39,6 +36,8 @@ _QUIET_S = 0.5  # [s] of wall time without a new subscription after which discov
 _DISCOVERY_S = 5.0  # [s] of wall time at most to wait for those that are there already
 _LOOK_S = 0.05  # [s] of wall time between two looks at who has subscribed
 _STUCK_S = 5.0  # [s] of wall time after which a subscriber that takes nothing is spoken of
+_STOPPED_ACK_S = 1.0  # [s] of wall time to wait for confirmation when asked to stop
+_CLOCK_DEPTH = 10  # [messages] of a generated clock kept for a subscriber; an old time is of no use to it
 _ACK_STEP = Duration(seconds=0.1)  # of wall time to wait for confirmation at once
 
 
@@ -65,13 +64,13 @@ class PlayerNode(RunnableNode):
         )
         start = PlaybackOptions(options.rate, options.start_paused, options.loop, options.read_ahead)
         self._schedule = PlaybackSchedule(self._source.read, self._source.span, start, monotonic_ns())
-        self._clock_outlet = self.create_publisher(Clock, CLOCK, LOSSLESS) if options.clock else None
+        self._clock_outlet = self.create_publisher(Clock, CLOCK, _CLOCK_DEPTH) if options.clock else None
         if self._clock_outlet:
             self.create_timer(1.0 / options.clock, self._publish_clock)
         self._line = StatusLine()
         self._refused_since = 0.0
         self._ended = False
-        self._make_services()
+        offer_services(self, self._schedule, self._stop)
 
     def run(self, executor: Executor, stop: Stop) -> int:
         """Play to the end or until asked to stop; return the exit code."""
@@ -91,14 +90,16 @@ class PlayerNode(RunnableNode):
                 if self._line.due:
                     self._line.show(progress_line(self._schedule, self._source.span, monotonic_ns()))
             now_ns = monotonic_ns()
+            self._publish_clock()
             self._line.show(progress_line(self._schedule, self._source.span, now_ns))
             self._line.stay()
             print(closing_line(self._schedule, now_ns))
             missing = self._unconfirmed(stop)
         if missing:
             print(f"not confirmed by a subscriber of: {', '.join(missing)}", file=sys.stderr)
-            return EXIT_LOSS
-        return EXIT_STOPPED if stop.asked else EXIT_OK
+        if stop.asked:
+            return EXIT_STOPPED
+        return EXIT_LOSS if missing else EXIT_OK
 
     # The start
 
@@ -181,11 +182,12 @@ class PlayerNode(RunnableNode):
 
     def _unconfirmed(self, stop: Stop) -> list[str]:
         """Wait until everything has been confirmed; return the topics where it has not."""
-        deadline = monotonic() + self.parameters.ack_timeout
+        asked = stop.asked
+        deadline = monotonic() + (_STOPPED_ACK_S if asked else self.parameters.ack_timeout)
         left = list(self._outlets.values())
         while left:
             left = [item for item in left if not item.confirmed(_ACK_STEP)]
-            if stop.asked or monotonic() > deadline:
+            if monotonic() > deadline or stop.asked != asked:
                 break
         return [item.topic_name for item in left]
 
@@ -202,62 +204,9 @@ class PlayerNode(RunnableNode):
             factor = _FASTER if key is Key.UP else 1.0 / _FASTER
             schedule.set_rate(schedule.clock.rate * factor, now_ns)
 
-    def _make_services(self) -> None:
-        """Make the services, named as those of rosbag2's player."""
-        simple: dict[str, Callable[[], str]] = {
-            "pause": lambda: self._now(self._schedule.pause),
-            "resume": lambda: self._now(self._schedule.resume),
-            "toggle_paused": lambda: self._now(self._schedule.toggle),
-            "play_next": self._play_next,
-            "stop": self._stop,
-        }
-        for name, act in simple.items():
-            self.create_service(Trigger, f"~/{name}", _answering(act))
-        self.create_service(SetRate, "~/set_rate", self._on_set_rate)
-        self.create_service(Seek, "~/seek", self._on_seek)
-
-    def _now(self, act: Callable[[int], None]) -> str:
-        """Do something at the present time; nothing can go wrong."""
-        act(monotonic_ns())
-        return ""
-
-    def _play_next(self) -> str:
-        """Send one message; return why not if that is not possible."""
-        return "" if self._schedule.step() else "only a playback that is paused, and not at its end, can step"
-
-    def _stop(self) -> str:
+    def _stop(self) -> None:
         """End the playback."""
         self._ended = True
-        return ""
-
-    def _on_set_rate(self, request: Any, response: Any) -> Any:
-        """Change the rate."""
-        return _told(response, lambda: self._schedule.set_rate(request.rate, monotonic_ns()))
-
-    def _on_seek(self, request: Any, response: Any) -> Any:
-        """Go on from another time."""
-        return _told(response, lambda: self._schedule.seek(stamp_ns_of(request.time), monotonic_ns()))
-
-
-def _answering(act: Callable[[], str]) -> Callable[[Any, Any], Any]:
-    """Return the callback of a Trigger service; ``act`` returns why it failed, or ''."""
-
-    def callback(request: Any, response: Any) -> Any:
-        response.message = act()
-        response.success = not response.message
-        return response
-
-    return callback
-
-
-def _told(response: Any, act: Callable[[], None]) -> Any:
-    """Return an answer that tells whether something could be done."""
-    try:
-        act()
-        response.success = True
-    except ConfigurationError as error:
-        response.message = str(error)
-    return response
 
 
 def _known(info: BagInfo) -> str:

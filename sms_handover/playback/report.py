@@ -25,13 +25,12 @@ def progress_line(schedule: PlaybackSchedule, span: TimeSpan, now_ns: int) -> st
 
 
 def closing_line(schedule: PlaybackSchedule, now_ns: int) -> str:
-    """Return what has been played, and whether the rate was kept."""
+    """Return what has been played and how late it was, with the achieved rate if that matters."""
     text = f"{schedule.sent_count} messages sent in {ns_to_seconds(schedule.clock.ran_ns(now_ns)):.2f} s"
     lag_ns = schedule.largest_lag_ns
     if lag_ns <= _PROMPT_NS:
         return f"{text}, none later than {ns_to_seconds(lag_ns) * 1000:.0f} ms"
     return (
-        f"{text}: the rate of {schedule.clock.rate:g} could not be kept, achieved was "
-        f"{schedule.achieved_rate(now_ns):.2f}; messages were up to {ns_to_seconds(lag_ns):.2f} s late, none"
-        " was left out"
+        f"{text}, up to {ns_to_seconds(lag_ns):.2f} s late: achieved rate "
+        f"{schedule.achieved_rate(now_ns):.2f}, asked {schedule.clock.rate:g}; none was left out"
     )
