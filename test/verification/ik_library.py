@@ -11,10 +11,10 @@ import mink
 import mujoco
 import numpy as np
 
+from benchmarks.mujoco_model import rotation_matrix, to_mjcf
 from sms_handover.frames import tool_frame
 from sms_handover.model.assembly import RobotDescription
 from sms_handover.types import Array, Pose
-from test.verification.mujoco_model import rotation_matrix, to_mjcf
 
 _DAMPING = 1e-6  # [-] the same constant part as ours
 _ERROR_DAMPING = 1.0  # [-] times the squared error, as in the examples of mink; ours: one half

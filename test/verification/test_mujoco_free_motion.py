@@ -13,13 +13,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from benchmarks.mujoco_model import MujocoRobot, State, apart, order
 from sms_handover.model.conserved import physics_receipt
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.integrators import TABLEAUS, LieGroupIntegrator
 from sms_handover.types import Array
 from test.verification.conftest import Record, Table
-from test.verification.mujoco_model import MujocoRobot, State, apart, order
 
 _MOTIONS = 24
 _TIME = 1.0  # [s]

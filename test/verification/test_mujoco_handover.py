@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from benchmarks.mujoco_model import MujocoRobot, State, apart, order
 from sms_handover.model.conserved import physics_receipt
 from sms_handover.model.reduced import base_twist_per_joint_rate, reduced_dynamics
 from sms_handover.run_data import RunData
@@ -21,7 +22,6 @@ from sms_handover.simulation.wiring import make_plant
 from sms_handover.types import Array, JointCommand
 from sms_handover.units import ns_to_seconds
 from test.verification.conftest import Record, Table
-from test.verification.mujoco_model import MujocoRobot, State, apart, order
 
 _EPS = float(np.finfo(float).eps)
 _ASKED = 1e-8  # [m, rad] agreement that is asked for

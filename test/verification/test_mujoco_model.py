@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from benchmarks.mujoco_model import MujocoRobot, rotation_matrix
 from sms_handover.model.assembly import RobotDescription
 from sms_handover.model.conserved import physics_receipt
 from sms_handover.model.description import load_robot
@@ -18,7 +19,6 @@ from sms_handover.model.parts import Inertia, JointDescription, Origin
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import Array, Pose
 from test.verification.conftest import Record
-from test.verification.mujoco_model import MujocoRobot, rotation_matrix
 
 _STATES = 100
 _TURN = (0.3, -0.5, 0.7)  # [rad] about all three axes, so that their order counts

@@ -1,0 +1,166 @@
+"""How fast the handover runs against other engines, and how precise each is for the work."""
+
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from time import perf_counter
+
+import matplotlib
+
+matplotlib.use("svg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+from benchmarks.contestants import InDrake, InMujoco, Ours
+from benchmarks.handover_task import Contestant, HandoverTask, State
+from benchmarks.machine import versions
+from benchmarks.mujoco_model import apart
+from benchmarks.results import FIGURES, Result, Table, publish, row
+from sms_handover.model.conserved import physics_receipt
+from sms_handover.plant.integrators import TABLEAUS, Tableau
+from sms_handover.simulation.scenario import load_scenario
+from sms_handover.simulation.simulate import simulate
+
+FIGURE = "work_precision.svg"
+REFERENCE_STEPS = 4  # per tick: what is then left of the error is rounding
+EULER = Tableau(1, ((),), (0,), ((1.0,),))
+KUTTA = Tableau(3, ((), (1 / 3,), (0.0, 2 / 3)), (0, 0, 0), ((1 / 3, 0.0, 0.0), (-1 / 12, 0.0, 3 / 4)))
+Point = tuple[float, float, str]  # us per tick, error in rad, name
+_MARKS = {"ours": "o", "MuJoCo": "s", "Drake": "^"}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One engine with one integrator and a number of steps per tick."""
+
+    engine: str
+    scheme: str
+    steps: int
+    make: Callable[[HandoverTask], Contestant]
+
+    @property
+    def name(self) -> str:
+        """Who it is, for tables."""
+        return f"{self.engine}, {self.scheme}" + (f", {self.steps} steps per tick" if self.steps > 1 else "")
+
+
+@dataclass
+class Course:
+    """How a case went through the task: wall time per reference period in s, and its states on the way."""
+
+    seconds: list[float]
+    states: list[State]
+
+
+def cases() -> list[Case]:
+    """Return who takes part; the first is the shipped one."""
+    ours = [
+        ("order 4 (rk4)", TABLEAUS["rk4"], 1),
+        ("order 3", KUTTA, 1),
+        ("order 2 (midpoint)", TABLEAUS["midpoint"], 1),
+        ("order 2 (midpoint)", TABLEAUS["midpoint"], 4),
+        ("order 1 (Euler)", EULER, 1),
+    ]
+    in_mujoco = [("RK4", 1), ("EULER", 1), ("EULER", 4), ("IMPLICITFAST", 1)]
+    in_drake = [("runge_kutta3", 1), ("runge_kutta5", 1), ("semi_explicit_euler", 1)]
+    return [
+        *(Case("ours", name, n, partial(Ours, tableau=tableau, steps=n)) for name, tableau, n in ours),
+        *(Case("MuJoCo", name, n, partial(InMujoco, integrator=name, steps=n)) for name, n in in_mujoco),
+        *(Case("Drake", name, n, partial(InDrake, scheme=name, steps=n)) for name, n in in_drake),
+    ]
+
+
+def race(task: HandoverTask, contestants: Mapping[str, Contestant]) -> dict[str, Course]:
+    """Let all go through the task, taking turns each reference period."""
+    courses = {name: Course([], [task.start]) for name in contestants}
+    for index in range(len(task.references) - 1):  # the last one is only answered
+        for name, contestant in contestants.items():
+            start = perf_counter()
+            contestant.period(index)
+            courses[name].seconds.append(perf_counter() - start)
+            courses[name].states.append(contestant.state)
+    return courses
+
+
+def precision(task: HandoverTask, course: Course, exact: Course) -> tuple[float, float, float]:
+    """Return the largest error of the joints in rad and of the base in m or rad, and the momentum gained."""
+    errors = np.array([apart(a, b) for a, b in zip(course.states, exact.states, strict=True)])
+    momenta = [physics_receipt(task.scenario.robot, *state).angular_momentum for state in course.states[::10]]
+    return float(errors[:, 0].max()), float(errors[:, 1:].max()), float(np.linalg.norm(momenta, axis=1).max())
+
+
+def draw(points: Mapping[str, list[Point]]) -> None:
+    """Draw wall time per tick against the error of the joints."""
+    figure, axes = plt.subplots(figsize=(7.0, 4.5))
+    for engine, found in points.items():
+        axes.loglog([x for x, _, _ in found], [y for _, y, _ in found], _MARKS[engine], label=engine)
+        for x, y, name in found:
+            axes.annotate(name, (x, y), textcoords="offset points", xytext=(5, 4), fontsize=7)
+    axes.set(
+        xlabel="wall time per tick of 1 ms, loop included [us]",
+        ylabel="largest error of a joint in 60 s [rad]",
+    )
+    axes.grid(True, which="major", alpha=0.3)
+    axes.legend()
+    FIGURES.mkdir(parents=True, exist_ok=True)
+    figure.savefig(FIGURES / FIGURE, metadata={"Date": None}, bbox_inches="tight")
+
+
+def compare(
+    task: HandoverTask, every: Sequence[Case], courses: Mapping[str, Course]
+) -> tuple[Table, dict[str, list[Point]]]:
+    """Return the table, and the points of the diagram by engine."""
+    rows, points = [], defaultdict(list)
+    ours = np.array(courses[every[0].name].seconds)
+    for case in every:
+        course = courses[case.name]
+        per_tick = float(np.median(course.seconds)) / task.scenario.parameters.common.ticks_per_reference
+        ratio = float(np.median(np.array(course.seconds) / ours))
+        errors = precision(task, course, courses["exact"])
+        shown = (f"{error:.1e}" for error in errors)
+        rows.append(row(case.name, 1e6 * per_tick, task.tick_s / per_tick, ratio, *shown))
+        points[case.engine].append((1e6 * per_tick, errors[0], f"{case.scheme} x{case.steps}"))
+    heading = ("engine and integrator", "us per tick", "x real time", "time over ours", "joints [rad]",
+               "base [m, rad]", "angular momentum [kg m^2/s]")  # fmt: skip
+    return Table(heading, rows), points
+
+
+def main() -> None:
+    """Measure and publish."""
+    matplotlib.rcParams.update({"svg.hashsalt": "sms_handover", "svg.fonttype": "none"})
+    scenario = load_scenario({"controller": {"law": "nmpc"}})
+    start = perf_counter()
+    run = simulate(scenario)
+    whole = perf_counter() - start
+    task = HandoverTask.of(scenario, run)
+    every = cases()
+    contestants = {
+        "exact": Ours(task, TABLEAUS["rk4"], REFERENCE_STEPS),
+        **{c.name: c.make(task) for c in every},
+    }
+    courses = race(task, contestants)
+    table, points = compare(task, every, courses)
+    draw(points)
+    publish(
+        Result(
+            name="engines",
+            question="How fast, and how precise, against other engines?",
+            notes=[
+                "The 60 s handover under NMPC: the same robot, references, gains and tick of 1 ms, and the "
+                "law with the engine's own H and c, in a loop in Python. All took turns every 20 ms of "
+                "simulated time; times are medians. Errors are the largest over the run, against ours with "
+                f"{REFERENCE_STEPS} steps of order 4 per tick. The run starts at rest, so all momentum is "
+                f"error. Compared: {versions(('pin', 'mujoco', 'drake'))}.",
+                f"`simulate` with everything (inverse kinematics, trajectory, record) took {whole:.2f} s for "
+                f"60 s of simulated time, {60.0 / whole:.1f} times real time.",
+            ],
+            tables=[table],
+            figures=[FIGURE],
+            values={"simulate_s": whole, "points": points},
+        )
+    )
+
+
+if __name__ == "__main__":
+    main()
