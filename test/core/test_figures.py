@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from sms_handover.analysis.figure_catalogue import FIGURES, FigureKind, chosen_figures
 from sms_handover.analysis.figures.draw import draw_figures
@@ -287,6 +288,30 @@ def test_every_kind_is_drawn_in_the_width_of_a_column_or_a_page(drawn: DrawnRun,
     for figure in figures.values():
         assert figure.get_size_inches()[0] in (COLUMN, PAGE)
         assert figure.get_size_inches()[1] < 9.0  # [in] of a page
+
+
+@pytest.mark.parametrize("stretch", [(1.0, 1.0, 1.0), (40.0, 1.0, 1.0), (1.0, 1.0, 40.0), (0.0, 0.0, 0.0)])
+@pytest.mark.parametrize("count", [1, 9])
+def test_a_path_of_any_shape_is_drawn_to_scale_within_the_figure(
+    nmpc: RunData, stretch: tuple[float, float, float], count: int
+) -> None:
+    pose = np.array(nmpc.base_pose)
+    pose[:, :3] = pose[0, :3] + (pose[:, :3] - pose[0, :3]) * np.array(stretch)
+    figure = figure_of("base_path", named([changed(nmpc, base_pose=pose)] * count))
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    (axes,) = figure.axes
+    assert isinstance(axes, Axes3D)
+    limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
+    scale = np.diff(limits, axis=1)[:, 0] / axes.get_box_aspect()
+    assert scale == pytest.approx(scale[0])
+    place = pose[:, :3] - pose[0, :3]
+    assert np.all(limits[:, 0] < MM * place.min(axis=0)) and np.all(MM * place.max(axis=0) < limits[:, 1])
+    width, height = canvas.get_width_height()
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        box = axis.get_tightbbox(canvas.get_renderer())
+        assert box.x0 >= 0.0 and box.y0 >= 0.0 and box.x1 <= width
+        assert box.y1 <= height - figure.legends[0].get_window_extent(canvas.get_renderer()).height
 
 
 def test_all_figures_come_in_the_order_of_the_catalogue(drawn: DrawnRun) -> None:

@@ -1,11 +1,15 @@
 """The path of the free base in space."""
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
+from matplotlib.transforms import Bbox
+from mpl_toolkits.mplot3d import proj3d
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from sms_handover.analysis.figures.drawn_run import DrawnRun
@@ -16,7 +20,10 @@ from sms_handover.types import Array
 from sms_handover.units import MM_PER_M, NS_PER_S
 
 _HEIGHT = 3.2  # [in]
-_AXES = (-0.05, -0.04, 0.98, 0.98)  # [-] left, bottom, width and height in the figure
+_EDGE = 0.01  # [-] of the figure, kept free around the box and its labels
+_LEGEND_COLUMNS = 3
+_LEGEND_ROW = 0.06  # [-] of the figure
+_FITTINGS = 3  # each brings what is drawn nearer to filling the room; the letters keep their size
 _VIEW = (22.0, -52.0)  # [deg] elevation and azimuth
 _MARGIN = 0.05  # [-] of the extent, around the paths
 _LEAST = 1e-6  # [mm] extent, where nothing moves
@@ -27,7 +34,7 @@ def draw_base_path(runs: Sequence[DrawnRun]) -> Figure:
     """Return the figure: one line per run, equal scales, a mark where each phase after the first begins."""
     figure = Figure(figsize=(COLUMN, _HEIGHT))
     figure.set_layout_engine("none")  # none fits a box in perspective
-    axes: Axes3D = figure.add_axes(_AXES, projection="3d")
+    axes: Axes3D = figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d")
     paths = [_known_path(run) for run in runs]
     for place, (run, (time, path)) in enumerate(zip(runs, paths, strict=True)):
         step = max(1, -(-len(path) // POINTS))
@@ -55,7 +62,10 @@ def draw_base_path(runs: Sequence[DrawnRun]) -> Figure:
         ),
         Line2D([], [], color=MUTED, marker="s", linestyle="", markersize=3.5, label="end"),
     ]
-    figure.legend(handles=[*run_handles(runs), *marks], loc="upper center", ncols=3)
+    handles = [*run_handles(runs), *marks]
+    figure.legend(handles=handles, loc="upper center", ncols=_LEGEND_COLUMNS)
+    legend_height = _LEGEND_ROW * -(-len(handles) // _LEGEND_COLUMNS)
+    _fit(figure, axes, Bbox([[_EDGE, _EDGE], [1.0 - _EDGE, 1.0 - _EDGE - legend_height]]))
     return figure
 
 
@@ -75,5 +85,27 @@ def _set_limits(axes: Axes3D, paths: Sequence[Array]) -> float:
         (axes.set_xlim, axes.set_ylim, axes.set_zlim), low - margin, high + margin, strict=True
     ):
         set_limits(begin, end)
-    axes.set_box_aspect(high - low + 2.0 * margin, zoom=1.05)
+    axes.set_box_aspect(high - low + 2.0 * margin)
     return float(low[2] - margin)
+
+
+def _fit(figure: Figure, axes: Axes3D, room: Bbox) -> None:
+    """Let the box with all its labels fill a room in the figure: its picture depends on what it holds."""
+    canvas = FigureCanvasAgg(figure)
+    for _ in range(_FITTINGS):
+        canvas.draw()  # type: ignore[no-untyped-call]
+        labels = [axis.get_tightbbox(canvas.renderer) for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
+        drawn = Bbox.union([_extent(axes), *labels]).transformed(figure.transFigure.inverted())
+        scale = min(room.width / drawn.width, room.height / drawn.height)
+        place = axes.get_position(original=True)
+        left = (room.x0 + room.x1) / 2.0 + scale * (place.x0 - (drawn.x0 + drawn.x1) / 2.0)
+        bottom = (room.y0 + room.y1) / 2.0 + scale * (place.y0 - (drawn.y0 + drawn.y1) / 2.0)
+        axes.set_position((left, bottom, scale * place.width, scale * place.height))
+
+
+def _extent(axes: Axes3D) -> Bbox:
+    """Return where the corners of the box are on the canvas, in dots."""
+    corners = np.array(list(product(axes.get_xlim(), axes.get_ylim(), axes.get_zlim())))
+    right, up, _ = proj3d.proj_transform(*corners.T, axes.get_proj())
+    seen = axes.transData.transform(np.column_stack([right, up]))
+    return Bbox([seen.min(axis=0), seen.max(axis=0)])
