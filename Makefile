@@ -8,13 +8,13 @@ MEASURED := build/verification
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint .ci/constraints.txt
 MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evidence $(MEASURED)/evidence.json
-TYPED := setup.py interfaces/setup.py sms_handover test $(wildcard benchmarks/*.py)
+TYPED := setup.py interfaces/setup.py docs/reference.py sms_handover test $(wildcard benchmarks/*.py)
 
 # The environment stands alone: what a sourced ROS workspace or another environment exports must not leak in.
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover figures simulate test verify measure bench lint install colcon clean
+.PHONY: help handover figures simulate test verify measure bench reference lint install colcon clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -47,6 +47,9 @@ measure: $(VENV)/.verify  ## the measurements of verify alone: nothing is broken
 
 bench: $(VENV)/.bench  ## measure how long things take, against other engines too; write docs/performance.md
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.performance
+
+reference: install  ## write docs/parameters.md and docs/topics.md from the code
+	$(BIN)/python -m docs.reference
 
 lint: $(VENV)/.test  ## check style and types
 	$(BIN)/ruff check

@@ -1,0 +1,117 @@
+"""Write docs/parameters.md and docs/topics.md from what the nodes are made from."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+from sms_handover.ros.contents import contents_of
+from sms_handover.ros.reference import (
+    ANY_ARM,
+    COMMON_GROUP,
+    OWN_GROUPS,
+    ParameterGroup,
+    parameter_rows,
+    publishers_of,
+    qos_text,
+    subscribers_of,
+)
+from sms_handover.services import SERVICES
+from sms_handover.topics import CONTROLLER, NODES, RECORDER, graph_topics
+
+DOCS = Path(__file__).resolve().parent
+_WRITTEN_BY = "This page is written by `make reference`; a test fails when it is not up to date."
+
+
+def parameters_page() -> str:
+    """Return the page of all parameters."""
+    parts = [
+        "# Parameters",
+        _WRITTEN_BY,
+        """\
+Every node reads its defaults from the files in [`config/`](../config), which are ROS 2 parameter files and give
+the reason for each number. On top of them come `--params-file FILE`, then `-p NAME:=VALUE` of the node, or
+`-p NODE.NAME:=VALUE` of `sms-handover run`. A node takes parameters at its start only: they are read-only,
+checked one by one and then together, and a wrong or unknown one ends it in one line with exit code 2.
+`ros2 param describe NODE NAME` tells the same of a running node.
+
+Empty text is `''`; a path is relative to the folder where the node starts.""",
+        *_group("Every node of the graph", COMMON_GROUP),
+    ]
+    for node, group in OWN_GROUPS.items():
+        parts += _group(f"`{node}`" + ("" if node in NODES else " (stands outside the graph)"), group)
+    return "\n\n".join(parts) + "\n"
+
+
+def topics_page() -> str:
+    """Return the page of all topics and services."""
+    topics = [
+        (
+            f"`{topic.name}`",
+            f"`{topic.type}`",
+            topic.rate.value,
+            qos_text(topic),
+            _nodes(publishers_of(topic)),
+            _nodes(node for node in subscribers_of(topic) if node != RECORDER),
+            contents_of(topic),
+        )
+        for topic in graph_topics([ANY_ARM])
+    ]
+    services = [
+        (f"`{s.relative_name}`", f"`{s.type}`", f"`{s.server}`", _nodes(s.clients), s.does) for s in SERVICES
+    ]
+    parts = [
+        "# Topics and services",
+        _WRITTEN_BY,
+        f"""\
+Names without a leading `/` are relative: a namespace moves them. `{ANY_ARM}` stands for the name of each arm of
+the robot, as shipped `arm_a` and `arm_b`. The recorder subscribes to every topic. Frames, signs and stamps are
+in [conventions.md](conventions.md), our own types in [`interfaces/`](../interfaces).
+
+A subscription of yours may ask for less than is offered, say best effort; a reliable one that keeps up loses
+nothing. A reliable subscriber that does not keep up holds the loop back: to look at the state at 50 Hz, take
+the sampled topics.""",
+        "## Topics",
+        _table(("Topic", "Type", "When", "Quality of service", "From", "Needed by", "Carries"), topics),
+        "The recorder adds `/tf` to the bag, one message each reference period.",
+        "## Services",
+        _table(("Service", "Type", "Offered by", "Called by", "Does"), services),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def pages() -> dict[Path, str]:
+    """Return the text of every page that is written here."""
+    return {DOCS / "parameters.md": parameters_page(), DOCS / "topics.md": topics_page()}
+
+
+def _group(title: str, group: ParameterGroup) -> Iterator[str]:
+    """Yield the section of a group."""
+    rows = [
+        (f"`{r.name}`", r.type, f"`{r.default}`", r.unit, r.allowed, r.description)
+        for r in parameter_rows(group)
+    ]
+    yield f"## {title}"
+    yield f"Defaults: [`config/{group.file}`](../config/{group.file})."
+    yield _table(("Parameter", "Type", "Default", "Unit", "Allowed", "Meaning"), rows)
+    if group is OWN_GROUPS[CONTROLLER]:
+        yield "The schedule may change the gains from phase to phase."
+
+
+def _nodes(names: Iterable[str]) -> str:
+    """Return the names of nodes."""
+    return ", ".join(f"`{name}`" for name in names)
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table."""
+    cells = [head, ["---"] * len(head), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
+    return "\n".join("| " + " | ".join(row) + " |" for row in cells)
+
+
+def main() -> None:
+    """Write the pages."""
+    for path, text in pages().items():
+        path.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

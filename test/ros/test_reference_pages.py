@@ -1,0 +1,34 @@
+"""The written pages are up to date, and hold what a reader looks for."""
+
+from pathlib import Path
+
+import pytest
+
+from docs.reference import pages
+from sms_handover.ros.reference import COMMON_GROUP, OWN_GROUPS, parameter_rows
+from sms_handover.topics import graph_topics
+
+PAGES = pages()
+
+
+@pytest.mark.parametrize("path", list(PAGES), ids=lambda path: path.name)
+def test_a_page_is_up_to_date(path: Path) -> None:
+    assert path.read_text(encoding="utf-8") == PAGES[path], "run: make reference"
+
+
+def test_every_parameter_and_topic_has_a_row() -> None:
+    parameters, topics = PAGES.values()
+    for group in (COMMON_GROUP, *OWN_GROUPS.values()):
+        for row in parameter_rows(group):
+            assert f"| `{row.name}` | {row.type} | `{row.default}` | {row.unit} |" in parameters
+    for topic in graph_topics(["ARM"]):
+        assert f"| `{topic.name}` | `{topic.type}` | {topic.rate.value} |" in topics
+
+
+def test_tables_are_rectangular() -> None:
+    for text in PAGES.values():
+        width = 0
+        for line in text.splitlines():
+            columns = line.replace("\\|", "").count("|") if line.startswith("|") else 0
+            assert not (width and columns) or columns == width, line
+            width = columns
