@@ -27,7 +27,7 @@ def parameters_page() -> str:
         "# Parameters",
         _WRITTEN_BY,
         """\
-Every node reads its defaults from the files in [`config/`](../config), which are ROS 2 parameter files and give
+Every node reads its defaults from the files in [`config/`](../config), ROS 2 parameter files that give
 the reason for each number. On top of them come `--params-file FILE`, then `-p NAME:=VALUE` of the node, or
 `-p NODE.NAME:=VALUE` of `sms-handover run`. A node takes parameters at its start only: they are read-only,
 checked one by one and then together, and a wrong or unknown one ends it in one line with exit code 2.
@@ -62,9 +62,9 @@ def topics_page() -> str:
         "# Topics and services",
         _WRITTEN_BY,
         f"""\
-Names without a leading `/` are relative: a namespace moves them. `{ANY_ARM}` stands for the name of each arm of
-the robot, as shipped `arm_a` and `arm_b`. The recorder subscribes to every topic. Frames, signs and stamps are
-in [conventions.md](conventions.md), our own types in [`interfaces/`](../interfaces).
+Names without a leading `/` are relative: a namespace moves them. `{ANY_ARM}` stands for the name of each arm
+of the robot, as shipped `arm_a` and `arm_b`. The recorder subscribes to every topic. Frames, signs and stamps
+are in [conventions.md](conventions.md), our own types in [`interfaces/`](../interfaces).
 
 A subscription of yours may ask for less than is offered, say best effort; a reliable one that keeps up loses
 nothing. A reliable subscriber that does not keep up holds the loop back: to look at the state at 50 Hz, take

@@ -1,56 +1,62 @@
-"""The graph under ros2 launch: arguments and nodes, wiring only.
+"""The graph under ros2 launch: arguments, nodes, and when it ends; wiring only.
 
-For a full ROS 2 installation; ``sms-handover run`` starts the same graph without the launch system,
-and also checks the scenario first and waits for the recorder at the end.
+With a recorder it ends when the bag is complete. A node that fails ends it with exit code 1.
+``sms-handover run`` starts the same graph without the launch system, checks the scenario before any
+node starts, and shows progress.
 """
 
-from launch.actions import DeclareLaunchArgument
-from launch.conditions import IfCondition
-from launch.substitutions import LaunchConfiguration, PythonExpression
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
+from launch.events.process import ProcessExited
 from launch_ros.actions import Node
 
-from launch import LaunchDescription
+from sms_handover.errors import GraphError
+from sms_handover.ros.launch_arguments import ARGUMENTS, node_arguments
 
 PACKAGE = "sms_handover"
-LOOP_NODES = ("plant", "trajectory", "ik", "controller")
-
-ARGUMENTS = {
-    "controller": ("nmpc", "control law: nmpc or pid"),
-    "schedule": ("", "path of a task schedule; empty: the package's handover.yaml"),
-    "robot": ("", "path of a robot description; empty: the package's robot.yaml"),
-    "mode": ("lockstep", "lockstep or realtime"),
-    "record": ("true", "whether to record the graph"),
-    "bag": ("", "new folder for the bag; empty: handover_<date>_<time>"),
-}
+OWN_ARGUMENTS = (
+    DeclareLaunchArgument(
+        "params_file", default_value="", description="parameters in ROS 2 form on top of the shipped ones"
+    ),
+    DeclareLaunchArgument(
+        "record", default_value="true", choices=["true", "false"], description="whether to record the graph"
+    ),
+    DeclareLaunchArgument("namespace", default_value="", description="namespace of nodes and topics"),
+    DeclareLaunchArgument("log_level", default_value="info", description="least severity that is logged"),
+)
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the loop nodes, and a recorder that is one of their peers if one is wanted."""
-    record = LaunchConfiguration("record")
-    with_recorder = [" + (['recorder'] if '", record, "' == 'true' else [])"]
-    peers = PythonExpression([repr(list(LOOP_NODES)), *with_recorder])
-    common = {name: LaunchConfiguration(name) for name in ("schedule", "robot", "mode")} | {"peers": peers}
-    own = {"controller": {"law": LaunchConfiguration("controller")}}
-    nodes = [
+    """Return the arguments, and what they start."""
+    of_parameters = [
+        DeclareLaunchArgument(name, default_value="", description=item.text, choices=item.choices)
+        for name, item in ARGUMENTS.items()
+    ]
+    return LaunchDescription([*of_parameters, *OWN_ARGUMENTS, OpaqueFunction(function=start)])
+
+
+def start(context: LaunchContext) -> list[Node]:
+    """Return the nodes that the arguments ask for."""
+    given = context.launch_configurations
+    return [
         Node(
             package=PACKAGE,
             executable=name,
             name=name,
+            namespace=given["namespace"],
             output="screen",
-            parameters=[common, own.get(name, {})],
+            ros_arguments=[*arguments, "--log-level", given["log_level"]],
+            additional_env={"OPENBLAS_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"},
+            on_exit=end,
         )
-        for name in LOOP_NODES
+        for name, arguments in node_arguments(given, record=given["record"] == "true").items()
     ]
-    recorder = Node(
-        package=PACKAGE,
-        executable="recorder",
-        name="recorder",
-        output="screen",
-        parameters=[common, {"folder": LaunchConfiguration("bag")}],
-        condition=IfCondition(record),
-    )
-    declared = [
-        DeclareLaunchArgument(name, default_value=value, description=text)
-        for name, (value, text) in ARGUMENTS.items()
-    ]
-    return LaunchDescription([*declared, *nodes, recorder])
+
+
+def end(event: ProcessExited, context: LaunchContext) -> Shutdown | None:
+    """End the launch when a node has ended: the recorder when all is recorded, any other by mistake."""
+    if context.is_shutdown:
+        return None
+    if event.returncode:
+        raise GraphError(f"{event.process_name} ended with exit code {event.returncode}")
+    return Shutdown(reason=f"{event.process_name} is done")

@@ -1,0 +1,84 @@
+"""The arguments of ``ros2 launch sms_handover handover.launch.py`` that set parameters of the nodes.
+
+An argument that is not given leaves its parameter to the parameter file of the user, then to ``config/``.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import get_type_hints
+
+from sms_handover.errors import ConfigurationError
+from sms_handover.parameters import ParameterSpec, spec_of
+from sms_handover.ros.parameters import as_arguments
+from sms_handover.ros.reference import COMMON_GROUP, OWN_GROUPS, ParameterGroup
+from sms_handover.topics import CONTROLLER, LOOP_NODES, RECORDER, TRAJECTORY
+
+_EVERY_NODE = ""
+
+
+@dataclass(frozen=True)
+class LaunchArgument:
+    """An argument that sets one parameter, of one node or of all."""
+
+    node: str
+    parameter: str
+
+    @property
+    def group(self) -> ParameterGroup:
+        """The parameters that this one belongs to."""
+        return COMMON_GROUP if self.node == _EVERY_NODE else OWN_GROUPS[self.node]
+
+    @property
+    def spec(self) -> ParameterSpec:
+        """What is known of the parameter."""
+        return next(spec_of(item) for item in fields(self.group.cls) if item.name == self.parameter)
+
+    @property
+    def text(self) -> str:
+        """What ``--show-args`` tells."""
+        unit = f" [{self.spec.unit}]" if self.spec.unit else ""
+        return f"{self.spec.description}{unit}; not given: as in params_file, else config/{self.group.file}"
+
+    @property
+    def choices(self) -> list[str] | None:
+        """The values allowed, with '' for not given; None if there is no such list."""
+        return ["", *self.spec.choices] if self.spec.choices else None
+
+
+ARGUMENTS = {
+    "controller": LaunchArgument(CONTROLLER, "law"),
+    "time_law": LaunchArgument(TRAJECTORY, "time_law"),
+    "schedule": LaunchArgument(_EVERY_NODE, "schedule"),
+    "robot": LaunchArgument(_EVERY_NODE, "robot"),
+    "duration": LaunchArgument(_EVERY_NODE, "duration"),
+    "mode": LaunchArgument(_EVERY_NODE, "mode"),
+    "bag": LaunchArgument(RECORDER, "folder"),
+}
+
+
+def node_arguments(given: Mapping[str, str], *, record: bool) -> dict[str, list[str]]:
+    """Return the nodes to start, each with the ROS arguments that the launch arguments make.
+
+    ``given`` may hold other launch arguments too; '' is one that was not given. Raises
+    ConfigurationError on a number that is none.
+    """
+    nodes = (*LOOP_NODES, RECORDER) if record else LOOP_NODES
+    files = ["--params-file", given["params_file"]] if given.get("params_file") else []
+    values: dict[str, dict[str, object]] = {node: {"peers": nodes} for node in nodes}
+    for name, argument in ARGUMENTS.items():
+        if given.get(name):
+            for node in nodes if argument.node == _EVERY_NODE else {argument.node} & set(nodes):
+                values[node][argument.parameter] = _typed(argument, name, given[name])
+    return {node: files + as_arguments(values[node]) for node in nodes}
+
+
+def _typed(argument: LaunchArgument, name: str, text: str) -> object:
+    """Return the text of an argument as its parameter is typed."""
+    if get_type_hints(argument.group.cls)[argument.parameter] is not float:
+        return text
+    try:
+        return float(text)
+    except ValueError:
+        raise ConfigurationError(
+            f"launch argument {name!r} is {text!r}, expected a number {argument.spec.unit}"
+        ) from None
