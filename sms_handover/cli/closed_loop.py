@@ -54,7 +54,7 @@ def closed_loop(bag: Path, domain_id: int | None) -> int:
                 node = Node(CONTROLLER, start_parameter_services=False, enable_rosout=False)
                 executor = EventsExecutor()
                 executor.add_node(node)
-                replay = CommandReplay(node, ticks, scenario.robot)
+                replay = CommandReplay(node, ticks, scenario.robot, scenario.parameters.common.reference_ns)
                 with NodeProcesses(folder, graph_environment(plan)) as processes:
                     processes.start(PLANT, _plant_arguments(scenario))
                     _watch(replay, executor, processes, Display(info.end_ns))

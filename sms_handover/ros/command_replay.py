@@ -3,8 +3,9 @@
 import struct
 from collections.abc import Callable, Iterator
 
+import numpy as np
 from rclpy.node import Node
-from sms_handover_interfaces.msg import RunState
+from sms_handover_interfaces.msg import RunState, TaskPhase
 from std_msgs.msg import String
 
 from sms_handover.analysis.deviation import LargestDeviation, state_deviation
@@ -12,9 +13,10 @@ from sms_handover.bag.stamp import stamp_ns
 from sms_handover.bag.ticks import RecordedTick
 from sms_handover.frames import BASE, WORLD
 from sms_handover.model.robot_model import RobotModel
+from sms_handover.ros.convert import header
 from sms_handover.ros.endpoints import Endpoints
 from sms_handover.ros.stamp_sync import StampSync
-from sms_handover.ros.wire import StateWire
+from sms_handover.ros.wire import JointStateWire, StateWire
 from sms_handover.topics import (
     BASE_ODOMETRY,
     CONTROLLER,
@@ -39,15 +41,24 @@ _STATE = (JOINT_STATES, BASE_ODOMETRY)
 class CommandReplay:
     """Feeds a live plant in lock step from a recording, and compares every state with the recorded one."""
 
-    def __init__(self, node: Node, ticks: Iterator[RecordedTick], robot: RobotModel) -> None:
-        """Make the endpoints on a node that has the name of the controller."""
+    def __init__(
+        self, node: Node, ticks: Iterator[RecordedTick], robot: RobotModel, reference_ns: int
+    ) -> None:
+        """Make the endpoints on a node that has the name of the controller.
+
+        Each ``reference_ns`` the plant wants a phase. Where none was recorded, as at the end of a run in
+        real time, it gets one without grasp commands; and without a command the last one is held, which is
+        zero at first, as it is for a plant in real time.
+        """
         self.deviation = LargestDeviation()
         self.stamp_ns = -1  # of the last state that came
         self.held = 0  # ticks without a recorded command
         self.done = False
         self._ticks = ticks
         self._next = next(ticks, None)
-        self._last_command: bytes | None = None
+        self._reference_ns = reference_ns
+        zero = np.zeros(robot.n_joints)  # N m
+        self._last_command = JointStateWire(robot.joint_names, ("effort",)).pack(0, effort=zero)
         self._wire = StateWire(robot.joint_names, WORLD, BASE)
         self._inputs: StampSync[bytes] = StampSync()
         self._endpoints = Endpoints(node, graph_topics(robot.arms), PEERS)
@@ -97,6 +108,8 @@ class CommandReplay:
         tick = self._next if self._next.stamp_ns == stamp else RecordedTick(stamp, None, None, None, None)
         if tick.task_phase is not None:
             self._phase.publish(tick.task_phase)
+        elif stamp % self._reference_ns == 0:
+            self._phase.publish(TaskPhase(header=header(stamp)))
         self._answer(stamp, tick.joint_command)
         if tick.joint_states is None or tick.base_odometry is None:
             return
@@ -110,10 +123,9 @@ class CommandReplay:
         """Publish the recorded command, or hold the last one where none was recorded."""
         if command is None:
             self.held += 1
-            command = self._last_command
-        if command is not None:
-            self._last_command = command
-            self._command.publish(_restamped(command, stamp))
+            command = _restamped(self._last_command, stamp)
+        self._last_command = command
+        self._command.publish(command)
 
 
 def _restamped(data: bytes, stamp: int) -> bytes:

@@ -77,7 +77,7 @@ class FakePlant:
         self._endpoints.subscribe(JOINT_COMMAND, self.commands.append, raw=True)
         self._endpoints.subscribe(TASK_PHASE, self.phases.append)
         self._endpoints.subscribe(RUN_READY, lambda message: self.ready.append(message.data))
-        self.replay = CommandReplay(bench.plain(CONTROLLER), iter(ticks), ROBOT)
+        self.replay = CommandReplay(bench.plain(CONTROLLER), iter(ticks), ROBOT, 2 * TICK_NS)
         bench.until(lambda: self.ready == [CONTROLLER], "the stand-in")
         bench.until(lambda: not self._endpoints.unmatched, "the endpoints")
 
@@ -129,10 +129,15 @@ def test_a_tick_that_was_not_recorded_is_answered_and_not_compared(bench: Bench)
     assert (plant.replay.held, plant.replay.deviation.compared) == (1, 3)
 
 
-def test_a_recording_that_begins_later_is_waited_for(bench: Bench) -> None:
+def test_before_any_recorded_command_there_is_none(bench: Bench) -> None:
+    """As for a plant in real time; a phase that lacks is one without grasp commands."""
     plant = FakePlant(bench, recorded((2, 3)))
-    plant.tick(2)
-    assert plant.efforts(1) == [(2, 2.0)]
+    for tick in range(3):
+        plant.tick(tick)
+    assert plant.efforts(3) == [(0, 0.0), (1, 0.0), (2, 2.0)]
+    bench.until(lambda: len(plant.phases) == 2, "two phases")
+    assert [(phase.name, list(phase.commands)) for phase in plant.phases] == [("", []), ("phase 2", [])]
+    assert plant.replay.held == 2
 
 
 def test_behind_the_recording_it_is_over(bench: Bench) -> None:
