@@ -27,23 +27,23 @@ class Ours:
         self._plant._integrator = LieGroupIntegrator(robot.pin, tableau, common.tick)
         self._controller = make_controller(robot, schedule, parameters.common, parameters.controller)
         self._task, self._steps = task, steps
-        self._ticks = parameters.common.ticks_per_reference
+        self._ticks, self._tick_ns = parameters.common.ticks_per_reference, parameters.common.tick_ns
 
     def period(self, index: int) -> None:
         """Take a reference and go through its ticks."""
         plant, controller, steps = self._plant, self._controller, range(self._steps)
         controller.enter(self._task.run.phases[index])
         controller.track(self._task.references[index])
-        for _ in range(self._ticks):
-            command = controller.step(plant.state)
+        start_ns = self._task.references[index].stamp_ns
+        for tick in range(self._ticks):
+            effort = controller.effort(start_ns + tick * self._tick_ns, plant.q, plant.v)
             for _ in steps:
-                plant.step(command)
+                plant.apply(effort)
 
     @property
     def state(self) -> State:
         """The state it is in."""
-        state = self._plant.state
-        return state.q, state.v
+        return self._plant.q, self._plant.v
 
 
 class InMujoco:

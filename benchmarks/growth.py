@@ -56,7 +56,7 @@ def ticks_of(robot: RobotModel) -> Callable[[], None]:
 
     def run() -> None:
         for _ in range(TICKS):
-            plant.step(controller.step(plant.state))
+            plant.apply(controller.effort(plant.stamp_ns, plant.q, plant.v))
 
     return run
 

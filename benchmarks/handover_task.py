@@ -85,8 +85,8 @@ class NmpcTracker:
 
     def effort(self, stamp_ns: int, q: Array, v: Array, inertia: Array, bias: Array) -> Array:
         """Return the joint efforts (n,) for joint angles and rates (n,)."""
-        desired = self._track.at(stamp_ns)
-        wanted = desired.acceleration - self._a1 * (q - desired.position) - self._a2 * (v - desired.velocity)
+        position, velocity, acceleration = self._track.at(stamp_ns)
+        wanted = acceleration - self._a1 * (q - position) - self._a2 * (v - velocity)
         pull = inertia[:, BASE_NV:].dot(wanted) + bias
         yielding = np.linalg.solve(inertia[:BASE_NV, :BASE_NV], pull[:BASE_NV])
         effort = pull[BASE_NV:] - inertia[BASE_NV:, :BASE_NV].dot(yielding)

@@ -4,24 +4,9 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from sms_handover.types import Array, RobotState, read_only
+from sms_handover.types import Array
 
 G = TypeVar("G")
-
-
-@dataclass(frozen=True, eq=False)
-class DesiredMotion:
-    """Desired joint position (n,) rad, velocity (n,) rad/s and acceleration (n,) rad/s^2 at one instant."""
-
-    position: Array
-    velocity: Array
-    acceleration: Array
-
-    def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only."""
-        object.__setattr__(self, "position", read_only(self.position))
-        object.__setattr__(self, "velocity", read_only(self.velocity))
-        object.__setattr__(self, "acceleration", read_only(self.acceleration))
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +19,7 @@ class LinearFeedback:
 
 
 class ControlLaw(ABC, Generic[G]):
-    """A joint-space law with gains of type ``G``: efforts from state and desired motion, e = q - q_d.
+    """A joint-space law with gains of type ``G``: efforts from the state and the desired motion, e = q - q_d.
 
     A law keeps no clock and does no I/O. It limits its efforts to what the joints can give.
     """
@@ -48,8 +33,11 @@ class ControlLaw(ABC, Generic[G]):
         """Go on with other gains, without a jump that the new gains do not ask for."""
 
     @abstractmethod
-    def step(self, state: RobotState, desired: DesiredMotion, dt: float) -> Array:
-        """Return the joint efforts (n,) N m for the tick of ``dt`` s that begins at ``state``."""
+    def effort(self, q: Array, v: Array, desired: Array, dt: float) -> Array:
+        """Return the joint efforts (n,) N m for the tick of ``dt`` s that begins at ``q``, ``v``.
+
+        ``desired`` (3, n) has the rows q_d rad, q_d' rad/s and q_d'' rad/s^2.
+        """
 
     @abstractmethod
     def linearised(self, inertia: Array) -> LinearFeedback:

@@ -57,10 +57,13 @@ class JointController:
 
     def step(self, state: RobotState) -> JointCommand:
         """Return the command that answers a state; zero efforts until a first reference has come."""
+        return JointCommand(state.stamp_ns, self.effort(state.stamp_ns, state.q, state.v))
+
+    def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
+        """Return the efforts (n,) of that command, read-only, for a state as bare arrays."""
         if not self._track.ready:
-            return JointCommand(state.stamp_ns, np.zeros(self._robot.n_joints))
-        effort = self._law.step(state, self._track.at(state.stamp_ns), self._dt)
-        return JointCommand(state.stamp_ns, frozen(effort))
+            return frozen(np.zeros(self._robot.n_joints))
+        return frozen(self._law.effort(q, v, self._track.at(stamp_ns), self._dt))
 
 
 def make_law(robot: RobotModel, gains: Gains) -> ControlLaw[Any]:

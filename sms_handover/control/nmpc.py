@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sms_handover.control.base import ControlLaw, DesiredMotion, LinearFeedback
+from sms_handover.control.base import ControlLaw, LinearFeedback
 from sms_handover.model.reduced import reduced_inverse_dynamics
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.parameters import parameter
-from sms_handover.types import Array, RobotState
+from sms_handover.types import BASE_NQ, BASE_NV, Array
 
 MAX_CONTROL_ORDER = 3
 
@@ -46,6 +46,7 @@ class NmpcLaw(ControlLaw[NmpcGains]):
         """Set up the law for a robot."""
         self._robot = robot
         self._errors = np.zeros((2, robot.n_joints))  # rows e, e'
+        self._error, self._error_rate = self._errors
         self.use(gains)
 
     def reset(self) -> None:
@@ -56,13 +57,13 @@ class NmpcLaw(ControlLaw[NmpcGains]):
         self._gains = gains
         self._feedback = np.array([gains.position_gain, gains.velocity_gain])
 
-    def step(self, state: RobotState, desired: DesiredMotion, dt: float) -> Array:
+    def effort(self, q: Array, v: Array, desired: Array, dt: float) -> Array:
         """Return the joint efforts (n,) N m, limited to what the joints can give; ``dt`` plays no part."""
-        robot, errors = self._robot, self._errors
-        np.subtract(state.joint_position, desired.position, out=errors[0])
-        np.subtract(state.joint_velocity, desired.velocity, out=errors[1])
-        acceleration = desired.acceleration - self._feedback.dot(errors)
-        return robot.limited(reduced_inverse_dynamics(robot, state.q, state.v, acceleration))
+        position, velocity, acceleration = desired
+        np.subtract(q[BASE_NQ:], position, out=self._error)
+        np.subtract(v[BASE_NV:], velocity, out=self._error_rate)
+        wanted = acceleration - self._feedback.dot(self._errors)  # q_d'' - A_1 e - A_2 e'
+        return self._robot.limited(reduced_inverse_dynamics(self._robot, q, v, wanted))
 
     def linearised(self, inertia: Array) -> LinearFeedback:
         """Return K_e = A_1 H*, K_v = A_2 H*, K_z = 0."""

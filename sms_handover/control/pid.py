@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sms_handover.control.base import ControlLaw, DesiredMotion, LinearFeedback
+from sms_handover.control.base import ControlLaw, LinearFeedback
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.parameters import parameter
-from sms_handover.types import Array, RobotState
+from sms_handover.types import BASE_NQ, BASE_NV, Array
 
 
 @dataclass(frozen=True)
@@ -42,11 +42,12 @@ class PidLaw(ControlLaw[PidGains]):
             self._integral *= self._gains.integral / gains.integral
         self._gains = gains
 
-    def step(self, state: RobotState, desired: DesiredMotion, dt: float) -> Array:
+    def effort(self, q: Array, v: Array, desired: Array, dt: float) -> Array:
         """Return the joint efforts (n,) N m, limited to what the joints can give."""
         gains = self._gains
-        error = state.joint_position - desired.position
-        error_rate = state.joint_velocity - desired.velocity
+        position, velocity, _ = desired
+        error = q[BASE_NQ:] - position
+        error_rate = v[BASE_NV:] - velocity
         wanted = -(
             gains.proportional * error + gains.integral * self._integral + gains.derivative * error_rate
         )

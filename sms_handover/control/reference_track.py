@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from sms_handover.control.base import DesiredMotion
-from sms_handover.types import Array, JointReference, frozen
+from sms_handover.types import Array, JointReference
 from sms_handover.units import ns_to_seconds
 
 
@@ -45,13 +44,13 @@ class ReferenceTrack:
         self._last = reference
         self._broken = False
 
-    def at(self, stamp_ns: int) -> DesiredMotion:
-        """Return the desired motion at a time not before the last reference."""
+    def at(self, stamp_ns: int) -> Array:
+        """Return q_d, q_d' and q_d'', the rows of (3, n), at a time not before the last reference."""
         if self._last is None:
             raise RuntimeError("no reference has come yet")
         s = ns_to_seconds(stamp_ns - self._last.stamp_ns)
         forward = self._forward
         forward[0, 1] = forward[1, 2] = s
         forward[0, 2] = 0.5 * s * s
-        motion = frozen(forward.dot(self._motion))
-        return DesiredMotion(motion[0], motion[1], motion[2])
+        motion: Array = forward.dot(self._motion)
+        return motion

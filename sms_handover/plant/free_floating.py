@@ -42,6 +42,8 @@ class FreeFloatingPlant:
     """H(q) v' + c(q, v) = (0, u): a base without actuators that carries arms, and no gravity.
 
     The efforts of a tick are held constant over it. Time is counted in whole ticks, so stamps are exact.
+    ``q``, ``v`` and ``joint_effort`` are those of :attr:`state`, as bare arrays that nobody changes: a
+    tick makes new ones.
     """
 
     def __init__(
@@ -62,9 +64,9 @@ class FreeFloatingPlant:
         """Go back to the initial state at time zero."""
         self._tick = 0
         robot, initial = self._robot, self._initial
-        self._q = read_only(robot.configuration(initial.base_in_world, initial.joint_position))
-        self._v = read_only(np.zeros(robot.pin.nv))
-        self._effort = read_only(np.zeros(robot.n_joints))
+        self.q = read_only(robot.configuration(initial.base_in_world, initial.joint_position))
+        self.v = read_only(np.zeros(robot.pin.nv))
+        self.joint_effort = read_only(np.zeros(robot.n_joints))
         self._work = 0.0
         self._saturated_ticks = np.zeros(robot.n_joints, dtype=np.int64)
         self._deputy = MasslessDeputy(initial.deputy_in_world, initial.deputy_grasp_frames)
@@ -82,7 +84,7 @@ class FreeFloatingPlant:
     @property
     def state(self) -> RobotState:
         """Return the state at this tick."""
-        return RobotState(self.stamp_ns, self._q, self._v, self._effort)
+        return RobotState(self.stamp_ns, self.q, self.v, self.joint_effort)
 
     @property
     def deputy(self) -> DeputyState:
@@ -106,12 +108,12 @@ class FreeFloatingPlant:
     @property
     def tools_in_world(self) -> dict[str, Pose]:
         """Return the pose of every tool."""
-        return self._robot.tools_at(self._q)
+        return self._robot.tools_at(self.q)
 
     @property
     def receipt(self) -> PhysicsReceipt:
         """Return momenta, energy and centre of mass of the robot."""
-        return physics_receipt(self._robot, self._q, self._v)
+        return physics_receipt(self._robot, self.q, self.v)
 
     def execute(self, commands: tuple[GraspCommand, ...]) -> tuple[GraspEvent, ...]:
         """Carry out grasp commands at this instant, in order, and return what came of each."""
@@ -119,22 +121,26 @@ class FreeFloatingPlant:
             return ()
         self._deputy_follow()
         tools = self.tools_in_world
-        twists = {arm: self._robot.tool_twist_in_world(self._q, self._v, arm) for arm in tools}
+        twists = {arm: self._robot.tool_twist_in_world(self.q, self.v, arm) for arm in tools}
         return tuple(
             answer(command, self._deputy, tools, twists, self._tolerance, self.stamp_ns)
             for command in commands
         )
 
     def step(self, command: JointCommand) -> None:
-        """Integrate one tick under the command's efforts, each limited to what the joint can give.
+        """Integrate one tick under the command's efforts, each limited to what the joint can give."""
+        self.apply(command.effort)
+
+    def apply(self, asked: Array) -> None:
+        """Integrate one tick under read-only efforts (n,), each limited to what the joint can give.
 
         The work is u . (q_m(t + h) - q_m(t)), exact because u is constant over the tick.
         """
-        effort = self._limited(command.effort)
-        before = self._q
-        q, v = self._integrator.step(self._acceleration, before, self._v)
-        self._q, self._v, self._effort = q, v, effort
+        effort = self._limited(asked)
+        before = self.q
+        q, v = self._integrator.step(self._acceleration, before, self.v)
         self._work += float(effort.dot(q[BASE_NQ:] - before[BASE_NQ:]))
+        self.q, self.v, self.joint_effort = q, v, effort
         self._tick += 1
         if not self._deputy.holder:
             self._deputy.drift(self._tick_s)
@@ -159,7 +165,7 @@ class FreeFloatingPlant:
         """Bring a held deputy to where its tool is now."""
         holder = self._deputy.holder
         if holder:
-            twist = self._robot.tool_twist_in_world(self._q, self._v, holder)
+            twist = self._robot.tool_twist_in_world(self.q, self.v, holder)
             self._deputy.follow(self.tools_in_world[holder], twist)
 
     def _check_start(self) -> None:

@@ -14,10 +14,8 @@ from sms_handover.types import (
     GraspEvent,
     IkResult,
     IkStatus,
-    JointCommand,
     JointReference,
     Pose,
-    RobotState,
     TaskPhase,
 )
 
@@ -47,14 +45,14 @@ class RunRecorder:
         self._tick = 0
         self._period = 0
 
-    def tick(self, state: RobotState, command: JointCommand) -> None:
-        """Add the row of one tick."""
+    def tick(self, stamp_ns: int, q: Array, v: Array, effort: Array, command: Array) -> None:
+        """Add the row of one tick: state, the efforts (n,) that led to it, and those that answer it."""
         k = self._tick
-        self._tick_ns[k] = state.stamp_ns
-        self._q[k] = state.q
-        self._v[k] = state.v
-        self._effort[k] = state.joint_effort
-        self._command[k] = command.effort
+        self._tick_ns[k] = stamp_ns
+        self._q[k] = q
+        self._v[k] = v
+        self._effort[k] = effort
+        self._command[k] = command
         self._tick += 1
 
     def reference(

@@ -31,8 +31,9 @@ def simulate(scenario: Scenario | None = None, *, progress: Progress | None = No
     periods = last_tick // common.ticks_per_reference + 1
     recorder = RunRecorder(robot.joint_names, robot.arms, last_tick + 1, periods)
     for tick in range(last_tick + 1):
-        state = plant.state
+        stamp_ns = plant.stamp_ns
         if tick % common.ticks_per_reference == 0:
+            state = plant.state
             deputy = plant.deputy
             recorder.plant(plant.tools_in_world, deputy.deputy_in_world, plant.receipt, plant.work)
             phase, targets = generator.targets(state, deputy.deputy_in_world)
@@ -45,9 +46,9 @@ def simulate(scenario: Scenario | None = None, *, progress: Progress | None = No
             controller.track(reference)
             recorder.events(plant.execute(phase.commands))
             if progress:
-                progress(state.stamp_ns, phase)
-        command = controller.step(state)
-        recorder.tick(state, command)
+                progress(stamp_ns, phase)
+        effort = controller.effort(stamp_ns, plant.q, plant.v)
+        recorder.tick(stamp_ns, plant.q, plant.v, plant.joint_effort, effort)
         if tick < last_tick:
-            plant.step(command)
+            plant.apply(effort)
     return recorder.data()

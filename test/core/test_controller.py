@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from sms_handover.control.base import DesiredMotion
 from sms_handover.control.controller import Gains, JointController, make_law
 from sms_handover.control.nmpc import NmpcGains, NmpcLaw
 from sms_handover.control.pid import PidGains, PidLaw
@@ -42,8 +41,10 @@ class Bench:
 
     def expected(self, gains: Gains) -> Array:
         """Return what a fresh law with these gains answers."""
-        desired = DesiredMotion(self.wanted, np.zeros(14), np.zeros(14))
-        return make_law(self.robot, gains).step(self.state(0), desired, 1e-3)
+        desired = np.array([self.wanted, np.zeros(14), np.zeros(14)])
+        state = self.state(0)
+        effort: Array = make_law(self.robot, gains).effort(state.q, state.v, desired, 1e-3)
+        return effort
 
 
 @pytest.fixture(params=sorted(_SETS))
@@ -92,8 +93,9 @@ def test_entering_the_same_phase_again_keeps_everything(robot: RobotModel, draw:
         bench.controller.enter(phase)
         velocity = acceleration * stamp_ns * 1e-9
         bench.controller.track(JointReference(stamp_ns, bench.wanted, velocity))
-    desired = DesiredMotion(bench.wanted, acceleration * 0.02, acceleration)
-    expected = NmpcLaw(robot, NmpcGains(1.0, 0)).step(bench.state(0), desired, 1e-3)
+    desired = np.array([bench.wanted, acceleration * 0.02, acceleration])
+    state = bench.state(0)
+    expected = NmpcLaw(robot, NmpcGains(1.0, 0)).effort(state.q, state.v, desired, 1e-3)
     # the acceleration is a difference of velocities of 2e-3 over 20 ms, times an inertia below 3
     np.testing.assert_allclose(bench.controller.step(bench.state(20 * _TICK_NS)).effort, expected, atol=1e-14)
 

@@ -7,7 +7,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sms_handover.control.base import DesiredMotion
 from sms_handover.control.nmpc import MAX_CONTROL_ORDER, NmpcGains, NmpcLaw
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
@@ -79,14 +78,13 @@ def test_error_acceleration_is_what_the_law_asks_for(robot: RobotModel, draw: Dr
     law = NmpcLaw(robot, gains)
     for _ in range(10):
         q, v = draw.q(), draw.v()
-        desired = DesiredMotion(
-            q[BASE_NQ:] + draw.vector(14, 0.01), v[BASE_NV:] + draw.vector(14, 0.1), draw.vector(14, 0.1)
-        )
-        effort = law.step(state_of(robot, q, v), desired, 1e-3)
+        position, velocity = q[BASE_NQ:] + draw.vector(14, 0.01), v[BASE_NV:] + draw.vector(14, 0.1)
+        desired = np.array([position, velocity, draw.vector(14, 0.1)])
+        effort = law.effort(q, v, desired, 1e-3)
         assert np.all(np.abs(effort) < robot.effort_limit)
         found = pin.aba(robot.pin, robot.data, q, v, np.concatenate([np.zeros(BASE_NV), effort]))[BASE_NV:]
-        error, rate = q[BASE_NQ:] - desired.position, v[BASE_NV:] - desired.velocity
-        expected = desired.acceleration - gains.position_gain * error - gains.velocity_gain * rate
+        error, rate = q[BASE_NQ:] - desired[0], v[BASE_NV:] - desired[1]
+        expected = desired[2] - gains.position_gain * error - gains.velocity_gain * rate
         inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.WORLD)
         scale = float(np.linalg.norm(expected) + np.linalg.norm(v) ** 2)
         np.testing.assert_allclose(found, expected, atol=20 * _EPS * np.linalg.cond(inertia) * scale)
@@ -123,14 +121,14 @@ def test_closed_loop_follows_its_closed_form(robot: RobotModel, draw: Draw, orde
     law = NmpcLaw(robot, gains)
     q0 = robot.configuration(draw.pose(), np.tile([0.2, -0.6, 0.1, -1.5, 0.3, -0.8, 0.4], 2))
     error = draw.vector(14, 0.05)
-    desired = DesiredMotion(q0[BASE_NQ:] - error, np.zeros(14), np.zeros(14))
+    desired = np.array([q0[BASE_NQ:] - error, np.zeros(14), np.zeros(14)])
     time, ticks, departures = 1.0, [0.002, 0.004, 0.008], []
     for tick in ticks:
         q, v = q0, np.zeros(20)
         integrator = LieGroupIntegrator(robot.pin, TABLEAUS["rk4"], tick)
         worst = 0.0
         for index in range(round(time / tick)):
-            effort = law.step(state_of(robot, q, v), desired, tick)
+            effort = law.effort(q, v, desired, tick)
             assert np.all(np.abs(effort) < robot.effort_limit)
             generalized = np.concatenate([np.zeros(BASE_NV), effort])
 
@@ -141,7 +139,7 @@ def test_closed_loop_follows_its_closed_form(robot: RobotModel, draw: Draw, orde
             e, rate = _response(gains, (index + 1) * tick)
             worst = max(
                 worst,
-                float(np.max(np.abs(q[BASE_NQ:] - desired.position - e * error))),
+                float(np.max(np.abs(q[BASE_NQ:] - desired[0] - e * error))),
                 float(np.max(np.abs(v[BASE_NV:] - rate * error))),
             )
         departures.append(worst)
@@ -157,8 +155,8 @@ def test_a_constant_disturbance_leaves_a_static_error(robot: RobotModel, draw: D
     disturbance = draw.vector(14, 0.1)
     inertia = reduced_dynamics(robot, q, np.zeros(20)).inertia
     error = 0.3 * period**2 * np.linalg.solve(inertia, disturbance)
-    desired = DesiredMotion(q[BASE_NQ:] - error, np.zeros(14), np.zeros(14))
-    effort = NmpcLaw(robot, NmpcGains(period, 0)).step(state_of(robot, q, np.zeros(20)), desired, 1e-3)
+    desired = np.array([q[BASE_NQ:] - error, np.zeros(14), np.zeros(14)])
+    effort = NmpcLaw(robot, NmpcGains(period, 0)).effort(q, np.zeros(20), desired, 1e-3)
     bound = 20 * _EPS * float(np.linalg.cond(inertia))
     np.testing.assert_allclose(effort, -disturbance, atol=bound)
 
@@ -166,22 +164,22 @@ def test_a_constant_disturbance_leaves_a_static_error(robot: RobotModel, draw: D
 def test_efforts_keep_to_what_the_joints_can_give(robot: RobotModel, draw: Draw) -> None:
     """However large the error, no joint is asked for more than its limit."""
     q = draw.q()
-    desired = DesiredMotion(q[BASE_NQ:] + 500.0, np.zeros(14), np.zeros(14))
-    effort = NmpcLaw(robot, NmpcGains(0.1, 3)).step(state_of(robot, q, np.zeros(20)), desired, 1e-3)
+    desired = np.array([q[BASE_NQ:] + 500.0, np.zeros(14), np.zeros(14)])
+    effort = NmpcLaw(robot, NmpcGains(0.1, 3)).effort(q, np.zeros(20), desired, 1e-3)
     assert np.all(np.abs(effort) <= robot.effort_limit)
     assert np.any(np.abs(effort) == robot.effort_limit)
 
 
 def test_new_gains_act_at_once_and_nothing_is_remembered(robot: RobotModel, draw: Draw) -> None:
     """A law that went on to other gains is the same as one that began with them."""
-    state = state_of(robot, draw.q(), draw.v(0.1))
-    desired = DesiredMotion(state.joint_position + 0.01, np.zeros(14), np.zeros(14))
+    q, v = draw.q(), draw.v(0.1)
+    desired = np.array([q[BASE_NQ:] + 0.01, np.zeros(14), np.zeros(14)])
     law, fresh = NmpcLaw(robot, NmpcGains(1.0, 0)), NmpcLaw(robot, NmpcGains(2.0, 1))
-    law.step(state, desired, 1e-3)
+    law.effort(q, v, desired, 1e-3)
     law.use(NmpcGains(2.0, 1))
-    np.testing.assert_array_equal(law.step(state, desired, 1e-3), fresh.step(state, desired, 1e-3))
+    np.testing.assert_array_equal(law.effort(q, v, desired, 1e-3), fresh.effort(q, v, desired, 1e-3))
     law.reset()
-    np.testing.assert_array_equal(law.step(state, desired, 1e-3), fresh.step(state, desired, 1e-3))
+    np.testing.assert_array_equal(law.effort(q, v, desired, 1e-3), fresh.effort(q, v, desired, 1e-3))
 
 
 def test_linearised_gains_are_the_derivatives_of_the_effort(robot: RobotModel, draw: Draw) -> None:
@@ -193,7 +191,7 @@ def test_linearised_gains_are_the_derivatives_of_the_effort(robot: RobotModel, d
     feedback = law.linearised(inertia)
     assert not np.any(feedback.integral)
     e, rate = draw.vector(14, 0.01), draw.vector(14, 0.01)
-    desired = DesiredMotion(state.joint_position - e, -rate, np.zeros(14))
+    desired = np.array([state.joint_position - e, -rate, np.zeros(14)])
     expected = -(feedback.position @ e + feedback.velocity @ rate)
     rounding = 100 * 14 * _EPS  # gains below 100 on numbers below 10 that were subtracted
-    np.testing.assert_allclose(law.step(state, desired, 1e-3), expected, atol=rounding)
+    np.testing.assert_allclose(law.effort(state.q, state.v, desired, 1e-3), expected, atol=rounding)

@@ -4,7 +4,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sms_handover.control.base import DesiredMotion
 from sms_handover.control.pid import PidGains, PidLaw
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
@@ -49,11 +48,11 @@ def test_law_on_a_frozen_robot_equals_the_linear_simulation(robot: RobotModel, d
     inertia = reduced_dynamics(robot, q, np.zeros(20)).inertia
     law = PidLaw(robot, _GAINS)
     e, rate, count = draw.vector(14, 0.1), np.zeros(14), 3000
-    desired = DesiredMotion(_BENT, np.zeros(14), np.zeros(14))
+    desired = np.array([_BENT, np.zeros(14), np.zeros(14)])
     expected, expected_rate = _linear(inertia, _GAINS, e, count)
     for tick in range(count):
         v = np.concatenate([np.zeros(BASE_NV), rate])
-        effort = law.step(state_of(robot, np.concatenate([q[:BASE_NQ], _BENT + e]), v), desired, _DT)
+        effort = law.effort(np.concatenate([q[:BASE_NQ], _BENT + e]), v, desired, _DT)
         acceleration = np.linalg.solve(inertia, effort)
         e = e + _DT * rate + 0.5 * _DT**2 * acceleration
         rate = rate + _DT * acceleration
@@ -72,19 +71,19 @@ def test_small_motions_of_the_robot_are_those_of_the_frozen_one(robot: RobotMode
     for size in sizes:
         law = PidLaw(robot, _GAINS)
         error = size * direction
-        desired = DesiredMotion(_BENT - error, np.zeros(14), np.zeros(14))
+        desired = np.array([_BENT - error, np.zeros(14), np.zeros(14)])
         expected, _ = _linear(inertia, _GAINS, error, count)
         q, v, worst = q0, np.zeros(20), 0.0
         integrator = LieGroupIntegrator(robot.pin, TABLEAUS["rk4"], _DT)
         for tick in range(count):
-            effort = law.step(state_of(robot, q, v), desired, _DT)
+            effort = law.effort(q, v, desired, _DT)
             generalized = np.concatenate([np.zeros(BASE_NV), effort])
 
             def acceleration(q: Array, v: Array, u: Array = generalized) -> Array:
                 return np.array(pin.aba(robot.pin, robot.data, q, v, u))
 
             q, v = integrator.step(acceleration, q, v)
-            worst = max(worst, float(np.max(np.abs(q[BASE_NQ:] - desired.position - expected[tick]))))
+            worst = max(worst, float(np.max(np.abs(q[BASE_NQ:] - desired[0] - expected[tick]))))
         departures.append(worst)
     assert slope(sizes, departures) == pytest.approx(2.0, abs=0.1)
 
@@ -104,8 +103,8 @@ class Bench:
         q, v = np.zeros(21), np.zeros(20)
         q[6] = 1.0
         q[BASE_NQ + self.joint], v[BASE_NV + self.joint] = error, rate
-        desired = DesiredMotion(np.zeros(14), np.zeros(14), np.zeros(14))
-        effort = self.law.step(state_of(self.robot, q, v), desired, dt)
+        desired = np.array([np.zeros(14), np.zeros(14), np.zeros(14)])
+        effort = self.law.effort(q, v, desired, dt)
         assert np.count_nonzero(np.delete(effort, self.joint)) == 0
         return float(effort[self.joint])
 
@@ -160,8 +159,8 @@ def test_a_saturated_joint_does_not_stop_the_others(robot: RobotModel, draw: Dra
     at_rest = state_of(robot, q, np.zeros(20))
     errors = np.zeros(14)
     errors[0], errors[5] = 100.0, 0.1
-    law.step(at_rest, DesiredMotion(-errors, np.zeros(14), np.zeros(14)), _DT)
-    effort = law.step(at_rest, DesiredMotion(np.zeros(14), np.zeros(14), np.zeros(14)), _DT)
+    law.effort(at_rest.q, at_rest.v, np.array([-errors, np.zeros(14), np.zeros(14)]), _DT)
+    effort = law.effort(at_rest.q, at_rest.v, np.array([np.zeros(14), np.zeros(14), np.zeros(14)]), _DT)
     expected = np.zeros(14)
     expected[5] = -0.1 * _DT
     np.testing.assert_allclose(effort, expected, atol=_EPS)

@@ -31,7 +31,9 @@ def _plant(
     frame = Pose(np.array([0.0, 0.1, 0.0]), np.array([0.0, 0.0, 0.0, 1.0]))
     deputy = pose_of(se3_of(tool) * se3_of(frame).inverse())
     initial = InitialState(base, joints, deputy, {_FRAME: frame})
-    return FreeFloatingPlant(robot, PlantParameters(integrator, *_TOLERANCES), initial, tick_ns)
+    return FreeFloatingPlant(
+        robot, PlantParameters(integrator, *_TOLERANCES, resend_after=1.0), initial, tick_ns
+    )
 
 
 class Drift:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sms_handover.control.base import ControlLaw, DesiredMotion, LinearFeedback
+from sms_handover.control.base import ControlLaw, LinearFeedback
 from sms_handover.control.controller import Gains, check_stability, make_law
 from sms_handover.control.nmpc import NmpcGains
 from sms_handover.control.pid import PidGains
@@ -40,8 +40,8 @@ def _tick(robot: RobotModel, law: ControlLaw[Gains], inertia: Array, q: Array, x
     n = robot.n_joints
     e, rate = x[:n], x[n : 2 * n]
     state = state_of(robot, q, np.zeros(20))
-    desired = DesiredMotion(q[BASE_NQ:] - e, -rate, np.zeros(n))
-    acceleration = np.linalg.solve(inertia, law.step(state, desired, dt))
+    desired = np.array([q[BASE_NQ:] - e, -rate, np.zeros(n)])
+    acceleration = np.linalg.solve(inertia, law.effort(state.q, state.v, desired, dt))
     return np.concatenate([e + dt * rate + 0.5 * dt**2 * acceleration, rate + dt * acceleration])
 
 

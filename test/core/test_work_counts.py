@@ -68,7 +68,8 @@ class Loop:
 
     def tick(self) -> None:
         """Answer a state and integrate."""
-        self.plant.step(self.controller.step(self.plant.state))
+        plant = self.plant
+        plant.apply(self.controller.effort(plant.stamp_ns, plant.q, plant.v))
 
 
 def _loop(overrides: Overrides | None = None) -> Loop:

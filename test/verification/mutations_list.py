@@ -222,8 +222,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "state reports the effort asked for, not the one given",
         "plant/free_floating",
-        "self._q, self._v, self._effort = q, v, effort",
-        "self._q, self._v, self._effort = q, v, command.effort",
+        "self.q, self.v, self.joint_effort = q, v, effort",
+        "self.q, self.v, self.joint_effort = q, v, asked",
         "plant",
     ),
     _core(
@@ -328,22 +328,22 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "NMPC error q_d - q",
         "control/nmpc",
-        "np.subtract(state.joint_position, desired.position, out",
-        "np.subtract(desired.position, state.joint_position, out",
+        "np.subtract(q[BASE_NQ:], position, out",
+        "np.subtract(position, q[BASE_NQ:], out",
         "nmpc",
     ),
     _core(
         "desired acceleration left out",
         "control/nmpc",
-        "acceleration = desired.acceleration - self",
-        "acceleration = 0.0 * desired.acceleration - self",
+        "wanted = acceleration - self",
+        "wanted = 0.0 * acceleration - self",
         "nmpc",
     ),
     _core(
         "NMPC efforts not limited",
         "control/nmpc",
-        "return robot.limited(reduced_inverse_dynamics(robot, state.q, state.v, acceleration))",
-        "return reduced_inverse_dynamics(robot, state.q, state.v, acceleration)",
+        "return self._robot.limited(reduced_inverse_dynamics(self._robot, q, v, wanted))",
+        "return reduced_inverse_dynamics(self._robot, q, v, wanted)",
         "nmpc",
     ),
     _core(
@@ -548,8 +548,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "command recorded as the effort that acted",
         "simulation/recorder",
-        "self._effort[k] = state.joint_effort",
-        "self._effort[k] = command.effort",
+        "self._effort[k] = effort",
+        "self._effort[k] = command",
         "analysis_runs",
     ),
 )

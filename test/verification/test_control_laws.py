@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sms_handover.control.base import ControlLaw, DesiredMotion
+from sms_handover.control.base import ControlLaw
 from sms_handover.control.nmpc import MAX_CONTROL_ORDER, NmpcGains, NmpcLaw
 from sms_handover.control.pid import PidGains, PidLaw
 from sms_handover.model.reduced import reduced_dynamics
@@ -19,7 +19,7 @@ from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
 from sms_handover.plant.integrators import TABLEAUS, LieGroupIntegrator
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.types import Array, JointCommand, Pose
-from test.core.conftest import Draw, slope, state_of
+from test.core.conftest import Draw, slope
 from test.core.test_pid import Bench, _linear
 from test.verification.conftest import Record, Table
 from test.verification.lagrangian import Lagrangian, pinocchio_configuration
@@ -46,9 +46,9 @@ def draw(robot: RobotModel) -> Draw:
     return Draw(robot, seed=20)
 
 
-def _at_rest(position: Array) -> DesiredMotion:
+def _at_rest(position: Array) -> Array:
     """Return a desired motion that stands still."""
-    return DesiredMotion(position, np.zeros(14), np.zeros(14))
+    return np.array([position, np.zeros(14), np.zeros(14)])
 
 
 def _balanced_cond(inertia: Array) -> float:
@@ -88,17 +88,17 @@ def _held_oscillator(gains: NmpcGains, count: int, error: Array, rate: Array) ->
 
 
 def _closed_loop(
-    robot: RobotModel, law: Law, desired: DesiredMotion, q: Array, v: Array, count: int, *, held: bool
+    robot: RobotModel, law: Law, desired: Array, q: Array, v: Array, count: int, *, held: bool
 ) -> Array:
     """Return the joint errors (count + 1, n); ``held`` holds the efforts over each tick, else they follow."""
 
     def effort_at(q: Array, v: Array) -> Array:
-        effort = law.step(state_of(robot, q, v), desired, _TICK)
+        effort = law.effort(q, v, desired, _TICK)
         assert np.all(np.abs(effort) < robot.effort_limit)
         return np.concatenate([np.zeros(BASE_NV), effort])
 
     integrator = LieGroupIntegrator(robot.pin, TABLEAUS["rk4"], _TICK)
-    errors = [q[BASE_NQ:] - desired.position]
+    errors = [q[BASE_NQ:] - desired[0]]
     for _ in range(count):
         command = effort_at(q, v)
 
@@ -106,7 +106,7 @@ def _closed_loop(
             return np.array(pin.aba(robot.pin, robot.data, q, v, command if held else effort_at(q, v)))
 
         q, v = integrator.step(acceleration, q, v)
-        errors.append(q[BASE_NQ:] - desired.position)
+        errors.append(q[BASE_NQ:] - desired[0])
     return np.array(errors)
 
 
@@ -153,14 +153,14 @@ def test_nmpc_effort(robot: RobotModel, draw: Draw, record: Record) -> None:
         euler = np.concatenate([draw.vector(6), draw.joints()])
         q, v = pinocchio_configuration(euler), draw.v()
         error, rate, wanted = draw.vector(14, 0.1), draw.vector(14, 0.1), draw.vector(14, 0.1)
-        desired = DesiredMotion(q[BASE_NQ:] - error, v[BASE_NV:] - rate, wanted)
+        desired = np.array([q[BASE_NQ:] - error, v[BASE_NV:] - rate, wanted])
         motion = lagrangian.motion(euler, v)
         inverse = np.linalg.inv(motion.inertia)
         inertia = np.linalg.inv(inverse[BASE_NV:, BASE_NV:])
         pulled = wanted - gains.position_gain * error - gains.velocity_gain * rate
         expected = inertia @ (pulled + (inverse @ motion.bias)[BASE_NV:])
         weights = 1.0 / np.sqrt(np.diag(inertia))
-        found = law.step(state_of(robot, q, v), desired, _TICK)
+        found = law.effort(q, v, desired, _TICK)
         off = np.linalg.norm((found - expected) * weights) / np.linalg.norm(expected * weights)
         worst, cond = max(worst, float(off)), max(cond, _balanced_cond(motion.inertia))
     claim = "NMPC efforts, relative, 20 states"
@@ -175,12 +175,14 @@ def test_static_error(robot: RobotModel, draw: Draw, period: float, record: Reco
     disturbance = inertia @ draw.vector(14, 0.2)  # 0.2 rad/s^2 on every joint
     nowhere = Pose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
     start = InitialState(base, _BENT, nowhere, {})
-    plant = FreeFloatingPlant(robot, PlantParameters("rk4", 0.01, 0.03, 0.02), start, 1_000_000)
+    plant = FreeFloatingPlant(
+        robot, PlantParameters("rk4", 0.01, 0.03, 0.02, resend_after=1.0), start, 1_000_000
+    )
     law, desired = NmpcLaw(robot, NmpcGains(period, 0)), _at_rest(_BENT)
     decays = 30.0
     # Modes decay as exp(-1.25 t / T_r) but for H*^-1 d changing with q, which costs up to half.
     for _ in range(round(2.0 * decays * period / 1.25 / _TICK)):
-        effort = law.step(plant.state, desired, _TICK) + disturbance
+        effort = law.effort(plant.q, plant.v, desired, _TICK) + disturbance
         plant.step(JointCommand(plant.stamp_ns, effort))
     state = plant.state
     assert not any(plant.saturated_ticks.values())
@@ -235,7 +237,7 @@ def test_pid_on_the_frozen_robot(robot: RobotModel, draw: Draw, record: Record) 
     for tick in range(count):
         v = np.concatenate([np.zeros(BASE_NV), rate])
         moved = np.concatenate([q[:BASE_NQ], _BENT + e])
-        effort = law.step(state_of(robot, moved, v), _at_rest(_BENT), _TICK)
+        effort = law.effort(moved, v, _at_rest(_BENT), _TICK)
         acceleration = np.linalg.solve(inertia, effort)
         e = e + _TICK * rate + 0.5 * _TICK**2 * acceleration
         rate = rate + _TICK * acceleration
