@@ -212,6 +212,10 @@ def test_in_a_frame_it_tells_and_takes_the_time(browsing: Browsing, scenes: dict
         page.evaluate(f"inside.contentWindow.postMessage({nonsense}, '*')")
     page.evaluate("inside.contentWindow.postMessage({ type: 'time', t: 0.75 }, '*')")
     inside.wait_for_function("player.t === 0.75")
+    inside.evaluate("window.postMessage({ type: 'time', t: 0.9 }, '*')")  # not from the page around it
+    page.evaluate("inside.contentWindow.postMessage({ type: 'theme', theme: 'light' }, '*')")
+    inside.wait_for_function("player.theme === 'light'")
+    assert inside.evaluate("player.t") == 0.75
     assert page.evaluate("heard.length") == count  # it does not tell what it was told
     assert visit.errors == [] and visit.requests == []
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import pytest
 
@@ -13,6 +14,7 @@ from sms_handover.topics import ROBOT_DESCRIPTION, graph_topics
 
 from .bag_messages import TYPES, WALL_NS, joint_state, made_up_run, odometry, open_topics, record_run
 from .layout_paths import (
+    PLOTJUGGLER,
     Messages,
     foxglove_layout,
     foxglove_paths,
@@ -90,6 +92,17 @@ def test_every_panel_has_one_place() -> None:
     tabs = [tab["layout"] for tab in layout["configById"]["Tab!plots"]["tabs"]]
     placed = [name for part in (layout["layout"], *tabs) for name in leaves(part)]
     assert sorted(placed) == sorted(layout["configById"])
+
+
+def test_the_tabs_of_plotjuggler_are_built_as_it_reads_them() -> None:
+    """Its loader takes the number of plots and their sizes from the splitter, not from what is in it."""
+    splitters = list(ET.parse(PLOTJUGGLER).iter("DockSplitter"))
+    assert splitters
+    for splitter in splitters:
+        sizes = [float(size) for size in splitter.attrib["sizes"].split(";")]
+        assert splitter.attrib["orientation"] in {"-", "|"}
+        assert len(list(splitter)) == int(splitter.attrib["count"]) == len(sizes)
+        assert sum(sizes) == pytest.approx(1.0, abs=1e-5)
 
 
 def leaves(part: Any) -> Iterator[str]:

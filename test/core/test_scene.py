@@ -34,8 +34,11 @@ def scenario(make_scenario: MakeScenario) -> Scenario:
 
 @pytest.fixture
 def run(scenario: Scenario) -> RunData:
-    """A handover of 1.4 s, so long that every phase has frames of its own."""
-    return simulate(scenario)
+    """A handover of 1.4 s, so that every phase has frames of its own; the deputy drifts, as it is made to."""
+    done = simulate(scenario)
+    deputy_pose = done.deputy_pose.copy()
+    deputy_pose[:, 0] += np.linspace(0.0, 0.1, len(deputy_pose))
+    return replace(done, deputy_pose=deputy_pose)
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ from sms_handover.simulation.scenario import Scenario
 from sms_handover.simulation.simulate import simulate
 
 from .conftest import MakeScenario
-from .scene_documents import frames, play, times
+from .scene_documents import frames, play, poses, times
 
 PATIENCE_S = 60.0  # s of wall time after which a wait has failed
 
@@ -65,6 +65,24 @@ def test_what_is_new_is_told_once(live: LiveScene, run: RunData, scene: Scene) -
     assert second is not None and "shapes" not in second[0]
     told = np.concatenate([times(first[0]), times(second[0])])
     assert np.array_equal(told, scene.stamp_ns[:8] / 1e9)
+
+
+def test_poses_are_those_of_the_run(live: LiveScene, run: RunData, scene: Scene) -> None:
+    play(live, run, scene)
+    news = live.news(Seen(), 0.0)
+    assert news is not None
+    told = poses(news[0], len(scene.links) + 1 + len(scene.arms))
+    targets = [scene.target_in_world[arm][:, None] for arm in scene.arms]
+    expected = np.concatenate([scene.link_in_world, scene.deputy_in_world[:, None], *targets], axis=1)
+    assert np.abs(told - expected).max() < 1e-6  # m; single precision
+
+
+def test_a_frame_that_goes_back_begins_another_run(live: LiveScene, run: RunData, scene: Scene) -> None:
+    """Whether the phase or the frame comes first depends on the middleware."""
+    for frame in (*frames(run, scene), frames(run, scene)[0]):
+        live.add(frame)
+    news = live.news(Seen(), 0.0)
+    assert news is not None and times(news[0]).tolist() == [0.0]
 
 
 def test_instants_between_frames_are_left_out(scenario: Scenario, run: RunData, scene: Scene) -> None:
