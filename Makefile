@@ -8,7 +8,6 @@ MEASURED := build/verification
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint .ci/constraints.txt
 MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evidence $(MEASURED)/evidence.json
-TYPED := setup.py interfaces/setup.py docs/reference.py sms_handover test $(wildcard benchmarks/*.py)
 
 # The environment stands alone: what a sourced ROS workspace or another environment exports must not leak in.
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
@@ -54,7 +53,7 @@ reference: install  ## write docs/parameters.md and docs/topics.md from the code
 lint: $(VENV)/.test  ## check style and types
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
-	$(BIN)/mypy $(TYPED)
+	$(BIN)/mypy
 
 install: $(VENV)/.package  ## make the environment and install the package into it
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+import yaml
 
 import sms_handover
 
@@ -58,6 +59,8 @@ OUTSIDE = sorted(set(imported_modules()) - {"sms_handover"} - set(sys.stdlib_mod
 def test_every_file_names_the_same_version() -> None:
     assert declared_version(ROOT / "package.xml") == sms_handover.__version__
     assert declared_version(ROOT / "interfaces" / "package.xml") == sms_handover.__version__
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["version"] == sms_handover.__version__
 
 
 def test_every_executable_exists() -> None:

@@ -1,0 +1,221 @@
+"""Every command and every Python block in the documents is right: programs, options, names, syntax."""
+
+import ast
+import re
+import subprocess
+from argparse import ArgumentParser
+from collections.abc import Iterable
+from dataclasses import fields
+from importlib import import_module
+from importlib.util import find_spec
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from sms_handover.cli.main import _COMMANDS
+from sms_handover.ros.launch_arguments import ARGUMENTS
+from sms_handover.ros.reference import COMMON_GROUP, OWN_GROUPS, groups_of
+from sms_handover.services import SERVICES
+from sms_handover.topics import TF, graph_topics
+
+from .documents import DOCUMENTS, SHELL, Block, blocks, commands, inline_code
+from .workspace import PACKAGE, ROOT, executables
+
+ELSEWHERE = {"apt", "cd", "colcon", "export", "git", "mkdir", "pip", "pre-commit", "rosdep", "ruff", "source"}
+BLOCKS = [block for path in DOCUMENTS for block in blocks(path)]
+OF_SHELL = [block for block in BLOCKS if block.language in SHELL]
+OF_PYTHON = [block for block in BLOCKS if block.language == "python"]
+ARMS = ("arm_a", "arm_b")
+
+
+class Refused(Exception):
+    """A command in a document is wrong."""
+
+
+class StrictParser(ArgumentParser):
+    """A parser that raises instead of ending the process."""
+
+    def error(self, message: str) -> None:  # type: ignore[override]
+        raise Refused(message)
+
+    def exit(self, status: int = 0, message: str | None = None) -> None:  # type: ignore[override]
+        """Let ``--help`` be."""
+
+
+def parser_of(command: str) -> ArgumentParser:
+    """Return the parser of one of our commands."""
+    if command not in _COMMANDS:
+        raise Refused(f"sms-handover has no command {command!r}")
+    parser = StrictParser(prog=command)
+    import_module(f"sms_handover.cli.{command}").add_parser(parser)
+    return parser
+
+
+def options_of(parser: ArgumentParser) -> list[str]:
+    """Return every option of a parser and of its sub-commands."""
+    nested = [action.choices.values() for action in parser._actions if isinstance(action.choices, dict)]
+    return [
+        *parser._option_string_actions,
+        *(o for group in nested for sub in group for o in options_of(sub)),
+    ]
+
+
+def check(words: list[str]) -> None:
+    """Raise Refused if a command names something that does not exist."""
+    program, rest = Path(words[0]).name, words[1:]
+    if program == "sms-handover":
+        check_ours(rest)
+    elif program == "make":
+        targets = re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+        require([word for word in rest if "=" not in word], targets, "target of make")
+    elif program.startswith("python"):
+        check_python(rest)
+    elif program == "ros2":
+        check_ros2(rest)
+    elif program not in ELSEWHERE:
+        raise Refused(f"{program!r} is no command of ours, nor one of ELSEWHERE in this file")
+
+
+def check_ours(words: list[str]) -> None:
+    """Check a call of ``sms-handover``."""
+    if not words or words[0] in ("--help", "--version"):
+        return
+    options = parser_of(words[0]).parse_args(words[1:])
+    for text in getattr(options, "param", []):
+        node, _, name = text.partition(":=")[0].partition(".")
+        groups = {"common": COMMON_GROUP, **OWN_GROUPS}
+        require([node], groups, "node")
+        require([name], [item.name for item in fields(groups[node].cls)], f"parameter of {node}")
+
+
+def check_python(words: list[str]) -> None:
+    """Check a call of Python: a module, or a script."""
+    if words[0] == "-m" and words[1] not in ("venv", "pip"):
+        if find_spec(words[1]) is None:
+            raise Refused(f"there is no module {words[1]!r}")
+        if words[1].startswith(f"{PACKAGE}.nodes."):
+            check_parameters(words[1].rpartition(".")[2], words)
+    elif words[0].endswith(".py") and not (ROOT / words[0]).is_file():
+        raise Refused(f"there is no script {words[0]!r}")
+
+
+def check_ros2(words: list[str]) -> None:
+    """Check a call of ``ros2``: executables, launch files, launch arguments, topics and services of ours."""
+    if words[:2] == ["run", PACKAGE]:
+        require(words[2:3], executables(), "executable")
+        if words[2] in OWN_GROUPS:
+            check_parameters(words[2], words)
+    elif words[:2] == ["launch", PACKAGE]:
+        require(words[2:3], [path.name for path in (ROOT / "launch").iterdir()], "launch file")
+        source = (ROOT / "launch" / words[2]).read_text(encoding="utf-8")
+        known = [*ARGUMENTS, *re.findall(r'DeclareLaunchArgument\(\s*"(\w+)"', source)]
+        require([word.partition(":=")[0] for word in words[3:] if ":=" in word], known, "launch argument")
+    elif words[0] == "topic":
+        known = ["/" + topic.name.lstrip("/") for topic in graph_topics(ARMS)]
+        require([word for word in words[2:] if word.startswith("/")], [*known, TF], "topic")
+    elif words[:2] == ["service", "call"]:
+        require(
+            words[2:4], [n for s in SERVICES for n in (f"/{s.relative_name}", s.type)], "service or its type"
+        )
+    else:
+        require(words[:1], ["interface", "node", "param", "pkg", "service"], "command of ros2")
+
+
+def check_parameters(node: str, words: list[str]) -> None:
+    """Check the names behind ``-p`` of a node."""
+    known = [item.name for group in groups_of(node) for item in fields(group.cls)]
+    given = [word.partition(":=")[0] for flag, word in pairwise(words) if flag == "-p"]
+    require(given, known, f"parameter of {node}")
+
+
+def require(names: Iterable[str], known: Iterable[str], what: str) -> None:
+    """Raise Refused at the first name that is not known."""
+    for name in names:
+        if name not in list(known):
+            raise Refused(f"{name!r} is no {what}")
+
+
+def place(block: Block) -> str:
+    return block.place
+
+
+@pytest.mark.parametrize("block", OF_SHELL, ids=place)
+def test_commands_are_right(block: Block) -> None:
+    subprocess.run(["bash", "-n"], input=block.text, text=True, check=True)
+    for words in commands(block.text):
+        try:
+            check(words)
+        except Refused as refusal:
+            pytest.fail(f"{block.place}: {' '.join(words)}: {refusal}")
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+def test_commands_in_the_text_exist(path: Path) -> None:
+    """In a sentence arguments may be left out; command, options and targets must exist."""
+    for code in inline_code(path):
+        words = code.split()
+        if words[:1] == ["make"]:
+            check(words)
+        elif words[:1] == ["sms-handover"] and len(words) > 1 and words[1].islower():
+            options = [word for word in words[2:] if word.startswith("--")]
+            require(options, options_of(parser_of(words[1])), f"option of {words[1]}")
+
+
+@pytest.mark.parametrize("block", OF_PYTHON, ids=place)
+def test_python_imports_what_exists(block: Block) -> None:
+    for node in ast.walk(ast.parse(block.text)):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            module = import_module(node.module)
+            for alias in node.names:
+                assert hasattr(module, alias.name) or find_spec(f"{node.module}.{alias.name}"), alias.name
+        elif isinstance(node, ast.Import):
+            assert all(find_spec(alias.name) for alias in node.names)
+
+
+@pytest.mark.parametrize("block", [block for block in OF_PYTHON if "runs/" not in block.text], ids=place)
+def test_python_that_needs_no_recording_runs(
+    block: Block, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    exec(compile(block.text, block.place, "exec"), {})
+
+
+def test_there_is_something_to_check() -> None:
+    assert len(OF_SHELL) >= 3 and OF_PYTHON
+    assert [block.place for block in BLOCKS if not block.language] == []
+
+
+WRONG = [
+    "sms-handover rum",
+    "sms-handover run --contoller pid",
+    "sms-handover run --controller pdi",
+    "sms-handover run -p controler.law:=pid",
+    "sms-handover run -p controller.lw:=pid",
+    "sms-handover compare",
+    "FOO=1 time .venv/bin/sms-handover simulate --nothing > out.txt",
+    "make handovr",
+    "cd there && python -m sms_handover.nodes.plnt",
+    "python -m sms_handover.nodes.plant --ros-args -p law:=pid",
+    "python no_such.py",
+    "ros2 run sms_handover plnt",
+    "ros2 run sms_handover plant --ros-args -p law:=pid",
+    "ros2 launch sms_handover handover.launch.xml",
+    "ros2 launch sms_handover handover.launch.py controler:=pid",
+    "ros2 topic echo /joint_state",
+    "ros2 service call /plant/stop std_srvs/srv/Trigger",
+    "ros2 bagg",
+    "sms_handover run",
+]
+
+
+@pytest.mark.parametrize("script", WRONG)
+def test_a_wrong_command_is_noticed(script: str) -> None:
+    with pytest.raises(Refused):
+        for words in commands(script):
+            check(words)
+
+
+def test_a_script_is_taken_apart() -> None:
+    script = "A=1 time make x  # not this\ncd a && b -c 'd # e' | f \\\n  --g > h\n"
+    assert list(commands(script)) == [["make", "x"], ["cd", "a"], ["b", "-c", "d # e"], ["f", "--g"]]
