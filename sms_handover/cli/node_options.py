@@ -33,10 +33,7 @@ def add_graph_options(parser: ArgumentParser) -> None:
 def given(options: Namespace, names: Mapping[str, str]) -> dict[str, object]:
     """Return the parameters that the options set; ``names`` maps options to parameters."""
     values = {name: getattr(options, option) for option, name in names.items()}
-    unset = (name for name, value in values.items() if value is None or value is False or value == [])
-    for name in list(unset):
-        del values[name]
-    return values
+    return {name: value for name, value in values.items() if not _unset(value)}
 
 
 def run_in_process(
@@ -52,3 +49,8 @@ def run_in_process(
         os.environ["ROS_DOMAIN_ID"] = str(options.domain_id)
     rules = [part for rule in remap for part in ("--remap", rule)]
     return main(["sms-handover", "--ros-args", *rules, *as_arguments(parameters)])
+
+
+def _unset(value: object) -> bool:
+    """Tell whether an option was not given."""
+    return value is None or value is False or value == []

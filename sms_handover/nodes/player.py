@@ -58,7 +58,7 @@ class PlayerNode(RunnableNode):
         self._source = PlaybackSource(
             path=self._info.path,
             topics=frozenset(self._outlets),
-            latched={name: item.kept for name, item in self._outlets.items() if item.kept},
+            latched={name: item.in_force for name, item in self._outlets.items() if item.in_force},
             bag_start_ns=self._info.start_ns,
             span=span_of(self._info, options.start_offset, options.duration),
         )

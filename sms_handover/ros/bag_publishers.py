@@ -39,13 +39,14 @@ class Skipped:
 
 
 class BagPublisher:
-    """The publisher of one topic of a bag."""
+    """The publisher of one topic of a bag; ``in_force`` messages of it reach a subscriber that comes late."""
 
     def __init__(self, node: Node, topic: TopicInfo, offer: Offer) -> None:
         """Advertise the topic; raises GraphError if its type is not installed."""
         self.name = topic.name
         self.profile = profile_for(offer, topic.message_count)
-        self.kept = self.profile.depth if offer.latched else 0
+        self._depth = self.profile.depth if offer.latched else 0
+        self.in_force = (self._depth or topic.message_count) if offer.latched else 0
         self._reliable = offer.reliability is Reliability.RELIABLE
         self._publisher = node.create_publisher(message_class(topic.type), topic.name, self.profile)
         self._unconfirmed = 0
@@ -66,7 +67,7 @@ class BagPublisher:
         A volatile topic has KEEP_ALL history, whose full queue refuses the message. A latched one keeps
         the last few, so before it would replace one that somebody has not got it waits for all.
         """
-        if self.kept and self._reliable and self._unconfirmed >= self.kept:
+        if self._depth and self._reliable and self._unconfirmed >= self._depth:
             if not self.confirmed(_ACK_POLL):
                 return False
             self._unconfirmed = 0

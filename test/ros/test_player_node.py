@@ -374,7 +374,7 @@ def test_a_full_queue_refuses_and_nothing_is_sent(bench: Bench, tmp_path: Path) 
 def test_a_latched_topic_replaces_nothing_that_has_not_been_got(bench: Bench, tmp_path: Path) -> None:
     fake = FakePublisher()
     publisher = bag_publisher(bench, tmp_path, fake, "/map")
-    assert publisher.kept == 1
+    assert publisher.in_force == 1
     assert publisher.publish(b"a")
     assert not publisher.publish(b"b")
     fake.acked = True
