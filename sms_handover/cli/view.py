@@ -55,6 +55,8 @@ def command(options: Namespace) -> int:
         if options.runs or options.output:
             raise ConfigurationError("--live shows a running graph: give no RUN and no --output with it")
         return int(import_module("sms_handover.cli.view_live").follow(options))  # bags need no ROS
+    if options.port is not None or options.domain_id is not None:
+        raise ConfigurationError("--port and --domain-id are for a running graph: give --live with them")
     if not options.runs:
         raise ConfigurationError("nothing to show: give the output folder of a run, or --live")
     page = animation_html(
@@ -69,13 +71,14 @@ def command(options: Namespace) -> int:
 
 def _scenes(options: Namespace) -> dict[str, Scene]:
     """Return the scenes of the runs, by the names of their folders."""
+    frame_rate = FRAME_RATE if options.frame_rate is None else options.frame_rate
     scenes: dict[str, Scene] = {}
     for path in options.runs:
         name = path.resolve().name
         if name in scenes:
             raise ConfigurationError(f"two runs are named {name!r}; rename one folder")
         try:
-            scenes[name] = read_scene(bag_of(path), options.frame_rate or FRAME_RATE)
+            scenes[name] = read_scene(bag_of(path), frame_rate)
         except BagError as error:
             raise ConfigurationError(str(error)) from error  # exit code 2: what was given cannot be used
     return scenes

@@ -27,6 +27,7 @@ def test_runs_become_one_page(recorded: Recorded, tmp_path: Path) -> None:
         ([], "nothing to show: give the output folder of a run, or --live"),
         (["nowhere"], "there is no bag at nowhere"),
         (["nowhere", "--live"], "give no RUN and no --output with it"),
+        (["nowhere", "--port", "8080"], "--port and --domain-id are for a running graph: give --live"),
         (["--live", "--port", "70000"], "'port' is 70000"),
         (["--live", "--domain-id", "500"], "domain id is 500, allowed is 0 to"),
     ],
@@ -36,6 +37,12 @@ def test_what_cannot_be_shown_is_named(arguments: list[str], message: str, tmp_p
     assert ended.code == 2
     (error,) = ended.errors
     assert message in error
+
+
+def test_a_rate_of_zero_is_not_taken_for_the_default(recorded: Recorded, tmp_path: Path) -> None:
+    ended = sms_handover("view", recorded[LAWS[0]][0], "--frame-rate", 0, "--no-browser", cwd=tmp_path)
+    assert ended.code == 2
+    assert "frame rate is 0 1/s, it must be positive" in ended.err
 
 
 def test_a_page_that_cannot_be_written_is_named(recorded: Recorded, tmp_path: Path) -> None:

@@ -85,7 +85,8 @@ class Picture {
     const half = (FIELD_OF_VIEW / 2) * (Math.PI / 180);
     const narrow = Math.min(half, Math.atan(Math.tan(half) * (width / height)));
     const direction = new THREE.Vector3(...VIEWS[view]).normalize();
-    this.camera.position.copy(middle).addScaledVector(direction, radius / Math.sin(narrow));
+    const room = width < height ? 1.1 : 1; // upright, a ball that just fits hides the elbows
+    this.camera.position.copy(middle).addScaledVector(direction, (room * radius) / Math.sin(narrow));
     this.controls.target.copy(middle);
     this.controls.update();
     this.ask();
