@@ -19,6 +19,7 @@ from .conftest import Browsing, Visit
 pytestmark = pytest.mark.browser
 
 NEAR = 1e-6  # s
+PATIENCE_MS = 60_000  # ms until a page that does not do what it should is given up
 LARGEST_IN_SIGHT = """() => {
   const { lines, view } = plots.plots[0];
   const [begin, end] = view.range;
@@ -61,7 +62,13 @@ def settle(page: Page) -> None:
 
 def until(page: Page, condition: str) -> None:
     """Wait until an expression is true; the page's policy forbids the way Playwright would do it."""
-    page.evaluate(f"async () => {{ while (!({condition})) await new Promise(requestAnimationFrame); }}")
+    page.evaluate(f"""async () => {{
+        const latest = performance.now() + {PATIENCE_MS};
+        while (!({condition})) {{
+            if (performance.now() > latest) throw new Error("it never came true");
+            await new Promise(requestAnimationFrame);
+        }}
+    }}""")
 
 
 def ranges(page: Page) -> list[list[float]]:

@@ -70,6 +70,16 @@ def test_highlights_are_the_worst_of_all_phases_and_arms() -> None:
     assert rows["largest distance at a grasp [mm]"].cells == ("4", "-")
 
 
+def test_a_tool_that_never_settles_in_one_phase_has_no_longest_settling_time() -> None:
+    """The first phase is an exponential that settles; later the tool stays 2 mm away, out of its band."""
+    late = {"arm_a": line(lambda t: np.where(t < 20.0, 0.05 * np.exp(-t), 0.002))}
+    settled = {"arm_a": line(lambda t: np.where(t < 20.0, 0.05 * np.exp(-t), 0.0))}
+    comparison = compare({"late": make_run(tool=late), "settled": make_run(tool=settled)})
+    (times,) = [item for item in highlights(comparison).rows if item.label == "longest settling time [s]"]
+    assert times.cells[0] == "never" and times.better == {1}
+    assert float(times.cells[1]) == pytest.approx(np.log(50.0), abs=0.02)
+
+
 def test_nmpc_is_solid_and_pid_is_dashed_wherever_they_stand() -> None:
     for laws in (["nmpc", "pid"], ["pid", "nmpc"], ["pid"], ["other", "pid", "nmpc"]):
         for style in run_styles([f"run {place}" for place in range(len(laws))], laws):
