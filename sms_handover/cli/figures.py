@@ -7,11 +7,12 @@ from pathlib import Path
 from sms_handover.analysis.figure_catalogue import FIGURES, chosen_figures, chosen_formats
 from sms_handover.cli.recorded import read_all
 from sms_handover.control.parameters import LAWS
-from sms_handover.errors import ConfigurationError
+from sms_handover.errors import BagError, ConfigurationError, SmsHandoverError
 from sms_handover.report.recorded_run import RecordedRun
 from sms_handover.scene.read import deputy_size_in
 from sms_handover.scene.scene import Scene, make_scene
 
+_SNAPSHOTS = "snapshots"  # the one figure that needs a scene
 _FRAME_RATE = 10.0  # [1/s] of the scene that snapshots are taken from
 _DEFAULT_FORMATS = "pdf,png"
 _DPI = (50, 1200)  # [1/in] allowed
@@ -57,23 +58,30 @@ def add_parser(parser: ArgumentParser) -> None:
 def command(options: Namespace) -> int:
     """Carry out the command; return the exit code."""
     formats = chosen_formats([name.strip() for name in options.format.split(",")])
-    chosen_figures(options.only)
+    with_scenes = _SNAPSHOTS in {kind.name for kind in chosen_figures(options.only)}
     if not _DPI[0] <= options.dpi <= _DPI[1]:
         raise ConfigurationError(f"--dpi is {options.dpi} dots per inch, allowed is {_DPI[0]} to {_DPI[1]}")
     # here, because matplotlib is optional and slow to import: help and wrong input need none of it
     from sms_handover.analysis.figures.draw import draw_figures, write_figure  # noqa: PLC0415
     from sms_handover.analysis.figures.drawn_run import DrawnRun  # noqa: PLC0415
 
-    runs = [DrawnRun(_label(run.name), run.data, _scene(run)) for run in read_all(options.runs)]
+    runs = [
+        DrawnRun(_label(run.name), run.data, _scene(run) if with_scenes else None)
+        for run in read_all(options.runs)
+    ]
     try:
         options.output.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ConfigurationError(f"{options.output} cannot be made: {error.strerror}") from error
+    written = 0
     for name, figure in draw_figures(runs, options.only):
         for suffix in formats:
             path = options.output / f"{name}.{suffix}"
             write_figure(figure, path, options.dpi)
             print(path, flush=True)
+            written += 1
+    if not written:
+        raise ConfigurationError(f"there is nothing to draw of {' '.join(options.only)} in these runs")
     return 0
 
 
@@ -83,8 +91,11 @@ def _label(name: str) -> str:
 
 
 def _scene(run: RecordedRun) -> Scene | None:
-    """Return the moving scene of a run, None if its bag does not describe the robot or the deputy."""
-    if run.info.urdf_text is None or run.info.schedule_text is None:
-        print(f"no snapshots of {run.name}: its bag describes no robot or no deputy", file=sys.stderr)
+    """Return the moving scene of a run, None if its bag does not describe all that there is to see."""
+    try:
+        if run.info.urdf_text is None:
+            raise BagError("its bag carries no robot description")
+        return make_scene(run.data, run.info.urdf_text, deputy_size_in(run.info), _FRAME_RATE)
+    except SmsHandoverError as error:
+        print(f"no snapshots of {run.name}: {error}", file=sys.stderr)
         return None
-    return make_scene(run.data, run.info.urdf_text, deputy_size_in(run.info), _FRAME_RATE)

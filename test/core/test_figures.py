@@ -256,13 +256,25 @@ def drawn_texts(figure: Figure) -> list[Text]:
     return [text for text in found if text.get_visible() and text.get_text().strip()]
 
 
-@pytest.mark.parametrize("name", [kind.name for kind in FIGURES if kind.name != "base_path"])
+FLAT = [kind.name for kind in FIGURES if kind.name != "base_path"]  # boxes around leaning words say little
+
+
+@pytest.mark.parametrize("name", FLAT)
 def test_no_text_covers_another_or_leaves_the_figure(
     nmpc_run: RunData, pid_run: RunData, scenario: Scenario, name: str
 ) -> None:
-    """Of the whole handover, as printed; not base_path, where the boxes around leaning words say little."""
+    """Of the whole handover, as printed."""
     scene = make_scene(nmpc_run, scenario.robot.urdf, scenario.schedule.deputy.size, 1.0)
-    runs = [DrawnRun("NMPC", nmpc_run, scene), DrawnRun("PID", pid_run)]
+    assert_legible([DrawnRun("NMPC", nmpc_run, scene), DrawnRun("PID", pid_run)], name)
+
+
+@pytest.mark.parametrize("name", ["tool_error", "torque", "momentum", "snapshots"])
+def test_words_of_short_phases_and_failed_grasps_find_room(drawn: DrawnRun, name: str) -> None:
+    assert_legible([drawn, *named([drawn.data] * 2)], name)
+
+
+def assert_legible(runs: Sequence[DrawnRun], name: str) -> None:
+    """Every text is within the figure and free of every other."""
     for _, figure in draw_figures(runs, [name]):
         canvas = FigureCanvasAgg(figure)
         canvas.draw()

@@ -5,12 +5,16 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 
 from sms_handover.analysis.figures.drawn_run import DrawnRun
-from sms_handover.analysis.figures.style import FAINT, MUTED
+from sms_handover.analysis.figures.style import FAINT, MUTED, PAGE
 from sms_handover.types import GraspAction, GraspCommand, GraspStatus
 from sms_handover.units import ns_to_seconds
 
-_NAMES_AT, _EVENTS_AT = 2.0, 10.5  # [pt] above the axes
-_SIZE = 7.0  # [pt]
+_SIZE = 7.0  # [pt] of the letters
+_LETTER = 3.6  # [pt] width of one, on the average
+_ROW = 8.5  # [pt] from one row of words above the axes to the next
+_GAP = 2.0  # [pt] between the axes and the first row
+_POINTS_PER_INCH = 72.0
+_AXES_PART = 0.8  # [-] of the width of its column that axes have at least, beside numbers and label
 
 
 def mark_boundaries(axes: Axes, runs: Sequence[DrawnRun]) -> None:
@@ -26,20 +30,42 @@ def mark_boundaries(axes: Axes, runs: Sequence[DrawnRun]) -> None:
 
 
 def name_phases(axes: Axes, runs: Sequence[DrawnRun]) -> None:
-    """Write the phases' names above the axes, and over them what was grasped when."""
-    for span in runs[0].phases:
-        middle = ns_to_seconds(span.start_ns + span.end_ns) / 2.0
-        _write(axes, middle, _NAMES_AT, span.name, style="italic")
+    """Write the phases' names above the axes, and over them what was grasped when.
+
+    Where names are longer than their phases, the phases are numbered from 1 instead; what does not fit
+    beside its neighbour goes a row higher.
+    """
+    spans = runs[0].phases
+    middles = [ns_to_seconds(span.start_ns + span.end_ns) / 2.0 for span in spans]
+    scale = _seconds_per_point(axes)
+    fits = all(len(span.name) * _LETTER * scale <= span.duration for span in spans)
+    names = [span.name if fits else str(number) for number, span in enumerate(spans, 1)]
+    for middle, name in zip(middles, names, strict=True):
+        _write(axes, middle, 0, name, style="italic")
+    ends: list[float] = []  # of the words in each row, s
     for time, words in _events(runs):
-        _write(axes, time, _EVENTS_AT, words)
+        half = (len(words) + 1) * _LETTER * scale / 2.0
+        row = next((row for row, end in enumerate(ends) if end <= time - half), len(ends))
+        ends[row : row + 1] = [time + half]
+        _write(axes, time, row + 1, words)
 
 
-def _write(axes: Axes, time: float, height: float, text: str, style: str = "normal") -> None:
+def _seconds_per_point(axes: Axes) -> float:
+    """Return how long the time is that takes a point of the width, before anything is laid out."""
+    place = axes.get_subplotspec()
+    columns = place.get_gridspec().ncols if place else 1
+    low, high = axes.get_xlim()
+    figure = axes.get_figure(root=True)
+    width = (figure.get_figwidth() if figure else PAGE) * _POINTS_PER_INCH / columns
+    return float(high - low) / (_AXES_PART * width)
+
+
+def _write(axes: Axes, time: float, row: int, text: str, style: str = "normal") -> None:
     """Write a text above the axes, centred at a time."""
     axes.annotate(
         text,
         (time, 1.0),
-        (0.0, height),
+        (0.0, _GAP + _ROW * row),
         xycoords=axes.get_xaxis_transform(),
         textcoords="offset points",
         ha="center",

@@ -1,5 +1,6 @@
 """The handover as a strip of pictures (figure 3 of the paper shows the planned sequence)."""
 
+from collections.abc import Sequence
 from math import radians
 
 import numpy as np
@@ -60,7 +61,7 @@ def draw_snapshots(run: DrawnRun) -> Figure:
         axes.grid(visible=False)
     for axes in panels[len(frames) :]:
         axes.set_axis_off()
-    _add_key(panels[len(frames)], run)
+    _add_key(panels[len(frames)], scene.arms, run.name)
     return figure
 
 
@@ -121,16 +122,14 @@ def _title(scene: Scene, frame: int) -> str:
     return f"{ns_to_seconds(stamp_ns):g} s: {words if frame else 'start'}"
 
 
-def _add_key(axes: Axes, run: DrawnRun) -> None:
+def _add_key(axes: Axes, arms: Sequence[str], title: str) -> None:
     """Say in an empty panel what the colours mean, and which way the world's axes point."""
-    assert run.scene is not None
-    arms = run.scene.arms
     handles: list[Patch | Line2D] = [
         Patch(color=_pale(COLOURS[place]), label=in_print(arm)) for place, arm in enumerate(arms)
     ]
     handles.append(Patch(color=_DEPUTY, label="deputy"))
     handles.append(Line2D([], [], color=MUTED, linewidth=1.0, label="path of a tool"))
-    axes.legend(handles=handles, title=run.name, loc="upper left", borderpad=0.0)
+    axes.legend(handles=handles, title=title, loc="upper left", borderpad=0.0)
     origin = (0.74, 0.4)
     for name, (right, up) in zip("xyz", 0.2 * _CAMERA.seen(np.eye(3)), strict=True):
         axes.annotate(

@@ -31,6 +31,8 @@ _STYLE: dict[str, Any] = {
     "xtick.major.width": 0.5,
     "ytick.major.width": 0.5,
     "grid.linewidth": 0.3,
+    "xtick.major.pad": 5.0,  # so that the first numbers of both axes keep apart in the corner
+    "ytick.major.pad": 4.5,
     "xtick.direction": "in",
     "ytick.direction": "in",
     "legend.frameon": False,
