@@ -78,22 +78,11 @@ class PlayerNode(RunnableNode):
             if keyboard.usable:
                 print(KEYS, file=sys.stderr)
             self._wait_for_subscribers(executor, stop)
-            self._schedule.read_ahead(self.parameters.read_ahead)
-            self._schedule.start(monotonic_ns())
-            while not (stop.asked or self._ended):
-                self._send()
-                if self._schedule.finished:
-                    break
-                executor.spin_once(timeout_sec=self._idle_s())
-                for key in keyboard.pressed():
-                    self._on_key(key)
-                if self._line.due:
-                    self._line.show(progress_line(self._schedule, self._source.span, monotonic_ns()))
-            now_ns = monotonic_ns()
-            self._publish_clock()
-            self._line.show(progress_line(self._schedule, self._source.span, now_ns))
-            self._line.stay()
-            print(closing_line(self._schedule, now_ns))
+            try:
+                self._play(executor, stop, keyboard)
+            finally:
+                self._line.stay()
+            print(closing_line(self._schedule, monotonic_ns()))
             missing = self._unconfirmed(stop)
         if missing:
             print(f"not confirmed by a subscriber of: {', '.join(missing)}", file=sys.stderr)
@@ -139,6 +128,26 @@ class PlayerNode(RunnableNode):
                 return
 
     # Playing
+
+    def _play(self, executor: Executor, stop: Stop, keyboard: Keyboard) -> None:
+        """Send every message when its time comes, until the end or until asked to stop."""
+        self._schedule.read_ahead(self.parameters.read_ahead)
+        self._schedule.start(monotonic_ns())
+        while not (stop.asked or self._ended):
+            self._send()
+            if self._schedule.finished:
+                break
+            executor.spin_once(timeout_sec=self._idle_s())
+            for key in keyboard.pressed():
+                self._on_key(key)
+            if self._line.due:
+                self._show()
+        self._publish_clock()
+        self._show()
+
+    def _show(self) -> None:
+        """Show how far the playback is."""
+        self._line.show(progress_line(self._schedule, self._source.span, monotonic_ns()))
 
     def _send(self) -> None:
         """Publish what is due, for a while at most."""

@@ -18,7 +18,7 @@ from std_srvs.srv import Trigger
 from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.qos import Durability, History, Qos, Reliability
 from sms_handover.bag.writer import BagWriter
-from sms_handover.errors import ConfigurationError, GraphError
+from sms_handover.errors import BagError, ConfigurationError, GraphError
 from sms_handover.nodes.player import PlayerNode
 from sms_handover.playback.qos import Offer
 from sms_handover.ros.bag_publishers import BagPublisher, profile_for
@@ -318,6 +318,22 @@ def test_what_nobody_confirms_is_a_loss(
     player.add()
     assert player.run() == EXIT_LOSS
     assert "not confirmed by a subscriber of: /odd" in capfd.readouterr().err
+
+
+def test_a_bag_that_is_damaged_further_on_is_played_up_to_there(bench: Bench, tmp_path: Path) -> None:
+    bag = ticks(tmp_path / "bag", count=5000, period_ns=MS // 10)
+    (file,) = bag.glob("*.mcap")
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2 : len(data) // 2 + 100] = bytes(100)
+    file.write_bytes(bytes(data))
+    player = Player(bench, bag, wait=30.0, topics=("odd", "even"), read_ahead=100)
+    ears = Ears(bench, "/odd", "/even")
+    player.add()
+    with pytest.raises(BagError, match=r"bag_0\.mcap is damaged"):
+        player.run()
+    for parity, topic in enumerate(("/even", "/odd")):
+        numbers = [int(text) for name, text in ears.heard if name == topic]
+        assert numbers == list(range(parity, 2 * len(numbers), 2)) and len(numbers) > 50
 
 
 def test_overrides_replace_what_was_recorded(bench: Bench, tmp_path: Path) -> None:
