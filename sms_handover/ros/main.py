@@ -92,15 +92,20 @@ def run_node(
         gc.freeze()  # what start-up has made lives to the end; no collection needs to look at it again
         return node.run(executor, stop)
     except ConfigurationError as error:
-        print(f"{name}: error: {error}", file=sys.stderr)
+        _tell(name, error)
         return EXIT_USAGE
     except SmsHandoverError as error:
-        print(f"{name}: error: {error}", file=sys.stderr)
+        _tell(name, error)
         return EXIT_FAILED
     finally:
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
+
+
+def _tell(name: str, error: SmsHandoverError) -> None:
+    """Print an error in one line that begins with the name of the node, once."""
+    print(f"{name}: error: {str(error).removeprefix(f'{name}: ')}", file=sys.stderr)
 
 
 def _ignore_signals() -> None:

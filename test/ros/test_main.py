@@ -88,6 +88,11 @@ def test_an_error_of_the_making_is_one_line(capfd: pytest.CaptureFixture[str]) -
     assert capfd.readouterr().err == "node: error: bad value\n"
 
 
+def test_the_name_of_the_node_is_told_once(capfd: pytest.CaptureFixture[str]) -> None:
+    assert MAINS["controller"](["controller", "--ros-args", "-p", "law:=fast"]) == EXIT_USAGE
+    assert capfd.readouterr().err.startswith("controller: error: parameter 'law': unknown value 'fast'")
+
+
 def test_a_bug_is_not_hidden() -> None:
     with pytest.raises(ZeroDivisionError):
         run_node(lambda: Worker(fail(ZeroDivisionError())), [])
