@@ -32,6 +32,7 @@ from sms_handover.ros.reference import (
 from sms_handover.share import config_file
 from sms_handover.topics import CLOCK, NODES, RUN_STATE, TF, Rate, graph_topics
 
+from ..workspace import ROOT, executables
 from .bench import Bench
 
 pytestmark = pytest.mark.ros
@@ -107,6 +108,12 @@ def test_examples_are_accepted(name: str) -> None:
     defaults = read_parameter_files([config_file(group.file)], group.section)
     build(group.cls, {**defaults, **EXAMPLES[name]}, name)
     assert all(defaults[key] != value for key, value in EXAMPLES[name].items())
+
+
+def test_every_node_has_a_reference_and_an_example() -> None:
+    files = {path.stem for path in (ROOT / "sms_handover" / "nodes").glob("[!_]*.py")}
+    assert files == set(OWN_GROUPS) == set(EXAMPLES)
+    assert files <= set(executables())
 
 
 def test_a_node_shows_its_help_without_starting_ros(capfd: pytest.CaptureFixture[str]) -> None:
