@@ -3,6 +3,7 @@ PYTHON ?= $(shell python3.11 -c 'import sys; print(sys.executable)' 2>/dev/null 
 VENV ?= .venv
 RUNS ?= runs
 FIGURES ?= figures
+REPORT ?= report
 MEASURED := build/verification
 
 BIN := $(VENV)/bin
@@ -13,7 +14,7 @@ MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evi
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover figures simulate test verify measure bench reference lint install colcon clean
+.PHONY: help handover figures report simulate test verify measure bench reference lint install colcon clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -25,6 +26,9 @@ handover: install  ## hand the deputy over under NMPC, then PID, over DDS in loc
 
 figures: install  ## draw the paper's figures from the runs of `make handover`
 	$(BIN)/sms-handover figures $(RUNS)/nmpc $(RUNS)/pid --output $(FIGURES) --format pdf,png,svg
+
+report: install  ## write an HTML page on the runs of `make handover`
+	$(BIN)/sms-handover report $(RUNS)/nmpc $(RUNS)/pid --output $(REPORT) --overwrite
 
 simulate: install  ## the same handover in one process, without DDS or a recording
 	$(BIN)/sms-handover simulate

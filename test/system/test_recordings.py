@@ -179,6 +179,18 @@ def test_compare_prints_a_table_and_writes_figures(recorded: Recorded, tmp_path:
     assert figures
 
 
+def test_a_report_is_one_page_on_the_runs(recorded: Recorded, tmp_path: Path) -> None:
+    folders = [folder for folder, _ in recorded.values()]
+    done = sms_handover("report", *folders, "-o", "report", cwd=tmp_path)
+    assert done.code == 0, done
+    page = tmp_path / "report" / "index.html"
+    assert done.out.startswith(f"{page.relative_to(tmp_path)}: ")
+    assert [path.name for path in (tmp_path / "report").iterdir()] == [page.name]
+    text = page.read_text(encoding="utf-8")
+    for part in ("nmpc and pid, side by side", "Claims of the paper", "no message missing", "srcdoc="):
+        assert part in text, part
+
+
 def test_real_time_ends_and_tells_how_it_kept_time(schedule: Path, tmp_path: Path) -> None:
     """Paced by the wall clock the whole run is recorded too, with the timing of its loop."""
     done = sms_handover(
