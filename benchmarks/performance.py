@@ -15,6 +15,9 @@ SCRIPTS: tuple[str, ...] = (  # in the order of the document
     "inverse_kinematics",
     "growth",
     "startup",
+    "lockstep",
+    "realtime",
+    "recorder",
     "playback",
     "report",
 )

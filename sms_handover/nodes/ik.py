@@ -30,6 +30,7 @@ class IkNode(GraphNode[IkParameters]):
         super().__init__(IK, IkParameters)
         self._solved = dict.fromkeys(IkStatus, 0)
         self._refused = 0
+        self._stamp_ns = 0
         self.inputs.serve(SolveIK, SOLVE_IK, self._on_request)
 
     @property
@@ -42,6 +43,10 @@ class IkNode(GraphNode[IkParameters]):
         solved: dict[str, object] = {status.name.lower(): count for status, count in self._solved.items()}
         return {**solved, "refused": self._refused}
 
+    def diagnostic_stamp_ns(self) -> int:
+        """Return the stamp of the last request."""
+        return self._stamp_ns
+
     def _on_request(self, request: Any, response: Any) -> Any:
         """Solve one request; a malformed one is answered with ``valid`` false and the reason."""
         try:
@@ -52,7 +57,7 @@ class IkNode(GraphNode[IkParameters]):
             return response
         result = solve_ik(self.robot, question, self.parameters)
         self._solved[result.status] += 1
-        stamp_ns = stamp_ns_of(request.seed.header.stamp)
+        self._stamp_ns = stamp_ns = stamp_ns_of(request.seed.header.stamp)
         response.solution = joint_positions_message(self.robot.joint_names, result.joint_position, stamp_ns)
         response.status = ik_status_message(result, stamp_ns)
         response.valid = True

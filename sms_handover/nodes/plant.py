@@ -1,5 +1,6 @@
 """The plant node."""
 
+import gc
 from collections.abc import Sequence
 from typing import Any
 
@@ -56,6 +57,7 @@ from sms_handover.types import JointCommand
 
 _COMMAND = (JOINT_COMMAND,)
 _PHASE_AND_COMMAND = (TASK_PHASE, JOINT_COMMAND)
+_MARGIN_S = 0.0002  # [s] before a deadline from which on nothing but the deadline is waited for
 _TIMING_PERIOD_S = 1.0  # [s] of wall time
 
 
@@ -103,6 +105,10 @@ class PlantNode(GraphNode[PlantParameters]):
         saturated = {f"saturated_{k}": v for k, v in self._plant.saturated_ticks.items() if v}
         return {"tick": self._plant.tick, "holder": self._plant.deputy.holder or "none", **saturated}
 
+    def diagnosis(self) -> tuple[int, str]:
+        """Return how well real time is kept."""
+        return self._loop_clock.diagnosis
+
     def diagnostic_stamp_ns(self) -> int:
         """Return simulation time."""
         return self._plant.stamp_ns
@@ -111,10 +117,18 @@ class PlantNode(GraphNode[PlantParameters]):
         """Handle events until asked to stop, and in real time begin every tick at its deadline."""
         if self._lockstep:
             return super().run(executor, stop)
-        while not stop.asked:
-            self.inputs.spin_once(executor, self._loop_clock.wait_s(), JOINT_COMMAND)
-            if self._loop_clock.due():
-                self._tick_now()
+        clock = self._loop_clock
+        gc.disable()  # a collection takes as long as ticks do; there is one of the young after each report
+        try:
+            while not stop.asked:
+                self.inputs.spin_once(executor, max(clock.wait_s() - _MARGIN_S, 0.0), self.awaited)
+                if self._command.stamp_ns == self._plant.stamp_ns or clock.wait_s() <= _MARGIN_S:
+                    clock.sleep()
+                if clock.due():
+                    self.inputs.poll()
+                    self._tick_now()
+        finally:
+            gc.enable()
         return EXIT_OK
 
     @property
@@ -166,6 +180,7 @@ class PlantNode(GraphNode[PlantParameters]):
         now_ns = plant.stamp_ns
         reference = plant.tick % self.common.ticks_per_reference == 0
         self._publish_loop(reference)
+        self._loop_clock.published()
         if reference:
             self._publish_period(now_ns)
         if now_ns % CLOCK_PERIOD_NS == 0:
@@ -206,10 +221,15 @@ class PlantNode(GraphNode[PlantParameters]):
     def _on_command(self, data: bytes, sent_ns: int) -> None:
         """Take a command; in lock step it may complete the tick."""
         if self._lockstep:
-            self._inputs.add(stamp_ns(data), JOINT_COMMAND, data)
+            stamp = stamp_ns(data)
+            if stamp == self._plant.stamp_ns:
+                self._loop_clock.answered()
+            self._inputs.add(stamp, JOINT_COMMAND, data)
             self._advance()
         else:
             self._command = self._read_command(data)
+            if self._command.stamp_ns == self._plant.stamp_ns:
+                self._loop_clock.answered()
 
     def _on_phase(self, data: bytes, sent_ns: int) -> None:
         """Take the phase of the task; in lock step it may complete the tick."""
@@ -320,9 +340,12 @@ class PlantNode(GraphNode[PlantParameters]):
         self._publish_state()
 
     def _finish(self, detail: str) -> None:
-        """Say that the run is over; every node then tells its counts."""
+        """Say that the run is over, and what real time has cost; every node then tells its counts."""
+        if not self._lockstep and self._loop_clock.misses:
+            detail = f"{detail}; {self._loop_clock.misses}"
         self.finished = True
         self._enter(RunState.FINISHED, detail)
+        self.publish_diagnostics()
         self.publish_counts()
 
     def _enter(self, state: int, detail: str) -> None:
@@ -342,6 +365,8 @@ class PlantNode(GraphNode[PlantParameters]):
             message = self._loop_clock.report()
             message.header = header(self._plant.stamp_ns)
             self._publish[LOOP_TIMING].publish(message)
+            if not self._lockstep:
+                gc.collect(0)
 
 
 def main(args: Sequence[str] | None = None) -> int:

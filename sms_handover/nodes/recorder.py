@@ -49,6 +49,7 @@ from sms_handover.types import Pose
 _POLL_S = 0.005  # [s] of wall time between two batches: long enough to be cheap, short enough to lose little
 _QUIET_S = 0.05  # [s] of wall time without a message after which nothing is on the way any more
 _REST_S = 1.0  # [s] of wall time at most to wait for that
+_BEHIND = 4096  # [reference periods] by which a recorder without a processor may be behind and make up for it
 _DISCOVERY_PERIOD_S = 1.0  # [s] of wall time between two looks for topics beyond the graph
 _TF_INPUTS = (SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
 
@@ -75,7 +76,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
         self._reported: set[str] = set()
         self._last_message = monotonic()
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
-        self._tf: StampSync[bytes] = StampSync()
+        self._tf: StampSync[bytes] = StampSync(_BEHIND)
         self._links = LinkTree(self.robot)
         frames = [*self._links.frames, (WORLD, DEPUTY)]
         self._tf_wire = TransformsWire(self._recording.writer.types, frames)
@@ -92,6 +93,9 @@ class RecorderNode(GraphNode[RecorderParameters]):
     def niceness(self) -> int:
         """Return how far the process stands back behind others, as its parameter says."""
         return self.parameters.niceness
+
+    def settle(self) -> None:
+        """Do nothing: processor and priority are for the nodes of the loop, before this one."""
 
     def prepared(self) -> bool:
         """Tell whether the parameters of every node have been written into the bag."""

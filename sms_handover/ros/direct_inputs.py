@@ -36,7 +36,7 @@ class DirectInputs(Inputs):
         self._node = node
         self._sources: dict[str, _Source] = {}
         self._serve_at = self._hot_until = 0.0
-        self.sleeps = 0
+        self._slept = False
 
     def subscribe(self, kind: Any, topic: str, profile: QoSProfile, receive: Receive) -> Subscription:
         """Hand every message of a topic to ``receive``."""
@@ -68,11 +68,13 @@ class DirectInputs(Inputs):
         now = monotonic()
         if found:
             self._hot_until = now + _HOT_S
+            self.wakes += self._slept
+            self._slept = False
         elif now > self._hot_until or awaited not in self._sources:
             executor.spin_once(timeout_sec=min(timeout_s, _IDLE_S))
             return
         else:
-            self.sleeps += 1
+            self._slept = True
             self._sources[awaited].wait(min(timeout_s, _SERVE_S))
         if now >= self._serve_at:
             self._serve_at = now + _SERVE_S

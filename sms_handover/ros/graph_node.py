@@ -17,6 +17,7 @@ from sms_handover.ros.endpoints import Endpoints
 from sms_handover.ros.inputs import ExecutorInputs, Inputs
 from sms_handover.ros.main import EXIT_OK, WAIT_S, RunnableNode, Stop
 from sms_handover.ros.parameters import declare, refuse_unknown
+from sms_handover.ros.process import settle
 from sms_handover.simulation.parameters import DIRECT, EXECUTOR, CommonParameters
 from sms_handover.simulation.scenario import load_robot_model
 from sms_handover.topics import DIAGNOSTICS, PLANT, RUN_PUBLISHED, RUN_READY, RUN_STATE, graph_topics
@@ -52,7 +53,7 @@ class GraphNode(RunnableNode, Generic[P]):
             self._ready = self.endpoints.publisher(RUN_READY)
             self.endpoints.subscribe(RUN_STATE, self._on_run_state)
         self._matching = self.create_timer(_MATCHING_PERIOD_S, self._look_for_peers)
-        self.create_timer(_DIAGNOSTICS_PERIOD_S, self._publish_diagnostics)
+        self.create_timer(_DIAGNOSTICS_PERIOD_S, self.publish_diagnostics)
 
     def run(self, executor: Executor, stop: Stop) -> int:
         """Handle events until asked to stop, and return the exit code; a node may override this."""
@@ -70,6 +71,10 @@ class GraphNode(RunnableNode, Generic[P]):
         self.inputs.destroy()
         super().destroy_node()
 
+    def settle(self) -> None:
+        """Set up the process as the parameters ask; raises ConfigurationError where it is not permitted."""
+        settle(self.common)
+
     def prepared(self) -> bool:
         """Tell whether this node has what it needs besides its topics; a node may override this."""
         return True
@@ -79,12 +84,17 @@ class GraphNode(RunnableNode, Generic[P]):
         self._ready.publish(String(data=self.get_name()))
 
     def on_end(self) -> None:
-        """Do what is due at the end of the run: by default, tell what has been published."""
+        """Do what is due at the end of the run: by default, tell how it went and what has been published."""
+        self.publish_diagnostics()
         self.publish_counts()
 
     def diagnostic_values(self) -> dict[str, object]:
         """Return what the diagnostics of this node tell; a node may override this."""
         return {}
+
+    def diagnosis(self) -> tuple[int, str]:
+        """Return level and words of the diagnostics of a running node; a node may override this."""
+        return 0, ""
 
     def diagnostic_stamp_ns(self) -> int:
         """Return the simulation time of the diagnostics; a node may override this."""
@@ -109,18 +119,20 @@ class GraphNode(RunnableNode, Generic[P]):
         """Take notice of the end of the run, or of its beginning anew."""
         ended = message.state in (RunState.FINISHED, RunState.FAILED)
         if ended and not self.finished:
+            self.inputs.poll()  # in real time answers may be due still; they belong to the counts
             self.on_end()
         self.finished = ended
 
-    def _publish_diagnostics(self) -> None:
-        """Publish the state of this node once a second."""
+    def publish_diagnostics(self) -> None:
+        """Publish the state of this node; it does so itself once a second and at the end of the run."""
         waiting = self.endpoints.unmatched if not self._matching.is_canceled() else []
-        level = DiagnosticStatus.WARN if waiting else DiagnosticStatus.OK
-        values = [KeyValue(key=key, value=str(value)) for key, value in self.diagnostic_values().items()]
+        level, words = self.diagnosis()
+        told = {**self.diagnostic_values(), "wakes": self.inputs.wakes}
+        values = [KeyValue(key=key, value=str(value)) for key, value in told.items()]
         status = DiagnosticStatus(
-            level=level,
+            level=DiagnosticStatus.WARN if waiting else bytes([level]),
             name=self.get_name(),
-            message="waiting for " + ", ".join(waiting) if waiting else "running",
+            message="waiting for " + ", ".join(waiting) if waiting else words or "running",
             values=values,
         )
         message = DiagnosticArray(status=[status])

@@ -33,7 +33,13 @@ class Asker(ABC):
 
 
 class Inputs(ABC):
-    """The messages, requests and answers that the loop of one node waits for."""
+    """The messages, requests and answers that the loop of one node waits for.
+
+    ``wakes`` counts how often something awaited has ended a sleep: a loop that is woken more than once
+    per tick loses time.
+    """
+
+    wakes: int = 0
 
     @abstractmethod
     def subscribe(self, kind: Any, topic: str, profile: QoSProfile, receive: Receive) -> Subscription:

@@ -1,32 +1,33 @@
 """Keeps the plant's loop on the wall clock, and accounts for how well it keeps to it."""
 
-from dataclasses import dataclass
-from math import sqrt
-from time import monotonic
+from array import array
+from dataclasses import dataclass, field
+from math import ceil, sqrt
+from time import monotonic, sleep
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from sms_handover_interfaces.msg import LoopTiming
 
 from sms_handover.units import ns_to_seconds
 
+LATENCY_BIN_S = 50e-6  # [s] width of the bins of the latency from a state to its command
+LATENCY_BINS = 41  # the last one counts everything from 2 ms on
+
 _IDLE_S = 0.1  # [s] wait while the loop does not run
+# Thresholds as the controller manager of ros2_control ships them, for the mean over one report
+_RATE_ERRORS_HZ = (5.0, 10.0)  # [Hz] off the wanted rate: warning, error
+_EXECUTION_S = (1e-3, 2e-3)  # [s] of work in a tick: warning, error
 
 
 @dataclass
 class _Interval:
-    """Sums over the ticks since the last report."""
+    """What happened in the ticks since the last report."""
 
     since: float
-    count: int = 0
-    total: float = 0.0
-    squares: float = 0.0
-    longest: float = 0.0
-
-    def add(self, period: float) -> None:
-        """Account for one period between two ticks."""
-        self.count += 1
-        self.total += period
-        self.squares += period * period
-        self.longest = max(self.longest, period)
+    periods: "array[float]" = field(default_factory=lambda: array("d"))
+    executions: "array[float]" = field(default_factory=lambda: array("d"))
+    latencies: list[int] = field(default_factory=lambda: [0] * LATENCY_BINS)
+    latency_max: float = 0.0
 
 
 class LoopClock:
@@ -40,13 +41,14 @@ class LoopClock:
         self._tick_s = ns_to_seconds(tick_ns)
         self._paced = paced
         self._deadline: float | None = None
-        self._last = 0.0
+        self._last = self._published = 0.0
         self._ticks = self._late = self._held = 0
         self._interval = _Interval(monotonic())
+        self._level: tuple[int, str] = (0, "")
 
     def start(self) -> None:
         """Begin, or go on after a pause: the first tick is due one period from now."""
-        self._last = monotonic()
+        self._last = self._published = monotonic()
         self._deadline = self._last + self._tick_s if self._paced else None
         self._interval = _Interval(self._last)
 
@@ -60,14 +62,19 @@ class LoopClock:
             return _IDLE_S
         return min(max(self._deadline - monotonic(), 0.0), _IDLE_S)
 
+    def sleep(self) -> None:
+        """Sleep until the next deadline, if there is one and it is not further than a short while away."""
+        if self._deadline is not None:
+            sleep(self.wait_s())
+
     def due(self) -> bool:
         """Tell whether the deadline has come."""
         return self._deadline is not None and monotonic() >= self._deadline
 
     def ticked(self, *, held: bool = False) -> None:
-        """Account for a tick; it is late if it began more than one period behind its deadline."""
+        """Account for the begin of a tick; it is late if more than one period behind its deadline."""
         now = monotonic()
-        self._interval.add(now - self._last)
+        self._interval.periods.append(now - self._last)
         self._last = now
         self._ticks += 1
         self._held += held
@@ -75,18 +82,71 @@ class LoopClock:
             self._late += now - self._deadline > self._tick_s
             self._deadline += self._tick_s
 
+    def published(self) -> None:
+        """Account for the state of the tick being out: its work is done."""
+        self._published = monotonic()
+        self._interval.executions.append(self._published - self._last)
+
+    def answered(self) -> None:
+        """Account for the command that answers the state published last."""
+        latency = monotonic() - self._published
+        interval = self._interval
+        interval.latencies[min(int(latency / LATENCY_BIN_S), LATENCY_BINS - 1)] += 1
+        interval.latency_max = max(interval.latency_max, latency)
+
+    @property
+    def misses(self) -> str:
+        """Return in words what real time has cost so far, "" if every tick was in time."""
+        if not self._late and not self._held:
+            return ""
+        return (
+            f"real time was not kept: of {self._ticks} ticks {self._late} began more than a tick late and "
+            f"{self._held} held an old command; run in lock step, or with a longer tick"
+        )
+
+    @property
+    def diagnosis(self) -> tuple[int, str]:
+        """Return level and words for the last report, by the thresholds that ros2_control ships."""
+        return self._level
+
     def report(self) -> LoopTiming:
         """Return the statistics since the last report and begin the next."""
         done, now = self._interval, monotonic()
-        count = max(done.count, 1)
-        mean = done.total / count
+        count = max(len(done.periods), 1)
+        mean = sum(done.periods) / count
+        errors = sorted(abs(period - self._tick_s) for period in done.periods)
         self._interval = _Interval(now)
+        work = sum(done.executions) / max(len(done.executions), 1)
+        self._level = self._diagnose(mean, work) if done.periods else (0, "")
         return LoopTiming(
             ticks=self._ticks,
             late_ticks=self._late,
             held_commands=self._held,
             period_mean=mean,
-            period_std=sqrt(max(done.squares / count - mean * mean, 0.0)),
-            period_max=done.longest,
-            real_time_factor=done.count * self._tick_s / max(now - done.since, self._tick_s),
+            period_std=sqrt(sum((period - mean) ** 2 for period in done.periods) / count),
+            period_max=max(done.periods, default=0.0),
+            real_time_factor=len(done.periods) * self._tick_s / max(now - done.since, self._tick_s),
+            period_error_p99=errors[ceil(0.99 * len(errors)) - 1] if errors else 0.0,
+            execution_mean=work,
+            execution_max=max(done.executions, default=0.0),
+            latency_bin=LATENCY_BIN_S,
+            latency_counts=done.latencies,
+            latency_max=done.latency_max,
         )
+
+    def _diagnose(self, mean: float, work: float) -> tuple[int, str]:
+        """Return level and words for a mean period and a mean time of work, both in s."""
+        if not self._paced:
+            return 0, ""
+        rate, wanted = 1.0 / mean, 1.0 / self._tick_s
+        off, slow = _level(abs(rate - wanted), _RATE_ERRORS_HZ), _level(work, _EXECUTION_S)
+        words = [f"{rate:.0f} Hz instead of {wanted:.0f} Hz"] * bool(off)
+        words += [f"a tick takes {1e6 * work:.0f} us"] * bool(slow)
+        return max(off, slow), ", ".join(words)
+
+
+def _level(value: float, thresholds: tuple[float, float]) -> int:
+    """Return the diagnostics level of a value between the thresholds of warning and error."""
+    warning, error = thresholds
+    levels = (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR)
+    return int.from_bytes(levels[(value > warning) + (value > error)], "little")

@@ -57,6 +57,9 @@ class RunnableNode(Node, ABC):
         """Return how far the process stands back behind others, as in nice(1); a node may override this."""
         return 0
 
+    def settle(self) -> None:
+        """Set up the process before the node runs; raises ConfigurationError. A node may override this."""
+
     @abstractmethod
     def run(self, executor: Executor, stop: Stop) -> int:
         """Work until asked to stop; return the exit code."""
@@ -88,6 +91,7 @@ def run_node(
         executor = EventsExecutor()
         executor.add_node(node)
         os.nice(node.niceness)
+        node.settle()
         gc.collect()
         gc.freeze()  # what start-up has made lives to the end; no collection needs to look at it again
         return node.run(executor, stop)
@@ -108,6 +112,11 @@ def _tell(name: str, error: SmsHandoverError) -> None:
     print(f"{name}: error: {str(error).removeprefix(f'{name}: ')}", file=sys.stderr)
 
 
+def use_profile() -> None:
+    """Let Fast DDS read the profile of the graph, unless the user names another; before ROS is started."""
+    os.environ.setdefault(_FAST_DDS_FILE, str(config_file("fastdds.xml")))
+
+
 def _ignore_signals() -> None:
     """Keep the exit code: a second signal while the interpreter ends would otherwise kill the process."""
     for number in _SIGNALS:
@@ -121,7 +130,7 @@ def _init(args: list[str]) -> None:
         raise ConfigurationError(
             f"unknown argument {before_ros[0]!r}; give a parameter as --ros-args -p NAME:=VALUE, see --help"
         )
-    os.environ.setdefault(_FAST_DDS_FILE, str(config_file("fastdds.xml")))
+    use_profile()
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:

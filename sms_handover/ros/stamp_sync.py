@@ -4,7 +4,7 @@ from typing import Generic, TypeVar
 
 V = TypeVar("V")
 
-_LONGEST = 64  # [stamps] waiting at most; more means that an input has stopped
+_LONGEST = 64  # [stamps] waiting at most by default; more means that an input has stopped
 
 
 class StampSync(Generic[V]):
@@ -13,8 +13,9 @@ class StampSync(Generic[V]):
     Inputs have names. Stamps older than the last one taken are dropped and counted.
     """
 
-    def __init__(self) -> None:
-        """Start empty."""
+    def __init__(self, longest: int = _LONGEST) -> None:
+        """Start empty; at most ``longest`` stamps wait, then the oldest is given up."""
+        self._longest = longest
         self._waiting: dict[int, dict[str, V]] = {}
         self._taken_ns = -1
         self.dropped = 0
@@ -37,7 +38,7 @@ class StampSync(Generic[V]):
             self.dropped += 1
             return
         self._waiting.setdefault(stamp_ns, {})[name] = value
-        if len(self._waiting) > _LONGEST:
+        if len(self._waiting) > self._longest:
             self.dropped += len(self._waiting.pop(min(self._waiting)))
 
     @property

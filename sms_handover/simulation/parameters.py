@@ -35,6 +35,13 @@ class CommonParameters:
         "executor, which is slower and all public",
         choices=TRANSPORTS,
     )
+    cpu: int = parameter("processor that the nodes of the loop run on; -1: any", minimum=-1, maximum=4095)
+    priority: int = parameter(
+        "real-time priority of the nodes of the loop (SCHED_FIFO), where the system permits it; 0: none",
+        minimum=0,
+        maximum=99,
+    )
+    lock_memory: bool = parameter("keep the memory of the nodes of the loop from being swapped out")
     peers: tuple[str, ...] = parameter("nodes of the graph; the run starts when all have matched")
 
     def __post_init__(self) -> None:

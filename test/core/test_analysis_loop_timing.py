@@ -45,6 +45,12 @@ def report(stamp_ns: int, ticks: int, mean: float, std: float, most: float, late
         period_std=std,
         period_max=most,
         real_time_factor=1.0,
+        period_error_p99=0.0,
+        execution_mean=0.0,
+        execution_max=0.0,
+        latency_bin=0.0,
+        latency_counts=np.zeros(0, np.uint32),
+        latency_max=0.0,
     )
 
 

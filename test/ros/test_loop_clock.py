@@ -5,7 +5,7 @@ from math import sqrt
 import pytest
 from sms_handover_interfaces.msg import LoopTiming
 
-from sms_handover.ros.loop_clock import LoopClock
+from sms_handover.ros.loop_clock import LATENCY_BIN_S, LATENCY_BINS, LoopClock
 
 TICK_S = 0.25  # s; with all times multiples of 1/16 s every sum here is exact
 TICK_NS = 250_000_000
@@ -149,6 +149,94 @@ def test_report_has_the_statistics_since_the_last_one(wall: WallClock, paced: Lo
     assert report.period_std == pytest.approx(sqrt(variance), rel=1e-12)
     assert report.period_max == 1.0
     assert report.real_time_factor == 4 * TICK_S / sum(periods)
+
+
+def test_99_of_100_periods_are_off_by_no_more_than_told(wall: WallClock, paced: LoopClock) -> None:
+    """Too early counts as too late does."""
+    errors = [0.0] * 98 + [-0.125, 1.0]
+    for error in errors[::7] + [e for k, e in enumerate(errors) if k % 7]:
+        wall.now += TICK_S + error
+        paced.ticked()
+    assert paced.report().period_error_p99 == 0.125
+
+
+def test_work_lasts_from_the_tick_to_its_state(wall: WallClock, paced: LoopClock) -> None:
+    for work in (0.0625, 0.125, 0.0625, 0.0):
+        wall.now += TICK_S
+        paced.ticked()
+        wall.now += work
+        paced.published()
+    report = paced.report()
+    assert (report.execution_mean, report.execution_max) == (0.0625, 0.125)
+
+
+def test_latencies_fall_into_bins_and_none_is_lost(wall: WallClock, paced: LoopClock) -> None:
+    bins = [0, 0, 1, 3, 39, 40, 1000]
+    for number in bins:
+        wall.now = 1000.0  # whence the bins' borders are far from a rounding error
+        paced.published()
+        wall.now += (number + 0.5) * LATENCY_BIN_S
+        paced.answered()
+    report = paced.report()
+    counts = list(report.latency_counts)
+    assert len(counts) == LATENCY_BINS and sum(counts) == len(bins)
+    assert {k: n for k, n in enumerate(counts) if n} == {0: 2, 1: 1, 3: 1, 39: 1, 40: 2}
+    assert report.latency_bin == LATENCY_BIN_S
+    assert report.latency_max == pytest.approx(1000.5 * LATENCY_BIN_S, rel=1e-6)
+
+
+KHZ_NS = 1_000_000
+
+
+@pytest.mark.parametrize(
+    ("period", "work", "level", "words"),
+    [
+        (1.0 / 1004.0, 0.0, 0, ""),
+        (1.0 / 994.0, 0.0, 1, "994 Hz instead of 1000 Hz"),
+        (1.0 / 1006.0, 0.0, 1, "1006 Hz instead of 1000 Hz"),
+        (1.0 / 989.0, 0.0, 2, "989 Hz instead of 1000 Hz"),
+        (1e-3, 0.0009, 0, ""),
+        (1e-3, 0.0011, 1, "a tick takes 1100 us"),
+        (1e-3, 0.0021, 2, "a tick takes 2100 us"),
+        (1.0 / 500.0, 0.0011, 2, "500 Hz instead of 1000 Hz, a tick takes 1100 us"),
+    ],
+)
+def test_diagnosis_has_the_thresholds_of_ros2_control(
+    wall: WallClock, period: float, work: float, level: int, words: str
+) -> None:
+    """Off the rate by 5 and 10 Hz, 1 and 2 ms of work: warning and error."""
+    clock = LoopClock(KHZ_NS, paced=True)
+    clock.start()
+    for _ in range(50):
+        begin = wall.now
+        wall.now = begin + period
+        clock.ticked()
+        wall.now += work
+        clock.published()
+        wall.now = begin + period
+    clock.report()
+    assert clock.diagnosis == (level, words)
+
+
+def test_in_lock_step_no_rate_is_wrong(wall: WallClock) -> None:
+    clock = LoopClock(KHZ_NS, paced=False)
+    clock.start()
+    wall.now += 1.0
+    clock.ticked()
+    clock.report()
+    assert clock.diagnosis == (0, "")
+
+
+def test_what_real_time_has_cost_is_told_with_what_to_do(wall: WallClock, paced: LoopClock) -> None:
+    wall.now += TICK_S
+    paced.ticked()
+    assert paced.misses == ""
+    wall.now += 3 * TICK_S
+    paced.ticked(held=True)
+    assert paced.misses == (
+        "real time was not kept: of 2 ticks 1 began more than a tick late and 1 held an old command; "
+        "run in lock step, or with a longer tick"
+    )
 
 
 def test_a_report_of_no_ticks_is_zero(wall: WallClock, paced: LoopClock) -> None:

@@ -91,6 +91,14 @@ def test_time_zero_begins_a_run_only_after_another() -> None:
     assert not sync.begins_anew(1)
 
 
+def test_as_many_stamps_wait_as_asked_for() -> None:
+    sync: StampSync[int] = StampSync(3)
+    for stamp in range(5):
+        sync.add(stamp, "a", stamp)
+    assert sync.oldest_ns == 2
+    assert sync.dropped == 2
+
+
 def test_what_is_missing_is_told_from_the_last() -> None:
     sync: StampSync[int] = StampSync()
     assert sync.oldest_ns is None

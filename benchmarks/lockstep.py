@@ -1,0 +1,89 @@
+"""How fast lock step is over DDS, beside the bare exchange of the same messages."""
+
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from functools import partial
+from statistics import median
+from tempfile import TemporaryDirectory
+from time import perf_counter
+
+from benchmarks.results import Result, Table, publish, row
+from sms_handover.simulation.scenario import load_scenario
+from sms_handover.simulation.simulate import simulate
+
+ROUNDS = 3
+SIMULATED_S = 5.0  # s of simulated time per run
+TICKS = round(SIMULATED_S * 1e3)
+TRIPS = 5000
+_FACTOR = re.compile(r"([\d.]+) x real time")
+
+FLOOR = "bare exchange of the same messages, no work"
+ALONE = "one process, no DDS"
+GRAPH = "graph, not recorded"
+RECORDED = "graph, recorded"
+FALLBACK = "graph by rclpy's executor, not recorded"
+
+
+def floor() -> float:
+    """Return the time in s of a bare round trip."""
+    command = [sys.executable, "-m", "benchmarks.ping_pong", "ping", str(TRIPS)]
+    return 1e-6 * float(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
+def alone() -> float:
+    """Return the time in s of a tick in one process."""
+    scenario = load_scenario({"common": {"duration": SIMULATED_S}})
+    start = perf_counter()
+    simulate(scenario)
+    return (perf_counter() - start) / TICKS
+
+
+def graph(folder: str, arguments: Sequence[str]) -> float:
+    """Return the time in s of a tick of the graph; raises CalledProcessError, on a lost message too."""
+    command = [sys.executable, "-m", "sms_handover.cli.main", "run", "--overwrite"]
+    command += ["--duration", str(SIMULATED_S), "--output", f"{folder}/run", *arguments]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    return 1e-3 / float(_FACTOR.findall(done.stderr)[-1])
+
+
+def main() -> None:
+    """Measure and publish."""
+    with TemporaryDirectory() as folder:
+        contestants: dict[str, Callable[[], float]] = {
+            FLOOR: floor,
+            ALONE: alone,
+            GRAPH: partial(graph, folder, ["--no-record"]),
+            RECORDED: partial(graph, folder, []),
+            FALLBACK: partial(graph, folder, ["--no-record", "-p", "common.transport:=executor"]),
+        }
+        times: dict[str, list[float]] = {name: [] for name in contestants}
+        for _ in range(ROUNDS):
+            for name, measure in contestants.items():
+                times[name].append(measure())
+    bare = times[FLOOR]
+    ratio = {name: median(a / b for a, b in zip(each, bare, strict=True)) for name, each in times.items()}
+    rows = [
+        row(name, 1e6 * min(each), 1e6 * median(each), 1e-3 / min(each), ratio[name])
+        for name, each in times.items()
+    ]
+    heading = ("what", "best [us/tick]", "median [us/tick]", "best: times real time", "times the bare one")
+    publish(
+        Result(
+            name="lockstep",
+            question="How fast is lock step over DDS?",
+            notes=[
+                f"{SIMULATED_S:g} s at 1 kHz, a reference with inverse kinematics by service every 20 ms; "
+                f"{ROUNDS} rounds in turn. The bare exchange is two processes that hand each other the two "
+                "messages of a state and the command, with the same bytes, quality of service and way of "
+                "taking them; its time depends on which processors the system puts the two on."
+            ],
+            tables=[Table(heading, rows)],
+            values={"us_per_tick": {name: [1e6 * t for t in each] for name, each in times.items()}},
+        )
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,119 @@
+"""How well real time is kept at 1 kHz, beside a process that only sleeps."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from itertools import accumulate
+from os import cpu_count
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from benchmarks.results import Result, Table, publish, row
+from sms_handover.bag.files import read_messages
+from sms_handover.bag.message_types import MessageTypes
+from sms_handover.topics import LOOP_TIMING
+
+DURATION_S = 20.0  # s of simulated and of wall time per case
+_START_S = 3.0  # s that the graph takes to begin, in which the sleeper sleeps alone
+_BUSY = "while True: pass"
+
+CASES: dict[str, tuple[bool, tuple[str, ...]]] = {
+    "idle machine": (False, ()),
+    "every processor busy": (True, ()),
+    "every processor busy, priority 50": (True, ("-p", "common.priority:=50")),
+}
+
+
+@contextmanager
+def load(wanted: bool) -> Iterator[None]:
+    """Keep every processor busy for a while, if wanted."""
+    processes = [subprocess.Popen([sys.executable, "-c", _BUSY]) for _ in range((cpu_count() or 1) * wanted)]
+    try:
+        yield
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+def reports(folder: Path, arguments: Sequence[str]) -> list[Any]:
+    """Run the graph in real time, not lock step, and return the reports of its loop."""
+    command = [sys.executable, "-m", "sms_handover.cli.main", "run", "--real-time", "--overwrite"]
+    command += ["--duration", str(DURATION_S), "--output", str(folder / "run"), *arguments]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    if not (folder / "run" / "bag").exists():
+        raise RuntimeError(done.stderr)
+    types = MessageTypes()
+    messages = read_messages(folder / "run" / "bag", {f"/{LOOP_TIMING}"})
+    return [types.deserialize(message.data, message.type) for message in messages]
+
+
+def quantile(counts: Sequence[int], width: float, part: float) -> float:
+    """Return the upper end of the bin of a histogram below which a part of it lies."""
+    sums = list(accumulate(counts))
+    return width * (1 + next(index for index, value in enumerate(sums) if value >= part * sums[-1]))
+
+
+def case(name: str, folder: Path) -> tuple[str, ...]:
+    """Return the row of one case."""
+    busy, arguments = CASES[name]
+    with load(busy):
+        command = [sys.executable, "-m", "benchmarks.sleeper", str(DURATION_S + _START_S)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as sleeper:
+            try:
+                told = reports(folder, arguments)
+            except RuntimeError as error:
+                sleeper.kill()
+                return row(name, str(error).strip().splitlines()[-1], *["-"] * 8)
+            noise = json.loads(sleeper.communicate()[0])
+    last = told[-1]
+    counts = [sum(column) for column in zip(*(report.latency_counts for report in told), strict=True)]
+    return row(
+        name,
+        f"{last.ticks}",
+        f"{last.late_ticks}",
+        f"{last.held_commands}",
+        1e6 * max(report.period_error_p99 for report in told),
+        1e6 * max(report.period_max for report in told),
+        1e6 * quantile(counts, last.latency_bin, 0.5),
+        1e6 * quantile(counts, last.latency_bin, 0.99),
+        noise["p99_us"],
+        noise["max_us"],
+    )
+
+
+def main() -> None:
+    """Measure and publish."""
+    with TemporaryDirectory() as folder:
+        rows = [case(name, Path(folder)) for name in CASES]
+    heading = (
+        "machine",
+        "ticks",
+        "late",
+        "held commands",
+        "period off by, p99 of the worst second [us]",
+        "longest period [us]",
+        "state to command, p50 [us]",
+        "p99 [us]",
+        "bare sleeper off by, p99 [us]",
+        "largest [us]",
+    )
+    publish(
+        Result(
+            name="realtime",
+            question="Is real time kept at 1 kHz?",
+            notes=[
+                f"{DURATION_S:g} s of the whole graph, recorded. A tick is late if it begins more than a "
+                "tick behind its deadline; a command is held where none has come in time. The bare sleeper "
+                "is a process beside it that only wakes every ms: what it is off is the machine's doing."
+            ],
+            tables=[Table(heading, rows)],
+        )
+    )
+
+
+if __name__ == "__main__":
+    main()

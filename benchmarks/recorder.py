@@ -1,0 +1,95 @@
+"""What recording costs per message, beside the writer of mcap alone."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import process_time
+
+import numpy as np
+from mcap.writer import CompressionType, Writer
+
+from benchmarks.ping_pong import NAMES
+from benchmarks.results import Result, Table, publish, row
+from sms_handover.bag.files import read_messages
+from sms_handover.bag.message_types import MessageTypes
+from sms_handover.bag.recording import Recording
+from sms_handover.bag.writer import CHUNK_SIZE
+from sms_handover.ros.wire import JointStateWire
+from sms_handover.topics import TF, graph_topics
+
+COUNT = 60_000  # messages, as of one topic of a whole run
+ROUNDS = 5
+_TICK_NS = 1_000_000
+_TYPE = "sensor_msgs/msg/JointState"
+
+
+def messages() -> list[bytes]:
+    """Return the joint states of a run in which every joint moves."""
+    wire, random = JointStateWire(NAMES, ("position", "velocity", "effort")), np.random.default_rng(1)
+    blocks = random.normal(size=(3, COUNT, len(NAMES)))
+    return [
+        wire.pack(k * _TICK_NS, position=blocks[0, k], velocity=blocks[1, k], effort=blocks[2, k])
+        for k in range(COUNT)
+    ]
+
+
+def bare(path: Path, data: list[bytes]) -> None:
+    """Write with mcap alone, with the chunks and the compression of our recordings."""
+    schema = MessageTypes().schema(_TYPE)
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)
+        writer.start(profile="ros2")
+        channel = writer.register_channel(
+            "/joint_states", "cdr", writer.register_schema(_TYPE, "ros2msg", schema.text.encode())
+        )
+        for k, message in enumerate(data):
+            writer.add_message(channel, k * _TICK_NS, message, k * _TICK_NS)
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
+def recorded(path: Path, data: list[bytes]) -> None:
+    """Record as the recorder node does: stamps read, losses booked, nothing held back longer than 20 ms."""
+    with Recording(path) as recording:
+        recording.add_topic("/joint_states", _TYPE, (), _TICK_NS)
+        for message in data:
+            recording.receive("/joint_states", message, 0)
+    assert recording.ledger.complete
+
+
+def cpu(write: Callable[[], None]) -> float:
+    """Return the CPU time in s per message."""
+    start = process_time()
+    write()
+    return (process_time() - start) / COUNT
+
+
+def main() -> None:
+    """Measure and publish."""
+    data = messages()
+    times: dict[str, list[float]] = {"mcap.writer.Writer": [], "our recording": []}
+    with TemporaryDirectory() as folder:
+        for number in range(ROUNDS):
+            file, bag = Path(folder) / f"{number}.mcap", Path(folder) / f"{number}"
+            times["mcap.writer.Writer"].append(cpu(partial(bare, file, data)))
+            times["our recording"].append(cpu(partial(recorded, bag, data)))
+        written = sum(1 for _ in read_messages(bag, {"/joint_states"}))
+    assert written == COUNT
+    least = min(times["mcap.writer.Writer"])
+    rows = [row(n, 1e6 * min(each), 1.0 / min(each), min(each) / least) for n, each in times.items()]
+    topics = len(graph_topics(("arm_a", "arm_b"))) + 1
+    publish(
+        Result(
+            name="recorder",
+            question="What does recording cost?",
+            notes=[
+                f"{COUNT} JointState messages of {len(data[0])} bytes, the least CPU time of {ROUNDS} "
+                f"rounds in turn. The bag of the graph has {topics} topics, {TF} among them."
+            ],
+            tables=[Table(("writer", "CPU per message [us]", "messages/s", "times the bare one"), rows)],
+        )
+    )
+
+
+if __name__ == "__main__":
+    main()
