@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from sms_handover.bag.info import BagInfo, read_info
@@ -19,12 +20,16 @@ _TOLERANCES = ("grasp_position_tolerance", "grasp_angle_tolerance", "grasp_speed
 
 @dataclass(frozen=True, eq=False)
 class RecordedRun:
-    """The arrays of a run under a name, its course in wall time, and what its bag says of itself."""
+    """The arrays of a run under a name, and what its bag says of itself."""
 
     name: str
     data: RunData
-    loop: LoopRecord
     info: BagInfo
+
+    @cached_property
+    def loop(self) -> LoopRecord:
+        """Return the course of the run in wall time, read from the bag when it is first asked for."""
+        return read_loop(self.info.path)
 
     @property
     def law(self) -> str:
@@ -43,7 +48,7 @@ class RecordedRun:
 def read_recorded(name: str, bag: Path) -> RecordedRun:
     """Return the run in a bag; raises ConfigurationError if the bag cannot be used or is not ours."""
     try:
-        return RecordedRun(name, read_run(bag), read_loop(bag), read_info(bag))
+        return RecordedRun(name, read_run(bag), read_info(bag))
     except BagError as error:
         raise ConfigurationError(str(error)) from error
 
