@@ -22,7 +22,7 @@ import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
 
-from benchmarks.results import Result, Table, publish
+from benchmarks.results import FOLDER, Result, Table, publish
 from sms_handover.bag.ledger import TopicLedger
 from sms_handover.bag.reader import read_run
 from sms_handover.bag.recover import recover
@@ -41,7 +41,7 @@ _LATEST_S = 3.0  # [s] of simulated time before which the recorder is killed
 _JITTER_S = 0.03  # [s] of wall time added, so that the kill falls anywhere between two flushes
 _PATIENCE_S = 120.0  # [s] of wall time for anything to happen
 _ON_THE_WAY_S = 0.5  # [s] of wall time in which the witness hears the last of what was sent
-_POLL_S = 0.005  # [s]
+_POLL_S = 0.005  # [s] of wall time
 _DOMAIN = "running on ROS domain "
 _STATES = f"/{JOINT_STATES}"
 
@@ -188,7 +188,9 @@ def main() -> int:
     parser.add_argument("--kills", type=int, default=20, metavar="N", help="runs (default: 20)")
     parser.add_argument("--seed", type=int, default=0, help="of the random moments (default: 0)")
     parser.add_argument("--bound", type=float, default=50.0, metavar="MS", help="loss allowed (default: 50)")
+    parser.add_argument("--output", type=Path, default=FOLDER, metavar="FOLDER", help="where the figures go")
     options = parser.parse_args()
+    os.environ.update(ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST", ROS_STATIC_PEERS="")
     moments = random.Random(options.seed)
     kills = []
     for number in range(options.kills):
@@ -198,7 +200,7 @@ def main() -> int:
         kills.append(kill)
         print(f"{number + 1}: {kill.loss_ms:.0f} ms lost at {kill.published_ns / NS_PER_S:.3f} s", flush=True)
     good = [kill.opened and kill.missing == 0 and kill.loss_ms <= options.bound for kill in kills]
-    publish(_result(kills, options.bound, options.seed))
+    publish(_result(kills, options.bound, options.seed), options.output)
     return 0 if all(good) else 1
 
 

@@ -77,6 +77,7 @@ DEPUTY_MARKER = "deputy/marker"
 RUN_STATE = "run/state"
 RUN_READY = "run/ready"
 RUN_PUBLISHED = "run/published"
+RUN_RECORDED = "run/recorded"  # up to which stamp everything is in the bag
 LOOP_TIMING = "loop_timing"
 CLOCK = "/clock"
 DIAGNOSTICS = "/diagnostics"
@@ -112,6 +113,7 @@ def graph_topics(arms: Iterable[str]) -> tuple[Topic, ...]:
         Topic(RUN_STATE, f"{_OURS}/RunState", (PLANT,), everyone_else, Rate.CHANGE),
         Topic(RUN_READY, text, everyone_else, (PLANT,), Rate.CHANGE),
         Topic(RUN_PUBLISHED, f"{_OURS}/PublishedCounts", LOOP_NODES, (), Rate.CHANGE),
+        Topic(RUN_RECORDED, "std_msgs/msg/Header", (RECORDER,), (PLANT,), Rate.WALL),
         Topic(LOOP_TIMING, f"{_OURS}/LoopTiming", (PLANT,), (), Rate.WALL),
         Topic(CLOCK, "rosgraph_msgs/msg/Clock", (PLANT,), (), Rate.CLOCK),
         Topic(DIAGNOSTICS, "diagnostic_msgs/msg/DiagnosticArray", LOOP_NODES, (), Rate.WALL),

@@ -71,6 +71,7 @@ def _check_file(scan: FileScan, into: _Into, report: Callable[[int], None] | Non
             index.message(found)
             content.message(found)
         elif isinstance(found, Source):
+            into.counts[found.topic] += 0
             content.source(found)
         elif isinstance(found, Damage):
             damages.append(found)

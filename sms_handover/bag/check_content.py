@@ -5,18 +5,17 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-from mcap.records import Header, Metadata
+from mcap.records import Metadata
 
 from sms_handover import topics
 from sms_handover.bag.claims import Claims
 from sms_handover.bag.findings import Findings
-from sms_handover.bag.ledger import LEDGER_RECORD, PERIODS_RECORD, Ledger, TopicLedger, periods_of
+from sms_handover.bag.ledger import LEDGER_RECORD, PERIODS_RECORD, Ledger, TopicLedger, is_of_ours, periods_of
 from sms_handover.bag.rebuild import LedgerRebuild
 from sms_handover.bag.recording import PUBLISHED_COUNTS
 from sms_handover.bag.recovery import RECOVERY_RECORD
 from sms_handover.bag.scan import ScannedMessage, Source
 from sms_handover.bag.schemas import SchemaTypes, types_of
-from sms_handover.bag.writer import LIBRARY, is_of_ours
 from sms_handover.errors import BagError
 from sms_handover.units import NS_PER_S
 
@@ -46,10 +45,8 @@ class ContentCheck:
     def record(self, record: Any) -> None:
         """Take a record that is no message."""
         self.any_record = True
-        if isinstance(record, Header):
-            self.is_ours = self.is_ours or record.library == LIBRARY
-        elif isinstance(record, Metadata):
-            self.is_ours = self.is_ours or is_of_ours(record.name)
+        if isinstance(record, Metadata):
+            self.is_ours = self.is_ours or is_of_ours([record.name])
             if record.name == PERIODS_RECORD:
                 self._rebuild.expect(periods_of(record.metadata))
             elif record.name == LEDGER_RECORD:
@@ -99,7 +96,7 @@ class ContentCheck:
         if self._recovery is not None:
             self._tell_recovery(self._recovery, findings)
         if not self.is_ours:
-            findings.note("it is no bag of sms_handover: it has no loss ledger, so losses do not show")
+            findings.note("it has no loss ledger, as only recorded runs have: losses on the way do not show")
             for topic, count in self._late.items():
                 findings.note(f"{topic}: {count} messages lie behind later ones")
             return

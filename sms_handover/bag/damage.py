@@ -67,10 +67,11 @@ class Hole:
         if damage.start_ns is not None and damage.end_ns is not None:
             self._largest_ns = max(self._largest_ns, damage.end_ns - damage.start_ns)
 
-    def largest(self, span: tuple[int, int] | None) -> int | None:
+    def largest(self, span: tuple[int, int] | None) -> tuple[int, bool]:
         """Return the longest stretch lost of a recording with this first and last log time.
 
-        None if its span is not known and damage reaches one of its ends.
+        The second value tells whether the stretches at its ends are among them: not, if the damage
+        reaches an end and the span of the recording is not known.
         """
         ends = []
         if self._late_start_ns is not None:
@@ -78,4 +79,4 @@ class Hole:
         if self._open:
             ends.append(None if span is None or self._begin_ns is None else span[1] - self._begin_ns)
         known = [end for end in ends if end is not None]
-        return max(self._largest_ns, *known, 0) if len(known) == len(ends) else None
+        return max(self._largest_ns, *known, 0), len(known) == len(ends)

@@ -1,7 +1,7 @@
 """The loss ledger of a recording: per topic what was received, what is missing and how evenly it came."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 
 from sms_handover.errors import BagError
@@ -22,6 +22,11 @@ _HEADING = (
 
 LEDGER_RECORD = "sms_handover.ledger"  # names of metadata records in the bag: the whole account, and
 PERIODS_RECORD = "sms_handover.periods"  # before any message the step of the stamps in ns by topic
+
+
+def is_of_ours(records: Iterable[str]) -> bool:
+    """Tell by the names of its metadata records whether a bag is one of our recorder, with a ledger."""
+    return not {LEDGER_RECORD, PERIODS_RECORD}.isdisjoint(records)
 
 
 @dataclass(frozen=True)

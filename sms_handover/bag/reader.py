@@ -8,8 +8,8 @@ import numpy as np
 from sms_handover import topics
 from sms_handover.bag.collector import BASE_POSE, BASE_TWIST, EFFORT, POSITION, VELOCITY, RunCollector
 from sms_handover.bag.info import BagInfo, read_info
+from sms_handover.bag.ledger import is_of_ours
 from sms_handover.bag.series import Series
-from sms_handover.bag.writer import is_of_ours
 from sms_handover.errors import BagError
 from sms_handover.run_data import Array, RunData, Stamps
 from sms_handover.types import TaskPhase
@@ -92,7 +92,7 @@ def holds_run(info: BagInfo) -> bool:
         find_namespace(info)
     except BagError:
         return False
-    return any(map(is_of_ours, info.records))
+    return is_of_ours(info.records)
 
 
 def find_namespace(info: BagInfo) -> str:

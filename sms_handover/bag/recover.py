@@ -5,17 +5,17 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from mcap.records import Attachment, Header, Metadata, Statistics
+from mcap.records import Attachment, Metadata, Statistics
 
 from sms_handover.bag.damage import Damage, Hole
 from sms_handover.bag.files import damage_reported, files_of
 from sms_handover.bag.frames import Frame, FrameWalk
-from sms_handover.bag.ledger import LEDGER_RECORD, PERIODS_RECORD, Ledger, periods_of
+from sms_handover.bag.ledger import LEDGER_RECORD, PERIODS_RECORD, Ledger, is_of_ours, periods_of
 from sms_handover.bag.metadata import ROSBAG2_RECORD, counts_in_metadata
 from sms_handover.bag.rebuild import LedgerRebuild
 from sms_handover.bag.recovery import RECOVERY_RECORD, Recovery, TopicRecovery
 from sms_handover.bag.scan import FileScan, Located, ScannedMessage, Source
-from sms_handover.bag.writer import LIBRARY, BagWriter, is_of_ours
+from sms_handover.bag.writer import BagWriter
 from sms_handover.errors import BagError
 
 Progress = Callable[[int, int], None]  # bytes gone through, bytes in all
@@ -112,6 +112,7 @@ class _Salvage:
             recovered[name] = recovered.get(name, 0) + count
         self.expect(self._in_statistics)
         names = dict.fromkeys((*recovered, *self._recorded))
+        largest_ns, ends_known = self._hole.largest(self._span)
         return Recovery(
             source=source,
             folder=self._writer.folder,
@@ -124,7 +125,8 @@ class _Salvage:
             from_cut_chunk=self._from_cut_chunk,
             start_ns=self._hole.first_ns,
             end_ns=self._hole.newest_ns,
-            largest_loss_ns=self._hole.largest(self._span),
+            largest_loss_ns=largest_ns,
+            ends_known=ends_known,
             ledger=None if self._rebuild is None else self._rebuild.ledger(),
         )
 
@@ -144,14 +146,12 @@ class _Salvage:
     def _take_record(self, found: Located, scan: FileScan) -> None:
         """Keep attachments and records, and listen to what tells of the whole bag."""
         record = found.record
-        if isinstance(record, Header) and record.library == LIBRARY and self._rebuild is None:
-            self._rebuild = LedgerRebuild()
-        elif isinstance(record, Attachment):
+        if isinstance(record, Attachment):
             if self._is_new(record.name, record.data):
                 times = record.log_time, record.create_time
                 self._writer.attach(record.name, record.media_type, record.data, *times)
         elif isinstance(record, Metadata):
-            if is_of_ours(record.name) and self._rebuild is None:
+            if is_of_ours([record.name]) and self._rebuild is None:
                 self._rebuild = LedgerRebuild()
             if record.name == PERIODS_RECORD and self._rebuild is not None:
                 self._rebuild.expect(periods_of(record.metadata))

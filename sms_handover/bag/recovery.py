@@ -32,7 +32,8 @@ class Recovery:
     ``size`` is what was read [byte], ``closed`` tells whether every file had its end,
     ``from_cut_chunk`` counts messages out of a chunk that the end of a file cuts off. Times are log
     times, None without a message. ``largest_loss_ns`` is the longest stretch of log time without
-    messages around damage, None if how far it went is not known. ``ledger`` is that of the new
+    messages around damage; unless ``ends_known``, damage reaches an end of the bag, and nothing
+    tells how much was beyond. ``ledger`` is that of the new
     bag, None if the old one had none.
     """
 
@@ -45,7 +46,8 @@ class Recovery:
     from_cut_chunk: int
     start_ns: int | None
     end_ns: int | None
-    largest_loss_ns: int | None
+    largest_loss_ns: int
+    ends_known: bool
     ledger: Ledger | None
 
     @property
@@ -78,5 +80,6 @@ class Recovery:
             "damage": [str(damage) for damage in self.damages],
             "messages_lost": {topic.name: topic.lost for topic in self.topics if topic.lost},
             "largest_loss_ns": self.largest_loss_ns,
+            "ends_known": self.ends_known,
         }
         return {key: json.dumps(value) for key, value in values.items()}

@@ -37,11 +37,6 @@ _PROFILE = "ros2"
 LIBRARY = "sms_handover"  # what the header of our bags names
 
 
-def is_of_ours(record: str) -> bool:
-    """Tell by the name of a metadata record whether it is one that our recordings carry."""
-    return record.startswith(f"{LIBRARY}.")
-
-
 @dataclass
 class _Topic:
     """An open channel; ``count`` grows with each message."""

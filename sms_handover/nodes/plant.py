@@ -45,8 +45,10 @@ from sms_handover.topics import (
     LINEAR_MOMENTUM,
     LOOP_TIMING,
     PLANT,
+    RECORDER,
     ROBOT_DESCRIPTION,
     RUN_READY,
+    RUN_RECORDED,
     RUN_STATE,
     SAMPLED_BASE_ODOMETRY,
     SAMPLED_JOINT_STATES,
@@ -58,6 +60,7 @@ from sms_handover.types import JointCommand
 _COMMAND = (JOINT_COMMAND,)
 _PHASE_AND_COMMAND = (TASK_PHASE, JOINT_COMMAND)
 _MARGIN_S = 0.0002  # [s] before a deadline from which on nothing but the deadline is waited for
+_MOST_UNRECORDED_NS = 45_000_000  # [ns] of simulation time that may be lost with the recorder
 _TIMING_PERIOD_S = 1.0  # [s] of wall time
 
 
@@ -87,6 +90,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self._run_state = RunState.WAITING
         self._steps_left = 0
         self._reset_asked = False
+        self._recorded_ns = 0
         self._waiting_for = set(self.common.peers) - {PLANT}
         self._make_endpoints()
         self._silent_tick = -1
@@ -134,7 +138,15 @@ class PlantNode(GraphNode[PlantParameters]):
     @property
     def awaited(self) -> str:
         """Return what comes last of what completes the tick."""
+        if self._ahead_of_recorder:
+            return RUN_RECORDED
         return self._inputs.missing(self._plant.stamp_ns, self._needed) or JOINT_COMMAND
+
+    @property
+    def _ahead_of_recorder(self) -> bool:
+        """Tell whether the next state would be more than may be lost if the recorder were killed."""
+        next_ns = self._plant.stamp_ns + self.common.tick_ns
+        return RECORDER in self.common.peers and next_ns - self._recorded_ns > _MOST_UNRECORDED_NS
 
     @property
     def _needed(self) -> tuple[str, ...]:
@@ -150,6 +162,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self._publish = {name: self.endpoints.publisher(name) for name in names}
         self.endpoints.receive(TASK_PHASE, self.inputs, self._on_phase)
         self.endpoints.receive(JOINT_COMMAND, self.inputs, self._on_command)
+        self.endpoints.receive(RUN_RECORDED, self.inputs, self._on_recorded)
         self.endpoints.subscribe(RUN_READY, self._on_ready)
         self.create_service(SetBool, "~/pause", self._on_pause)
         self.create_service(StepTicks, "~/step", self._on_step)
@@ -204,7 +217,8 @@ class PlantNode(GraphNode[PlantParameters]):
         Whoever has answered it sends the same bytes again; whoever has missed it answers now.
         """
         tick = self._plant.tick
-        if tick == self._silent_tick and (self._run_state == RunState.RUNNING or self._steps_left):
+        waiting = tick == self._silent_tick and not self._ahead_of_recorder
+        if waiting and (self._run_state == RunState.RUNNING or self._steps_left):
             self._publish_loop(tick % self.common.ticks_per_reference == 0)
         self._silent_tick = tick
 
@@ -239,8 +253,16 @@ class PlantNode(GraphNode[PlantParameters]):
         else:
             self._execute(data)
 
+    def _on_recorded(self, data: bytes, sent_ns: int) -> None:
+        """Note up to where the recorder has come; in lock step the plant may have waited for it."""
+        self._recorded_ns = stamp_ns(data)
+        if self._lockstep:
+            self._advance()
+
     def _advance(self) -> None:
         """Integrate one tick if its command has come and nothing holds the plant back (lock step)."""
+        if self._ahead_of_recorder:
+            return
         if self._run_state == RunState.PAUSED and self._steps_left == 0 and not self._reset_asked:
             return
         needed = self._needed

@@ -11,6 +11,7 @@ from rclpy.executors import Executor
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from sms_handover_interfaces.msg import PublishedCounts
+from std_msgs.msg import Header
 
 from sms_handover.bag.ledger import ledger_table
 from sms_handover.bag.parameters import RecorderParameters
@@ -21,7 +22,7 @@ from sms_handover.bag.transforms import TF_TYPE, TransformsWire
 from sms_handover.errors import BagError, ConfigurationError, SmsHandoverError
 from sms_handover.frames import BASE, DEPUTY, WORLD
 from sms_handover.model.link_tree import LinkTree
-from sms_handover.ros.convert import pose_of_message
+from sms_handover.ros.convert import pose_of_message, time_message
 from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.inputs import Receive
 from sms_handover.ros.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, Stop, run_node
@@ -35,9 +36,11 @@ from sms_handover.simulation.scenario import load_task
 from sms_handover.topics import (
     CLOCK_PERIOD_NS,
     DEPUTY_POSE,
+    JOINT_STATES,
     PLANT,
     RECORDER,
     RUN_PUBLISHED,
+    RUN_RECORDED,
     SAMPLED_BASE_ODOMETRY,
     SAMPLED_JOINT_STATES,
     TF,
@@ -50,6 +53,7 @@ _POLL_S = 0.005  # [s] of wall time between two batches: long enough to be cheap
 _QUIET_S = 0.05  # [s] of wall time without a message after which nothing is on the way any more
 _REST_S = 1.0  # [s] of wall time at most to wait for that
 _BEHIND = 4096  # [reference periods] by which a recorder without a processor may be behind and make up for it
+_FLUSH_NS = 15_000_000  # [ns] of simulation time after which what has come is written to the file
 _DISCOVERY_PERIOD_S = 1.0  # [s] of wall time between two looks for topics beyond the graph
 _TF_INPUTS = (SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
 
@@ -81,6 +85,8 @@ class RecorderNode(GraphNode[RecorderParameters]):
         frames = [*self._links.frames, (WORLD, DEPUTY)]
         self._tf_wire = TransformsWire(self._recording.writer.types, frames)
         self._topics: set[str] = set()
+        self._recorded = self.endpoints.publisher(RUN_RECORDED)
+        self._state_ns = self._flushed_ns = 0
         for topic in self.endpoints.topics:
             self._record(topic)
         self._recording.add_topic(TF, TF_TYPE, (stored(LOSSLESS),), self.common.reference_ns)
@@ -126,8 +132,8 @@ class RecorderNode(GraphNode[RecorderParameters]):
         try:
             while not stop.asked and not self._drained():
                 executor.spin_once(timeout_sec=_POLL_S)
-                if not self.inputs.poll() and monotonic() - self._last_message > _POLL_S:
-                    self._recording.writer.flush()  # nothing may wait for a message that does not come
+                nothing = not self.inputs.poll() and monotonic() - self._last_message > _POLL_S
+                self._flush(idle=nothing)
             if stop.asked:
                 self._take_the_rest(executor)
         finally:
@@ -138,6 +144,19 @@ class RecorderNode(GraphNode[RecorderParameters]):
         if not self.finished:
             return EXIT_STOPPED
         return EXIT_OK if ledger.complete else EXIT_LOSS
+
+    def _flush(self, *, idle: bool) -> None:
+        """Write to the file what has come, and tell the plant: it does not go on far without.
+
+        Between two polls all that was published with a state has come. In an idle moment the last
+        messages go out too, as they may not wait for others that do not come.
+        """
+        behind_ns = abs(self._state_ns - self._flushed_ns)
+        if idle or behind_ns >= _FLUSH_NS:
+            self._recording.writer.flush()
+        if behind_ns and (idle or behind_ns >= _FLUSH_NS):
+            self._flushed_ns = self._state_ns
+            self._recorded.publish(Header(stamp=time_message(self._flushed_ns)))
 
     def _drained(self) -> bool:
         """Tell whether the run is over and nothing is to be expected any more."""
@@ -169,6 +188,8 @@ class RecorderNode(GraphNode[RecorderParameters]):
         receive: Receive = partial(self._receive, name)
         if topic.name in _TF_INPUTS:
             receive = partial(self._receive_for_tf, topic.name, name)
+        elif topic.name == JOINT_STATES:
+            receive = partial(self._receive_state, name)
         elif topic.name == RUN_PUBLISHED:
             receive = partial(self._receive_counts, name)
         elif topic.rate is Rate.WALL:
@@ -184,6 +205,11 @@ class RecorderNode(GraphNode[RecorderParameters]):
         """Record one message that was sent at a wall-clock time."""
         self._last_message = monotonic()
         self._recording.receive(name, data, sent_ns)
+
+    def _receive_state(self, name: str, data: bytes, sent_ns: int) -> None:
+        """Record one state; its stamp is how far the run has come."""
+        self._receive(name, data, sent_ns)
+        self._state_ns = stamp_ns(data)
 
     def _receive_anyway(self, name: str, data: bytes, sent_ns: int) -> None:
         """Record one message of a topic that goes on after the run, which is no sign that more is to come."""

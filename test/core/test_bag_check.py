@@ -189,7 +189,7 @@ def test_a_whole_bag_of_others_is_complete(tmp_path: Path, compression: Compress
     write_file(tmp_path / "a.mcap", compression)
     result = check(tmp_path / "a.mcap")
     assert result.complete and not result.is_ours
-    assert any("no bag of sms_handover" in line for line in texts(result, Severity.NOTE))
+    assert any("no loss ledger" in line for line in texts(result, Severity.NOTE))
 
 
 def test_a_bag_without_index_is_complete_and_slow(tmp_path: Path) -> None:

@@ -1,10 +1,11 @@
 """The whole graph in one process: the real nodes, and an ear in the place of the recorder."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from rclpy.node import Node
-from std_msgs.msg import String
+from std_msgs.msg import Header, String
 
 from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.stamp import stamp_ns
@@ -12,10 +13,22 @@ from sms_handover.nodes.controller import ControllerNode
 from sms_handover.nodes.ik import IkNode
 from sms_handover.nodes.plant import PlantNode
 from sms_handover.nodes.trajectory import TrajectoryNode
+from sms_handover.ros.convert import time_message
 from sms_handover.ros.endpoints import Endpoints
 from sms_handover.ros.graph_node import GraphNode
 from sms_handover.simulation.parameters import EXECUTOR
-from sms_handover.topics import CONTROLLER, IK, PLANT, RECORDER, RUN_READY, TRAJECTORY, Topic, graph_topics
+from sms_handover.topics import (
+    CONTROLLER,
+    IK,
+    JOINT_STATES,
+    PLANT,
+    RECORDER,
+    RUN_READY,
+    RUN_RECORDED,
+    TRAJECTORY,
+    Topic,
+    graph_topics,
+)
 
 from .bench import Bench, Parameters
 from .short_handover import short_handover
@@ -38,8 +51,21 @@ class Ear:
         self.heard: dict[str, list[bytes]] = {topic.name: [] for topic in TOPICS}
         self._endpoints = Endpoints(node, TOPICS, peers)
         self._ready = self._endpoints.publisher(RUN_READY)
+        self._recorded = self._endpoints.publisher(RUN_RECORDED)
+        self.recorded_ns: int | None = None  # how far a recorder that does not keep up has come
         for topic in TOPICS:
-            self._endpoints.subscribe(topic.name, self.heard[topic.name].append, raw=True)
+            self._endpoints.subscribe(topic.name, partial(self._hear, topic.name), raw=True)
+
+    def _hear(self, topic: str, data: bytes) -> None:
+        """Keep a message, and tell the plant that it need not wait."""
+        self.heard[topic].append(data)
+        if topic == JOINT_STATES:
+            time_ns = stamp_ns(data)
+            self.tell_recorded(time_ns if self.recorded_ns is None else min(time_ns, self.recorded_ns))
+
+    def tell_recorded(self, time_ns: int) -> None:
+        """Tell up to which stamp everything is in the bag."""
+        self._recorded.publish(Header(stamp=time_message(time_ns)))
 
     def get_ready(self, bench: Bench) -> None:
         """Wait for the other nodes, and say so."""

@@ -29,6 +29,7 @@ from sms_handover.topics import (
     PLANT,
     RUN_PUBLISHED,
     RUN_READY,
+    RUN_RECORDED,
     RUN_STATE,
     SAMPLED_BASE_ODOMETRY,
     SAMPLED_JOINT_STATES,
@@ -318,3 +319,18 @@ def test_in_real_time_the_loop_reports_its_timing(bench: Bench) -> None:
     assert 0 < report.ticks <= len(graph.heard[JOINT_STATES])
     assert 0.0 < report.period_mean <= report.period_max
     assert stamp_ns(graph.heard[LOOP_TIMING][0]) <= graph.plant.diagnostic_stamp_ns()
+
+
+def test_it_waits_for_a_recorder_that_is_behind(bench: Bench) -> None:
+    """What a killed recorder can lose is bounded: the plant goes no further ahead of what is in the bag."""
+    graph = plant_with(bench, duration=0.2)
+    graph.ear.recorded_ns = 30_000_000
+    graph.ear.get_ready(bench)
+    bench.until(lambda: graph.plant.awaited == RUN_RECORDED, "the plant to wait")
+    assert graph.stamps(JOINT_STATES)[-1] <= 75_000_000
+    bench.until(lambda: graph.stamps(JOINT_STATES)[-1] == 75_000_000, "the last state before that")
+    assert not graph.plant.finished
+    graph.ear.recorded_ns = None
+    graph.ear.tell_recorded(75_000_000)
+    graph.wait_for_end()
+    assert graph.stamps(JOINT_STATES) == [k * TICK_NS for k in range(201)]

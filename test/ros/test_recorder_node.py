@@ -1,6 +1,6 @@
 """The recorder, with the real nodes or made-up ones, all in one process: what the bag holds at the end."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.reader import read_run
+from sms_handover.bag.scan import FileScan, ScannedMessage
 from sms_handover.errors import ConfigurationError
 from sms_handover.frames import BASE, WORLD
 from sms_handover.nodes.controller import ControllerNode
@@ -25,6 +26,7 @@ from sms_handover.nodes.ik import IkNode
 from sms_handover.nodes.plant import PlantNode
 from sms_handover.nodes.recorder import RecorderNode
 from sms_handover.nodes.trajectory import TrajectoryNode
+from sms_handover.ros.convert import stamp_ns_of
 from sms_handover.ros.endpoints import Endpoints
 from sms_handover.ros.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED
 from sms_handover.ros.qos import LATCHED, LOSSLESS
@@ -39,6 +41,7 @@ from sms_handover.topics import (
     PLANT,
     RECORDER,
     RUN_PUBLISHED,
+    RUN_RECORDED,
     RUN_STATE,
     TF,
     Rate,
@@ -261,16 +264,22 @@ class FakePlant:
         self._counts = self._endpoints.publisher(RUN_PUBLISHED)
         diagnostics = self._endpoints.publisher(DIAGNOSTICS)
         node.create_timer(0.05, lambda: diagnostics.publish(DiagnosticArray()))  # s, well below drain_timeout
+        self.recorded: list[int] = []  # stamps in ns up to which the recorder says it has everything
+        self._endpoints.subscribe(RUN_RECORDED, lambda m: self.recorded.append(stamp_ns_of(m.stamp)))
         self._wire = JointStateWire(("joint",), ("position",))
 
     def matched(self) -> bool:
         """Tell whether the recorder listens."""
         return not self._endpoints.unmatched
 
-    def run(self, ticks: list[int], told: int) -> None:
-        """Publish a whole run, and tell a count."""
+    def publish(self, ticks: Iterable[int]) -> None:
+        """Publish the states of ticks."""
         for tick in ticks:
             self._state.publish(self._wire.pack(tick * 1_000_000, position=np.ones(1)))
+
+    def run(self, ticks: list[int], told: int) -> None:
+        """Publish a whole run, and tell a count."""
+        self.publish(ticks)
         self._run_state.publish(RunState(state=RunState.FINISHED))
         self._counts.publish(PublishedCounts(node=PLANT, topics=["/joint_states"], counts=[told]))
 
@@ -346,3 +355,23 @@ def test_a_folder_that_cannot_be_made_is_refused(bench: Bench, tmp_path: Path) -
     bench.start({RECORDER: {"folder": str(tmp_path / "file" / "bag")}})
     with pytest.raises(ConfigurationError, match="file"):
         bench.add(RecorderNode)
+
+
+def test_what_it_says_is_recorded_is_in_the_file(bench: Bench, lone: tuple[RecorderNode, FakePlant]) -> None:
+    """The file as it is at that moment is what a kill would leave."""
+    recorder, plant = lone
+    file = bench.folder / "bag" / "bag_0.mcap"
+    ticks = list(range(0, 201, 4))
+
+    def told_all() -> bool:
+        heard = plant.recorded[-1] if plant.recorded else -1
+        there = [item.log_time_ns for item in FileScan(file) if isinstance(item, ScannedMessage)]
+        assert max(there, default=-1) >= heard
+        if ticks:
+            plant.publish([ticks.pop(0)])
+        return heard == 200_000_000
+
+    stop: Any = Stop(told_all)
+    assert recorder.run(bench.executor, stop) == EXIT_STOPPED
+    assert plant.recorded == sorted(plant.recorded)
+    assert len(plant.recorded) > 2

@@ -73,6 +73,8 @@ def _text(result: Recovery) -> str:
         lines.append(f"{result.from_cut_chunk} messages are out of a chunk that the end of the file cuts off")
     if result.largest_loss_ns:
         lines.append(f"largest loss: {result.largest_loss_ns / _NS_PER_MS:.3f} ms of log time")
+    if not result.ends_known:
+        lines.append("the damage reaches an end of the bag; nothing tells how much was there")
     if not result.closed:
         lines.append(
             "the recording was not closed: what the recorder had not written when it ended is in no file"
