@@ -9,7 +9,6 @@ from textwrap import wrap
 from sms_handover.ros.contents import contents_of
 from sms_handover.ros.reference import (
     COMMON_GROUP,
-    OWN_GROUPS,
     ParameterGroup,
     ParameterRow,
     groups_of,
@@ -57,10 +56,10 @@ def show_help(node: str, cls: object) -> None:
 
 
 def node_help(node: str, cls: object) -> str:
-    """Return the help of the node that a class makes."""
+    """Return the help of a node of this package; ``cls`` is what makes it."""
     parts = [_usage(node), inspect.getdoc(cls) or "", *_topics(node), *_services(node)]
-    parts += [_parameters(group) for group in groups_of(node)] if node in OWN_GROUPS else []
-    return "\n\n".join(part for part in [*parts, _example(node), _EXIT_CODES] if part)
+    parts += [*map(_parameters, groups_of(node)), _example(node), _EXIT_CODES]
+    return "\n\n".join(part for part in parts if part)
 
 
 def _usage(node: str) -> str:
@@ -104,8 +103,6 @@ def _parameter(row: ParameterRow) -> str:
 
 def _example(node: str) -> str:
     """Return a command line that works, and in the graph the one that runs everything."""
-    if node not in EXAMPLES:
-        return ""
     values = " ".join(f"-p {name}:={_shell(value)}" for name, value in EXAMPLES[node].items())
     lines = [f"  ros2 run sms_handover {node} --ros-args {values}"]
     if node in NODES:
