@@ -1,4 +1,4 @@
-"""What a release must keep in step: the version in every file, and entry points that exist."""
+"""What a release must keep in step: versions, entry points, dependencies, pages written from the code."""
 
 import ast
 import re
@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 import sms_handover
+from docs.reference import pages
 
 from .workspace import ROOT, entry_points
 
@@ -53,6 +54,7 @@ def imported_modules() -> Iterator[str]:
                 yield node.module.partition(".")[0]
 
 
+PAGES = pages()
 OUTSIDE = sorted(set(imported_modules()) - {"sms_handover"} - set(sys.stdlib_module_names))
 
 
@@ -83,3 +85,9 @@ def test_what_is_imported_is_declared_to_rosdep(module: str) -> None:
     assert key is not None, f"{module} is imported, but KEYS in this file names no rosdep key for it"
     package = ElementTree.parse(ROOT / "package.xml").getroot()
     assert key in {item.text for tag in ("depend", "exec_depend") for item in package.findall(tag)}
+
+
+@pytest.mark.parametrize("path", list(PAGES), ids=lambda path: path.name)
+def test_a_reference_page_is_up_to_date(path: Path) -> None:
+    """After a change of parameters, topics or services: ``make reference``."""
+    assert path.read_text(encoding="utf-8") == PAGES[path], "run: make reference"

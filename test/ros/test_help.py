@@ -6,7 +6,7 @@ from collections.abc import Callable
 from importlib import import_module
 from inspect import getdoc
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 import rclpy
@@ -20,6 +20,7 @@ from sms_handover.nodes.trajectory import TrajectoryNode
 from sms_handover.parameters import build, read_parameter_files
 from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.help import EXAMPLES, node_help
+from sms_handover.ros.playback_services import offer_services
 from sms_handover.ros.reference import (
     ANY_ARM,
     OWN_GROUPS,
@@ -30,7 +31,7 @@ from sms_handover.ros.reference import (
     topics_of,
 )
 from sms_handover.share import config_file
-from sms_handover.topics import CLOCK, NODES, RUN_STATE, TF, Rate, graph_topics
+from sms_handover.topics import CLOCK, NODES, PLAYER, RUN_STATE, TF, Rate, graph_topics
 
 from ..workspace import ROOT, executables
 from .bench import Bench
@@ -83,6 +84,16 @@ def test_the_reference_is_what_the_node_has(
         service: types for service, types in clients.items() if not any(r in service for r in ROS_SERVICES)
     }
     assert clients == {f"/{service.relative_name}": [service.type] for service in called}
+
+
+def test_the_services_told_of_the_player_are_those_it_offers(bench: Bench) -> None:
+    bench.start()
+    node = bench.plain(PLAYER)
+    offer_services(node, cast(Any, None), lambda: None)  # nothing is called
+    own = dict(node.get_service_names_and_types_by_node(PLAYER, "/"))
+    assert {f"/{s.relative_name}": [s.type] for s in services_of(PLAYER)[0]} == {
+        name: types for name, types in own.items() if not any(part in name for part in ROS_SERVICES)
+    }
 
 
 @pytest.mark.parametrize("name", list(OWN_GROUPS))
