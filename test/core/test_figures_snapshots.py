@@ -161,6 +161,13 @@ def test_a_deputy_that_was_not_recorded_is_left_out(drawn: DrawnRun) -> None:
     assert len([axes for axes in figure.axes if axes.collections]) == 9
 
 
+def test_without_phases_there_are_the_first_and_the_last_instant(drawn: DrawnRun) -> None:
+    assert drawn.scene is not None
+    scene = Scene(**{**vars(drawn.scene), "phases": ()})
+    titles = [axes.get_title() for axes in draw_snapshots(DrawnRun("NMPC", drawn.data, scene)).axes]
+    assert titles == ["0 s", "1.4 s", "", ""]
+
+
 def test_snapshots_are_the_same_bytes_each_time(drawn: DrawnRun, tmp_path: Path) -> None:
     for suffix in ("svg", "png"):
         written = []

@@ -68,10 +68,11 @@ def draw_snapshots(run: DrawnRun) -> Figure:
 def _frames(scene: Scene) -> list[int]:
     """Return the rows of the scene to show, in the order of time."""
     starts = [phase.stamp_ns for phase in scene.phases]
-    ends = [*starts[1:], int(scene.stamp_ns[-1])]
+    last = int(scene.stamp_ns[-1])
     times = [int(scene.stamp_ns[0])]
-    for start, end in zip(starts, ends, strict=False):
+    for start, end in zip(starts, [*starts[1:], last], strict=False):
         times += [start + round(_ON_THE_WAY * (end - start)), end]
+    times.append(last)
     nearest = [int(np.argmin(np.abs(scene.stamp_ns - time))) for time in times]
     return list(dict.fromkeys(nearest))
 
@@ -117,6 +118,8 @@ def _title(scene: Scene, frame: int) -> str:
     stamp_ns = int(scene.stamp_ns[frame])
     running = [phase for phase in scene.phases if phase.stamp_ns < stamp_ns] or scene.phases[:1]
     name = running[-1].name if running else ""
+    if not name:
+        return f"{ns_to_seconds(stamp_ns):g} s"
     ended = stamp_ns in {phase.stamp_ns for phase in scene.phases[1:]} | {int(scene.stamp_ns[-1])}
     words = f"end of {name}" if ended else name
     return f"{ns_to_seconds(stamp_ns):g} s: {words if frame else 'start'}"
