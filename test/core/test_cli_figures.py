@@ -1,5 +1,7 @@
 """``sms-handover figures`` as a user meets it: files, notes, help and wrong input."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -8,6 +10,8 @@ from sms_handover.analysis.figure_catalogue import FIGURES
 from sms_handover.cli.main import main
 
 from .bag_messages import made_up_run, write_run
+
+ROOT = Path(__file__).resolve().parent.parent.parent
 
 
 @pytest.fixture(scope="module")
@@ -79,3 +83,19 @@ def test_a_bag_that_does_not_describe_the_robot_has_no_snapshots(
         "no snapshots of mine: its bag carries no robot description",
         "sms-handover figures: error: there is nothing to draw of snapshots in these runs",
     ]
+
+
+@pytest.mark.parametrize(("option", "code"), [("--help", 0), ("--only=momentum", 1)])
+def test_without_matplotlib_there_is_help_and_one_line_of_error(
+    bags: tuple[str, str], tmp_path: Path, option: str, code: int
+) -> None:
+    script = (
+        "import sys\nsys.modules['matplotlib'] = None\n"
+        "from sms_handover.cli.main import main\nsys.exit(main(sys.argv[1:]))"
+    )
+    words = [sys.executable, "-c", script, "figures", bags[0], "-o", str(tmp_path / "out"), option]
+    ended = subprocess.run(words, capture_output=True, text=True, check=False, cwd=ROOT)
+    assert ended.returncode == code
+    expected = "sms-handover figures: error: figures need matplotlib, which is not installed: "
+    assert ended.stderr == (f"{expected}pip install 'sms_handover[analysis]'\n" if code else "")
+    assert not (tmp_path / "out").exists()
