@@ -25,7 +25,6 @@ class RunCard:
     duration: float
     started: str
     messages: int
-    size: int
     verdicts: tuple[Verdict, ...]
     ledger: str
 
@@ -38,7 +37,6 @@ def run_card(run: RecordedRun, style: RunStyle) -> RunCard:
         duration=ns_to_seconds(int(ticks[-1] - ticks[0])) if len(ticks) else 0.0,
         started=run.info.provenance.get("start", ""),
         messages=run.info.message_count,
-        size=run.info.size,
         verdicts=(_grasps(run), _recording(ledger)),
         ledger="" if ledger is None else ledger_table(ledger),
     )

@@ -1,5 +1,6 @@
 """The report in a real browser: drawn, linked, safe, without a network, and whole on a telephone."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -289,6 +290,29 @@ def test_even_a_script_that_got_in_would_not_run(opened: Open, html: str) -> Non
     visit.page.locator("b").click()
     assert visit.page.evaluate("window.ran") is None
     assert len([error for error in visit.errors if "Content Security Policy" in error]) == 2
+
+
+def test_a_plot_of_many_lines_tells_the_nearest_one_and_its_time(opened: Open) -> None:
+    page = opened().page
+    box = frame_of(page, "arm_a/joint_torque")
+    page.mouse.move(box["x"] + 250, box["middle"])
+    label = "plots.plots[4].frame.querySelector('.hoverlayer .hovertext')"
+    until(page, label)
+    told = page.evaluate(f"{label}.textContent")
+    assert re.fullmatch(r"joint \d, (nmpc|pid).+ N m at 0\.\d\d\d s", told), told
+
+
+def test_a_plot_can_be_saved(opened: Open) -> None:
+    """The policy of the page must not keep a plot from becoming a file."""
+    visit = opened()
+    frame_of(visit.page, "arm_b/position_error")
+    plot = visit.page.locator("[data-plot='arm_b/position_error']")
+    plot.locator(".frame").hover()
+    with visit.page.expect_download() as saved:
+        plot.locator("[data-title^='Download']").click()
+    assert saved.value.suggested_filename == "arm_b_position_error.svg"
+    assert saved.value.path().read_text(encoding="utf-8").startswith("<svg")
+    assert visit.errors == []
 
 
 def test_it_prints_whole(opened: Open) -> None:

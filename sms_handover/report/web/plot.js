@@ -23,7 +23,8 @@ class TimePlot {
 
   async draw(view) {
     this.view = view;
-    const config = { ...CONFIG, displayModeBar: coarse ? false : "hover" };
+    const filename = this.plot.key.replaceAll("/", "_");
+    const config = { ...CONFIG, displayModeBar: coarse ? false : "hover", toImageButtonOptions: { format: "svg", filename } };
     await Plotly.newPlot(this.frame, this.traces(), this.layout(), config);
     this.frame.append(this.cursor);
   }
@@ -40,7 +41,7 @@ class TimePlot {
         y: line.values,
         visible: this.shows(line),
         line: { color: lineColour(this.plot, line), dash: run.dash, width: 1.6 },
-        hovertemplate: `%{y:.4g} ${this.plot.unit}`,
+        hovertemplate: `%{y:.4g} ${this.plot.unit}${this.unified ? "" : " at %{x:.3f} s"}`,
       };
     });
   }
@@ -54,6 +55,7 @@ class TimePlot {
       modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("muted"), activecolor: colour("accent") },
       showlegend: false,
       hovermode: this.unified ? "x unified" : "closest",
+      hoverdistance: -1, // the nearest line, however far
       hoverlabel: { ...hoverColours(), namelength: -1 },
       dragmode: coarse ? false : "zoom",
       xaxis: { ...axisColours(), range: [...this.view.range], zeroline: false, ticksuffix: " s", hoverformat: ".3f", fixedrange: coarse },
