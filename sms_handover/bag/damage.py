@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
+from sms_handover.units import NS_PER_S
+
 
 @dataclass(frozen=True)
 class Damage:
@@ -30,8 +32,13 @@ class Damage:
         return self.end - self.begin
 
     def __str__(self) -> str:
-        """Return the damage in words, with its place."""
-        return f"{self.file.name}: bytes {self.begin} to {self.end}: {self.reason}"
+        """Return the damage in words, with its place and, where known, what was there."""
+        text = f"{self.file.name}: bytes {self.begin} to {self.end}: {self.reason}"
+        if self.start_ns is not None and self.end_ns is not None:
+            text += f" ({self.start_ns / NS_PER_S:.3f} to {self.end_ns / NS_PER_S:.3f} s)"
+        if self.messages:
+            text += f", {sum(self.messages.values())} messages"
+        return text
 
 
 class Hole:

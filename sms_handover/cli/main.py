@@ -1,5 +1,6 @@
 """The command line ``sms-handover``."""
 
+import os
 import sys
 from argparse import REMAINDER, ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Sequence
@@ -44,12 +45,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     module.add_parser(command_parser)
     options = command_parser.parse_args(chosen.arguments)
     try:
-        return int(module.command(options))
+        code = int(module.command(options))
+        sys.stdout.flush()
+        return code
     except ConfigurationError as error:
         print(f"sms-handover {chosen.command}: error: {error}", file=sys.stderr)
         return _EXIT_USAGE
     except SmsHandoverError as error:
         print(f"sms-handover {chosen.command}: error: {error}", file=sys.stderr)
+        return _EXIT_FAILED
+    except BrokenPipeError:  # whoever reads the output has seen enough, as head(1) does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return _EXIT_FAILED
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)

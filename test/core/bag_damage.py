@@ -42,6 +42,7 @@ def write_file(
     chunked: bool = True,
     crcs: bool = True,
     count: int = 60,
+    start_ns: int = 0,
 ) -> bytes:
     """Write a file with three topics, an attachment and a record by the MCAP library; return its bytes."""
     random = np.random.default_rng(0)
@@ -60,10 +61,13 @@ def write_file(
             for name, kind in topics
         }
         for number in range(count):
+            time_ns = start_ns + number * 10
             data = TYPES.serialize(text(f"number {number}"))
-            writer.add_message(channels["/text"], number * 10, data, 7 * number, sequence=number)
+            writer.add_message(channels["/text"], time_ns, data, 7 * number, sequence=number)
             data = TYPES.serialize(joint_state(number, position=random.standard_normal(14)))
-            writer.add_message(channels["/joints"], number * 10 + 5, data, 9 * number, sequence=number)
+            writer.add_message(
+                channels["/joints"], start_ns + number * 10 + 5, data, 9 * number, sequence=number
+            )
         writer.finish()
     return path.read_bytes()
 

@@ -43,9 +43,9 @@ def _text(info: BagInfo) -> str:
         "Bag size": f"{info.size / _BYTES_PER_MIB:.1f} MiB",
         "Storage id": "mcap",
         "Profile, library": f"{info.profile or '-'}, {info.library or '-'}",
-        "Duration": f"{info.duration_ns / NS_PER_S:.9f} s",
-        "Start": f"{info.start_ns / NS_PER_S:.9f} s",
-        "End": f"{info.end_ns / NS_PER_S:.9f} s",
+        "Duration": _seconds(info.duration_ns),
+        "Start": _seconds(info.start_ns),
+        "End": _seconds(info.end_ns),
         "Messages": str(info.message_count),
     }
     lines = [*_table(head), "", *_topics(list(info.topics.values()))]
@@ -77,6 +77,11 @@ def _topics(topics: list[TopicInfo]) -> list[str]:
 def _cells(topic: TopicInfo) -> tuple[str, str, str, str]:
     """Return the cells of a topic."""
     return topic.name, topic.type or "-", str(topic.message_count), topic.encoding
+
+
+def _seconds(time_ns: int) -> str:
+    """Return a time in s with every nanosecond, which a float would not hold of a wall clock."""
+    return f"{time_ns // NS_PER_S}.{time_ns % NS_PER_S:09d} s"
 
 
 def _table(values: Mapping[str, str]) -> list[str]:
