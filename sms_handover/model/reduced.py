@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-import eigenpy
 import numpy as np
 import pinocchio as pin
 
@@ -49,7 +48,8 @@ def reduced_inverse_dynamics(robot: RobotModel, q: Array, v: Array, joint_accele
     accelerations[BASE_NV:] = joint_acceleration
     forces = pin.rnea(robot.pin, robot.data, q, v, accelerations)
     inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.WORLD)
-    yielding = eigenpy.LLT(inertia[:BASE_NV, :BASE_NV]).solve(forces[:BASE_NV])  # -a_b
+    solver = robot.base_solver.compute(inertia[:BASE_NV, :BASE_NV])
+    yielding = solver.solve(forces[:BASE_NV])  # -a_b
     efforts: Array = forces[BASE_NV:] - inertia[BASE_NV:, :BASE_NV].dot(yielding)
     return efforts
 

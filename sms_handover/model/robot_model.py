@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
+import eigenpy
 import numpy as np
 import pinocchio as pin
 
@@ -32,6 +33,7 @@ class RobotModel:
         self.pin = pin.buildModelFromXML(self.urdf, pin.JointModelFreeFlyer())
         self.pin.gravity.setZero()
         self.data = self.pin.createData()
+        self.base_solver = eigenpy.LLT(BASE_NV)  # work space too: Cholesky of a matrix of the base's size
         self.joint_names: tuple[str, ...] = tuple(self.pin.names[2:])
         self.n_joints = len(self.joint_names)
         if self.pin.nv != BASE_NV + self.n_joints or self.pin.nq != BASE_NQ + self.n_joints:

@@ -25,7 +25,9 @@ from sms_handover.types import (
 )
 from sms_handover.units import ns_to_seconds
 
-_IN_WORLD = pin.Convention.WORLD  # axes in which Pinocchio works; faster than those of the joints
+# Axes in which Pinocchio works. In those of the world it is a tenth faster, but its rounding grows with the
+# distance to the origin: 1e-8 rad/s^2 at the wrists within a metre, 1e-5 rad/s^2 at 100 m.
+_IN_JOINTS = pin.Convention.LOCAL
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +160,7 @@ class FreeFloatingPlant:
     def _acceleration(self, q: Array, v: Array) -> Array:
         """Return v' (6 + n,) under the efforts of this tick."""
         robot = self._robot
-        acceleration: Array = pin.aba(robot.pin, robot.data, q, v, self._generalized, _IN_WORLD)
+        acceleration: Array = pin.aba(robot.pin, robot.data, q, v, self._generalized, _IN_JOINTS)
         return acceleration
 
     def _deputy_follow(self) -> None:

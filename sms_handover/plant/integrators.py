@@ -79,7 +79,7 @@ class LieGroupIntegrator:
             if i > 0
         )
         ends = [_of_velocities(weights, a, h) for weights in b]
-        self._end_weights = np.array([*ends, np.concatenate([[1.0], h * b.sum(axis=0)])])
+        self._end_weights = np.array([*ends, np.concatenate([[0.0], h * b.sum(axis=0)])])
 
     def step(self, acceleration: Acceleration, q: Array, v: Array) -> tuple[Array, Array]:
         """Return configuration (7 + n,) and velocity (6 + n,) after one step, as read-only arrays."""
@@ -92,10 +92,10 @@ class LieGroupIntegrator:
             q_stage = pin.integrate(model, configurations[origin], motion)
             configurations.append(q_stage)
             result[:] = acceleration(q_stage, velocity)
-        *motions, v_next = frozen(self._end_weights.dot(rows))
+        *motions, increment = self._end_weights.dot(rows)
         for motion in motions:
             q = pin.integrate(model, q, motion)
-        return frozen(q), v_next
+        return frozen(q), frozen(v + increment)
 
     def _stage(self, index: int, origin: int, motion_weights: Array, a: Array, h: float) -> _Stage:
         """Return a stage with its weights and its places in the work space."""

@@ -142,14 +142,14 @@ def _rounding(scenario: Scenario, run: RunData) -> Array:
     """Return how far rounding can drive two engines apart in joints rad, base m and base rad.
 
     A solve with H* is exact to cond(H*) eps of the largest acceleration; were that error the same
-    in every tick, it would be integrated twice over the run. The base follows the joints by
-    -H_b^-1 H_bm, as momentum demands.
+    in every tick, it would be integrated twice over the run. Each engine errs so, and their errors may
+    add. The base follows the joints by -H_b^-1 H_bm, as momentum demands.
     """
     states = [_row(run, tick) for tick in range(0, run.tick_ns.size, _SAMPLE // _TICK)]
     condition = max(np.linalg.cond(reduced_dynamics(scenario.robot, *state).inertia) for state in states)
     tick_s, time_s = ns_to_seconds(_TICK), ns_to_seconds(int(run.tick_ns[-1]))
     acceleration = np.max(np.abs(np.diff(run.joint_velocity, axis=0))) / tick_s
-    joints = condition * _EPS * acceleration * time_s**2 / 2.0
+    joints = 2.0 * condition * _EPS * acceleration * time_s**2 / 2.0
     reactions = np.array([base_twist_per_joint_rate(scenario.robot, q) for q, _ in states])
     sums = np.abs(reactions).sum(axis=2).max(axis=0)
     return np.asarray(joints * np.array([1.0, np.linalg.norm(sums[:3]), np.linalg.norm(sums[3:])]))
