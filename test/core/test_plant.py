@@ -100,16 +100,15 @@ def test_a_robot_at_rest_without_efforts_stays_as_it_is(robot: RobotModel, draw:
 def test_motion_does_not_depend_on_where_the_base_is(robot: RobotModel, draw: Draw) -> None:
     """A hundred metres from the origin of the world the robot moves as it does there, to rounding."""
     joints, attitude = draw.joints(margin=0.5), draw.pose().quaternion_xyzw
-    effort = draw.effort(robot.configuration(Pose(np.zeros(3), attitude), joints))
+    effort = draw.vector(14, 0.3)  # [N m]
     velocities = []
     for place in (np.zeros(3), np.array([100.0, -100.0, 100.0])):
         plant = _plant(robot, joints, Pose(place, attitude))
         for _ in range(20):
             plant.step(JointCommand(plant.stamp_ns, effort))
         velocities.append(plant.v)
-    assert np.max(np.abs(velocities[0])) > 1e-3
-    # accelerations below 100 rad/s^2 are known to cond(H*) eps, a few thousand eps, over 20 ms
-    np.testing.assert_allclose(velocities[1], velocities[0], atol=0.02 * 100.0 * 1e4 * _EPS)
+    assert np.max(np.abs(velocities[0])) > 1.0  # [rad/s]
+    np.testing.assert_allclose(velocities[1], velocities[0], rtol=0.0, atol=1000 * _EPS)
 
 
 def test_work_is_effort_times_way(robot: RobotModel, draw: Draw) -> None:
