@@ -29,8 +29,8 @@ def recover(source: Path, folder: Path, progress: Progress | None = None) -> Rec
     """Write what the bag at ``source`` (its folder or a file) holds into a new bag in ``folder``.
 
     No message is altered, and every message of every chunk that is as it was written is there, in
-    the order of the file, with attachments and metadata records. Memory does not grow with the
-    length of the bag. Raises BagError if nothing can be read, if ``folder`` exists, or if it cannot
+    the order of the file, with attachments and metadata records. One chunk is held at a time.
+    Raises BagError if nothing can be read, if ``folder`` exists, or if it cannot
     be written; nothing is left of ``folder`` then.
     """
     files = files_of(source)
