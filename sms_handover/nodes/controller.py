@@ -41,6 +41,7 @@ class ControllerNode(GraphNode[ControllerParameters]):
         schedule = load_task(self.common, self.robot)
         self._controller = make_controller(self.robot, schedule, self.common, self.parameters)
         self._lockstep = self.common.mode == LOCKSTEP
+        self._tick_ns, self._reference_ns = self.common.tick_ns, self.common.reference_ns
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
         self._reference_wire = JointStateWire(self.robot.joint_names, ("position", "velocity"))
         self._command_wire = JointStateWire(self.robot.joint_names, ("effort",))
@@ -65,12 +66,12 @@ class ControllerNode(GraphNode[ControllerParameters]):
         """Return what comes last of the inputs of the next state."""
         stamp = self._inputs.oldest_ns
         if stamp is None:
-            stamp = self._answered_ns + self.common.tick_ns if self._command.count else 0
+            stamp = self._answered_ns + self._tick_ns if self._command.count else 0
         return self._inputs.missing(stamp, self._needed(stamp)) or BASE_ODOMETRY
 
     def _needed(self, stamp: int) -> tuple[str, ...]:
         """Return the inputs that belong to a stamp, the last one to come last."""
-        return _STATE_AND_REFERENCE if self._lockstep and stamp % self.common.reference_ns == 0 else _STATE
+        return _STATE_AND_REFERENCE if self._lockstep and stamp % self._reference_ns == 0 else _STATE
 
     def _taker(self, topic: str) -> Receive:
         """Return the callback of a topic of raw messages."""

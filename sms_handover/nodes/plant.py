@@ -79,6 +79,8 @@ class PlantNode(GraphNode[PlantParameters]):
         self._deputy_size = schedule.deputy.size
         self._last_tick = self.common.last_tick(schedule.end_ns)
         self._lockstep = self.common.mode == LOCKSTEP
+        self._tick_ns, self._per_reference = self.common.tick_ns, self.common.ticks_per_reference
+        self._is_recorded = RECORDER in self.common.peers
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
         self._command_wire = JointStateWire(self.robot.joint_names, ("effort",))
         self._pose_wire, self._vector_wire = pose_wire(WORLD), vector_wire(WORLD)
@@ -145,13 +147,13 @@ class PlantNode(GraphNode[PlantParameters]):
     @property
     def _ahead_of_recorder(self) -> bool:
         """Tell whether the next state would be more than may be lost if the recorder were killed."""
-        next_ns = self._plant.stamp_ns + self.common.tick_ns
-        return RECORDER in self.common.peers and next_ns - self._recorded_ns > _MOST_UNRECORDED_NS
+        next_ns = self._plant.stamp_ns + self._tick_ns
+        return self._is_recorded and next_ns - self._recorded_ns > _MOST_UNRECORDED_NS
 
     @property
     def _needed(self) -> tuple[str, ...]:
         """Return the inputs that complete this tick, the last one to come last."""
-        return _COMMAND if self._plant.tick % self.common.ticks_per_reference else _PHASE_AND_COMMAND
+        return _COMMAND if self._plant.tick % self._per_reference else _PHASE_AND_COMMAND
 
     def _make_endpoints(self) -> None:
         """Make publishers, subscriptions and services."""
@@ -191,7 +193,7 @@ class PlantNode(GraphNode[PlantParameters]):
         """
         plant, publish = self._plant, self._publish
         now_ns = plant.stamp_ns
-        reference = plant.tick % self.common.ticks_per_reference == 0
+        reference = plant.tick % self._per_reference == 0
         self._publish_loop(reference)
         self._loop_clock.published()
         if reference:
@@ -219,7 +221,7 @@ class PlantNode(GraphNode[PlantParameters]):
         tick = self._plant.tick
         waiting = tick == self._silent_tick and not self._ahead_of_recorder
         if waiting and (self._run_state == RunState.RUNNING or self._steps_left):
-            self._publish_loop(tick % self.common.ticks_per_reference == 0)
+            self._publish_loop(tick % self._per_reference == 0)
         self._silent_tick = tick
 
     def _publish_period(self, now_ns: int) -> None:

@@ -54,9 +54,12 @@ class StampSync(Generic[V]):
     def take(self, stamp_ns: int, names: tuple[str, ...]) -> dict[str, V] | None:
         """Return the inputs of a stamp if all the named ones are there, else None."""
         inputs = self._waiting.get(stamp_ns)
-        if inputs is None or any(name not in inputs for name in names):
+        if inputs is None or not inputs.keys() >= set(names):
             return None
         self._taken_ns = stamp_ns
+        if len(self._waiting) == 1:
+            self._waiting.clear()
+            return inputs
         for old in [stamp for stamp in self._waiting if stamp <= stamp_ns]:
             del self._waiting[old]
         return inputs

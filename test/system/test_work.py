@@ -19,7 +19,7 @@ PERIODS = (TICKS - 1) // 20 + 1
 PER_TICK = 3  # messages over DDS: two of the state, one of the command
 PER_PERIOD = 13  # messages over DDS beside them each reference period, without the service
 WAKES = {PLANT: TICKS, CONTROLLER: TICKS, TRAJECTORY: 2 * PERIODS, IK: PERIODS}
-MARGIN = 1.1  # [-] a message may overtake one that another writer has sent before it
+MARGIN = 1.05  # [-] a message may overtake one that another writer has sent before it
 
 Recorded = dict[str, tuple[Path, Ended]]
 
