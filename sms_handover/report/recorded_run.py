@@ -48,9 +48,11 @@ class RecordedRun:
 def read_recorded(name: str, bag: Path) -> RecordedRun:
     """Return the run in a bag; raises ConfigurationError if the bag cannot be used or is not ours."""
     try:
-        return RecordedRun(name, read_run(bag), read_info(bag))
+        run = RecordedRun(name, read_run(bag), read_info(bag))
+        _ = run.info.parameters, run.info.ledger  # parsed when asked for: what is broken is told now
     except BagError as error:
         raise ConfigurationError(str(error)) from error
+    return run
 
 
 def common_tolerance(runs: Sequence[RecordedRun]) -> GraspTolerance | None:

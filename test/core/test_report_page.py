@@ -21,7 +21,16 @@ from sms_handover.report.recorded_run import RecordedRun, read_recorded
 from sms_handover.run_data import RunData
 from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, TaskPhase
 
-from .bag_messages import JOINT_STATE, TYPES, WALL_NS, joint_state, made_up_run, odometry
+from .bag_messages import (
+    JOINT_STATE,
+    TYPES,
+    WALL_NS,
+    joint_state,
+    made_up_run,
+    odometry,
+    open_topics,
+    record_run,
+)
 from .report_bags import Parameters, write_bag
 from .test_analysis_runs import changed
 
@@ -195,7 +204,7 @@ def test_the_command_writes_a_page_once(
     assert (tmp_path / "alone.html").is_file()
 
 
-@pytest.mark.parametrize("kind", ["absent", "other", "text", "cut", "twice", "place"])
+@pytest.mark.parametrize("kind", ["absent", "other", "text", "cut", "parameters", "twice", "place"])
 def test_wrong_input_is_one_line_and_exit_code_2(
     kind: str, handover_bags: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -204,6 +213,10 @@ def test_wrong_input_is_one_line_and_exit_code_2(
     with Recording(other, types=TYPES) as recording:
         recording.add_topic("/camera/joint_states", JOINT_STATE)
         recording.receive("/camera/joint_states", TYPES.serialize(joint_state(1)), WALL_NS)
+    with Recording(tmp_path / "parameters", types=TYPES) as recording:
+        recording.writer.attach("parameters.json", "application/json", b"no JSON")
+        open_topics(recording)
+        record_run(recording, made_up_run(ticks=3))
     (tmp_path / "notes.txt").write_text("no bag", encoding="utf-8")
     (tmp_path / "cut.mcap").write_bytes(next(good.glob("*.mcap")).read_bytes()[:50_000])
     (tmp_path / "file").write_text("", encoding="utf-8")
@@ -212,6 +225,7 @@ def test_wrong_input_is_one_line_and_exit_code_2(
         "other": ([other], "out", "holds no run of sms_handover"),
         "text": ([tmp_path / "notes.txt"], "out", "is not an MCAP file"),
         "cut": ([good, tmp_path / "cut.mcap"], "out", "cut.mcap"),
+        "parameters": ([tmp_path / "parameters"], "out", "parameters.json in the bag is not JSON"),
         "twice": ([good, good], "out", "two runs are named 'pid'"),
         "place": ([good], "file/report", "cannot be written"),
     }
