@@ -62,6 +62,9 @@ def test_a_whole_bag_comes_back_bit_for_bit(tmp_path: Path) -> None:
     assert set(new.records) == {*old.records, "sms_handover.recovery"}
     assert new.provenance == {"seed": "7"}
     assert file.read_bytes() == before
+    with (tmp_path / "new" / "new_0.mcap").open("rb") as stream:
+        names = [record.name for record in make_reader(stream).iter_metadata()]
+    assert names.count("sms_handover.ledger") == names.count("sms_handover.recovery") == 1
     assert check(tmp_path / "new").complete == check(tmp_path / "bag").complete
 
 

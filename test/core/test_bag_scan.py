@@ -214,3 +214,14 @@ def test_a_damaged_index_is_told_as_such(tmp_path: Path) -> None:
     file.write_bytes(content)
     assert len(scanned(file)) == 120
     assert all(item.of_index for item in FileScan(file) if isinstance(item, Damage))
+
+
+def test_messages_in_a_chunk_that_has_lost_its_head_are_not_taken(tmp_path: Path) -> None:
+    """They look like messages outside of chunks, but no checksum says that they are as they were."""
+    file = tmp_path / "a.mcap"
+    content = bytearray(write_file(file, CompressionType.NONE))
+    first, *others = chunks_of(file)
+    content[first.begin : first.begin + 9] = bytes(9)
+    content[content.index(b"number 2") + 7] ^= 1
+    file.write_bytes(content)
+    assert scanned(file) == [message for chunk in others for message in chunk.messages]
