@@ -69,6 +69,7 @@ setup(
         "ros-jazzy-common-interfaces>=5.3.6,<5.4",
         "ros-jazzy-rmw-fastrtps-cpp>=8.4.3,<8.5",
         "sms_handover_interfaces",
+        "eigenpy>=3.10,<4",
         "lz4>=4.3,<5",
         "mcap>=1.5,<2",
         "numpy>=2.0,<3",
