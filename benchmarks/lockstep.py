@@ -1,5 +1,6 @@
 """How fast lock step is over DDS, beside the bare exchange of the same messages."""
 
+import os
 import re
 import subprocess
 import sys
@@ -14,15 +15,17 @@ from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
 
 ROUNDS = 3
-SIMULATED_S = 5.0  # s of simulated time per run
+SIMULATED_S = 4.0  # s of simulated time per run
 TICKS = round(SIMULATED_S * 1e3)
 TRIPS = 5000
+_CPU = max(os.sched_getaffinity(0))
 _FACTOR = re.compile(r"([\d.]+) x real time")
 
 FLOOR = "bare exchange of the same messages, no work"
 ALONE = "one process, no DDS"
 GRAPH = "graph, not recorded"
 RECORDED = "graph, recorded"
+ONE_CPU = "graph on one processor, not recorded"
 FALLBACK = "graph by rclpy's executor, not recorded"
 
 
@@ -56,6 +59,7 @@ def main() -> None:
             ALONE: alone,
             GRAPH: partial(graph, folder, ["--no-record"]),
             RECORDED: partial(graph, folder, []),
+            ONE_CPU: partial(graph, folder, ["--no-record", "-p", f"common.cpu:={_CPU}"]),
             FALLBACK: partial(graph, folder, ["--no-record", "-p", "common.transport:=executor"]),
         }
         times: dict[str, list[float]] = {name: [] for name in contestants}
