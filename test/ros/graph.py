@@ -35,6 +35,7 @@ from .short_handover import short_handover
 
 ARMS = ("arm_a", "arm_b")
 TOPICS = graph_topics(ARMS)
+_NEVER_S = 3600.0  # s of wall time: a node that is slow on a busy machine is asked once
 REAL: Mapping[str, Callable[[], GraphNode[Any]]] = {
     PLANT: PlantNode,
     TRAJECTORY: TrajectoryNode,
@@ -96,6 +97,7 @@ class Graph:
             "transport": EXECUTOR,  # every node has its turn, and a test can act while the graph runs
             **parameters.get("common", {}),
         }
+        parameters[PLANT] = {"resend_after": _NEVER_S, **parameters.get(PLANT, {})}
         self.bench = bench
         bench.start(parameters)
         self.ear = Ear(bench.plain(RECORDER), self.peers)
