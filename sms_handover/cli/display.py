@@ -21,6 +21,10 @@ class Display:
         """Count wall time from now on, with the run at this simulated time."""
         self._begin, self._begin_s = monotonic(), ns_to_seconds(stamp_ns)
 
+    def finish(self, wall_time: float) -> None:
+        """Let the whole run have taken so many s of wall time, as whoever ran it has measured."""
+        self._begin, self._begin_s = monotonic() - wall_time, 0.0
+
     def show(self, stamp_ns: int, phase: str, tool_error: Mapping[str, float], *, last: bool = False) -> None:
         """Show simulated time, phase, real-time factor and the tools' distance to their targets in mm."""
         if not last and not self._line.due:

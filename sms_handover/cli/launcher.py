@@ -212,6 +212,8 @@ class _Watch:
         for event in progress.events[self._events_shown :]:
             self._display.event(event)
         self._events_shown = len(progress.events)
+        if last:
+            self._display.finish(progress.wall_time)
         self._display.show(progress.stamp_ns, progress.phase, progress.tool_error, last=last)
 
     def _on_signal(self, number: int, frame: object) -> None:

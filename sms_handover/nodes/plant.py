@@ -359,6 +359,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self.finished = False
         self._plant.reset()
         self._inputs.reset()
+        self._loop_clock.reset()
         self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
         self._enter(RunState.PAUSED if self._run_state == RunState.PAUSED else RunState.RUNNING, "reset")
         self._publish_state()
@@ -380,7 +381,7 @@ class PlantNode(GraphNode[PlantParameters]):
         else:
             self._loop_clock.stop()
         message = RunState(header=header(self._plant.stamp_ns), state=state, tick=self._plant.tick)
-        message.detail = detail
+        message.detail, message.wall_time = detail, self._loop_clock.ran
         self._publish[RUN_STATE].publish(message)
 
     def _publish_timing(self) -> None:

@@ -45,16 +45,32 @@ class LoopClock:
         self._ticks = self._late = self._held = 0
         self._interval = _Interval(monotonic())
         self._level: tuple[int, str] = (0, "")
+        self._since: float | None = None
+        self._ran = 0.0
 
     def start(self) -> None:
         """Begin, or go on after a pause: the first tick is due one period from now."""
         self._last = self._published = monotonic()
         self._deadline = self._last + self._tick_s if self._paced else None
         self._interval = _Interval(self._last)
+        if self._since is None:
+            self._since = self._last
 
     def stop(self) -> None:
         """Have nothing due until the next start."""
         self._deadline = None
+        self._ran, self._since = self.ran, None
+
+    def reset(self) -> None:
+        """Count the wall time of a run from now on."""
+        self._ran = 0.0
+        if self._since is not None:
+            self._since = monotonic()
+
+    @property
+    def ran(self) -> float:
+        """Return for how many s of wall time the loop has run, pauses left out."""
+        return self._ran if self._since is None else self._ran + monotonic() - self._since
 
     def wait_s(self) -> float:
         """Return how long to wait for the next deadline, at least zero."""

@@ -35,11 +35,16 @@ _NEWEST = QoSProfile(
 
 @dataclass
 class Progress:
-    """What is known of the run; ``tool_error`` is the distance in m of each tool to its target."""
+    """What is known of the run.
+
+    ``tool_error`` is the distance in m of each tool to its target; ``wall_time`` is how long in s the
+    plant says that the run has taken, with the last news of its state.
+    """
 
     state: int = RunState.WAITING
     detail: str = ""
     stamp_ns: int = 0
+    wall_time: float = 0.0
     phase: str = ""
     tool_error: dict[str, float] = field(default_factory=dict)
     events: list[GraspEvent] = field(default_factory=list)
@@ -90,6 +95,7 @@ class RunMonitor:
     def _on_state(self, message: Any) -> None:
         self.progress.state = message.state
         self.progress.detail = message.detail
+        self.progress.wall_time = message.wall_time
         self.progress.stamp_ns = header_ns(message)
 
     def _on_event(self, message: Any) -> None:

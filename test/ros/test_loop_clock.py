@@ -244,3 +244,32 @@ def test_a_report_of_no_ticks_is_zero(wall: WallClock, paced: LoopClock) -> None
     report = paced.report()
     assert (report.ticks, report.period_mean, report.period_std, report.period_max) == (0, 0.0, 0.0, 0.0)
     assert report.real_time_factor == 0.0
+
+
+def test_the_time_a_run_has_taken_leaves_pauses_out(wall: WallClock) -> None:
+    clock = LoopClock(TICK_NS, paced=False)
+    wall.now += 7.0
+    assert clock.ran == 0.0
+    clock.start()
+    wall.now += 2.0
+    assert clock.ran == 2.0
+    clock.stop()
+    wall.now += 30.0
+    assert clock.ran == 2.0
+    clock.start()
+    wall.now += 0.5
+    assert clock.ran == 2.5
+
+
+def test_a_reset_counts_the_time_of_a_run_anew(wall: WallClock) -> None:
+    clock = LoopClock(TICK_NS, paced=False)
+    clock.start()
+    wall.now += 2.0
+    clock.reset()
+    clock.start()
+    wall.now += 0.5
+    assert clock.ran == 0.5
+    clock.stop()
+    clock.reset()
+    wall.now += 1.0
+    assert clock.ran == 0.0
