@@ -9,7 +9,7 @@ from typing import BinaryIO
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
-from sms_handover.bag.frames import MAGIC
+from sms_handover.bag.framing import MAGIC
 from sms_handover.bag.records import RECORD_HEAD, fits, parse
 
 _FOOTER = struct.Struct("<BQQQI")  # opcode, length, begin of summary and of its offsets [byte], CRC

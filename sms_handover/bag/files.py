@@ -11,7 +11,7 @@ import zstandard
 from mcap.exceptions import McapError
 
 from sms_handover.bag.damage import Damage
-from sms_handover.bag.frames import MAGIC
+from sms_handover.bag.framing import MAGIC
 from sms_handover.bag.scan import FileScan, Found, ScannedMessage
 from sms_handover.errors import BagError
 

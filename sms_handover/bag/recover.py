@@ -9,7 +9,7 @@ from mcap.records import Attachment, Metadata, Statistics
 
 from sms_handover.bag.damage import Damage, Hole
 from sms_handover.bag.files import damage_reported, files_of
-from sms_handover.bag.frames import Frame, FrameWalk
+from sms_handover.bag.framing import Frame, FrameWalk
 from sms_handover.bag.ledger import LEDGER_RECORD, PERIODS_RECORD, Ledger, is_of_ours, periods_of
 from sms_handover.bag.metadata import ROSBAG2_RECORD, counts_in_metadata
 from sms_handover.bag.rebuild import LedgerRebuild

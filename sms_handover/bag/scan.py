@@ -17,7 +17,7 @@ from mcap.records import Channel, Schema
 from sms_handover.bag.chunks import DamagedChunkError, inner_records, records_of, records_of_cut
 from sms_handover.bag.damage import Damage
 from sms_handover.bag.definitions import Definitions, definitions_at_end
-from sms_handover.bag.frames import MAGIC, Frame, FrameWalk, Gap
+from sms_handover.bag.framing import MAGIC, Frame, FrameWalk, Gap
 from sms_handover.bag.records import (
     MESSAGE_HEAD,
     RECORD_HEAD,

@@ -6,43 +6,29 @@ from typing import Any
 
 import numpy as np
 from rclpy.executors import Executor
-from rosgraph_msgs.msg import Clock
 from sms_handover_interfaces.msg import RunState
 from sms_handover_interfaces.srv import StepTicks
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from sms_handover.bag.stamp import stamp_ns
-from sms_handover.frames import BASE, WORLD
-from sms_handover.model.poses import pose_row
 from sms_handover.plant.parameters import PlantParameters
-from sms_handover.ros.convert import (
-    event_message,
-    header,
-    time_message,
-)
+from sms_handover.ros.convert import event_message, header, time_message
 from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.loop_clock import LoopClock
 from sms_handover.ros.main import EXIT_OK, Stop, run_node
 from sms_handover.ros.marker import deputy_marker
 from sms_handover.ros.phase_wire import PhaseWire
+from sms_handover.ros.plant_outputs import PlantOutputs
 from sms_handover.ros.stamp_sync import StampSync
-from sms_handover.ros.wire import JointStateWire, StateWire, energy_wire, pose_wire, vector_wire
+from sms_handover.ros.wire import JointStateWire
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import load_task
 from sms_handover.simulation.wiring import make_plant
 from sms_handover.topics import (
-    ANGULAR_MOMENTUM,
-    BASE_ODOMETRY,
-    CLOCK,
-    CLOCK_PERIOD_NS,
     DEPUTY_MARKER,
-    DEPUTY_POSE,
-    ENERGY,
     GRASP_EVENT,
     JOINT_COMMAND,
-    JOINT_STATES,
-    LINEAR_MOMENTUM,
     LOOP_TIMING,
     PLANT,
     RECORDER,
@@ -50,10 +36,7 @@ from sms_handover.topics import (
     RUN_READY,
     RUN_RECORDED,
     RUN_STATE,
-    SAMPLED_BASE_ODOMETRY,
-    SAMPLED_JOINT_STATES,
     TASK_PHASE,
-    tool_pose,
 )
 from sms_handover.types import JointCommand
 
@@ -81,10 +64,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self._lockstep = self.common.mode == LOCKSTEP
         self._tick_ns, self._per_reference = self.common.tick_ns, self.common.ticks_per_reference
         self._is_recorded = RECORDER in self.common.peers
-        self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
         self._command_wire = JointStateWire(self.robot.joint_names, ("effort",))
-        self._pose_wire, self._vector_wire = pose_wire(WORLD), vector_wire(WORLD)
-        self._energy_wire = energy_wire(WORLD)
         self._phase_wire = PhaseWire()
         self._inputs: StampSync[bytes] = StampSync()
         self._loop_clock = LoopClock(self.common.tick_ns, paced=not self._lockstep)
@@ -153,15 +133,18 @@ class PlantNode(GraphNode[PlantParameters]):
     @property
     def _needed(self) -> tuple[str, ...]:
         """Return the inputs that complete this tick, the last one to come last."""
-        return _COMMAND if self._plant.tick % self._per_reference else _PHASE_AND_COMMAND
+        return _PHASE_AND_COMMAND if self._at_reference else _COMMAND
+
+    @property
+    def _at_reference(self) -> bool:
+        """Tell whether a reference period begins with this tick."""
+        return self._plant.tick % self._per_reference == 0
 
     def _make_endpoints(self) -> None:
         """Make publishers, subscriptions and services."""
-        names = [JOINT_STATES, BASE_ODOMETRY, DEPUTY_POSE, GRASP_EVENT, LINEAR_MOMENTUM, ANGULAR_MOMENTUM]
-        names += [ENERGY, ROBOT_DESCRIPTION, DEPUTY_MARKER, RUN_STATE, LOOP_TIMING, CLOCK]
-        names += [SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY]
-        names += [tool_pose(arm) for arm in self.robot.arms]
+        names = [GRASP_EVENT, ROBOT_DESCRIPTION, DEPUTY_MARKER, RUN_STATE, LOOP_TIMING]
         self._publish = {name: self.endpoints.publisher(name) for name in names}
+        self._outputs = PlantOutputs(self.robot, self.endpoints.publisher)
         self.endpoints.receive(TASK_PHASE, self.inputs, self._on_phase)
         self.endpoints.receive(JOINT_COMMAND, self.inputs, self._on_command)
         self.endpoints.receive(RUN_RECORDED, self.inputs, self._on_recorded)
@@ -191,27 +174,10 @@ class PlantNode(GraphNode[PlantParameters]):
 
         What other nodes wait for goes first, so that they work while the rest is published.
         """
-        plant, publish = self._plant, self._publish
-        now_ns = plant.stamp_ns
-        reference = plant.tick % self._per_reference == 0
-        self._publish_loop(reference)
+        with_reference = self._at_reference
+        self._outputs.publish_loop(self._plant, with_reference=with_reference)
         self._loop_clock.published()
-        if reference:
-            self._publish_period(now_ns)
-        if now_ns % CLOCK_PERIOD_NS == 0:
-            publish[CLOCK].publish(Clock(clock=time_message(now_ns)))
-
-    def _publish_loop(self, reference: bool) -> None:
-        """Publish what the other nodes of the loop wait for."""
-        publish = self._publish
-        joints, odometry = self._state_wire.pack(self._plant.state)
-        if reference:
-            deputy = pose_row(self._plant.deputy.deputy_in_world)
-            publish[SAMPLED_JOINT_STATES].publish(joints)
-            publish[SAMPLED_BASE_ODOMETRY].publish(odometry)
-            publish[DEPUTY_POSE].publish(self._pose_wire.pack(self._plant.stamp_ns, deputy))
-        publish[JOINT_STATES].publish(joints)
-        publish[BASE_ODOMETRY].publish(odometry)
+        self._outputs.publish_rest(self._plant, with_reference=with_reference)
 
     def _send_again(self) -> None:
         """Publish the state of this tick once more if nothing has answered it for a while (lock step).
@@ -221,18 +187,8 @@ class PlantNode(GraphNode[PlantParameters]):
         tick = self._plant.tick
         waiting = tick == self._silent_tick and not self._ahead_of_recorder
         if waiting and (self._run_state == RunState.RUNNING or self._steps_left):
-            self._publish_loop(tick % self._per_reference == 0)
+            self._outputs.publish_loop(self._plant, with_reference=self._at_reference)
         self._silent_tick = tick
-
-    def _publish_period(self, now_ns: int) -> None:
-        """Publish tool poses, momenta and energy of a reference period."""
-        receipt = self._plant.receipt
-        for arm, pose in self._plant.tools_in_world.items():
-            self._publish[tool_pose(arm)].publish(self._pose_wire.pack(now_ns, pose_row(pose)))
-        vector, energy = self._vector_wire, np.array([receipt.kinetic_energy, self._plant.work])
-        self._publish[LINEAR_MOMENTUM].publish(vector.pack(now_ns, receipt.linear_momentum))
-        self._publish[ANGULAR_MOMENTUM].publish(vector.pack(now_ns, receipt.angular_momentum))
-        self._publish[ENERGY].publish(self._energy_wire.pack(now_ns, energy))
 
     def _on_command(self, data: bytes, sent_ns: int) -> None:
         """Take a command; in lock step it may complete the tick."""

@@ -1,0 +1,72 @@
+"""What the plant publishes of its state: each tick what the loop waits for, each period what goes with it."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from rosgraph_msgs.msg import Clock
+
+from sms_handover.frames import BASE, WORLD
+from sms_handover.model.poses import pose_row
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.plant.free_floating import FreeFloatingPlant
+from sms_handover.ros.convert import time_message
+from sms_handover.ros.endpoints import CountedPublisher
+from sms_handover.ros.wire import StateWire, energy_wire, pose_wire, vector_wire
+from sms_handover.topics import (
+    ANGULAR_MOMENTUM,
+    BASE_ODOMETRY,
+    CLOCK,
+    CLOCK_PERIOD_NS,
+    DEPUTY_POSE,
+    ENERGY,
+    JOINT_STATES,
+    LINEAR_MOMENTUM,
+    SAMPLED_BASE_ODOMETRY,
+    SAMPLED_JOINT_STATES,
+    tool_pose,
+)
+
+_LOOP = (JOINT_STATES, BASE_ODOMETRY, SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
+_PERIOD = (LINEAR_MOMENTUM, ANGULAR_MOMENTUM, ENERGY)
+
+
+class PlantOutputs:
+    """The publishers of the plant's state, and the layout of their messages."""
+
+    def __init__(self, robot: RobotModel, publisher: Callable[[str], CountedPublisher]) -> None:
+        """Make the publishers; ``publisher`` returns the one of a topic."""
+        names = (*_LOOP, *_PERIOD, CLOCK, *(tool_pose(arm) for arm in robot.arms))
+        self._publish: dict[str, Callable[[Any], None]] = {name: publisher(name).publish for name in names}
+        self._state_wire = StateWire(robot.joint_names, WORLD, BASE)
+        self._pose_wire, self._vector_wire = pose_wire(WORLD), vector_wire(WORLD)
+        self._energy_wire = energy_wire(WORLD)
+
+    def publish_loop(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
+        """Publish what the other nodes of the loop wait for.
+
+        At a reference period what the trajectory waits for goes first, because more has to be done with it.
+        """
+        publish = self._publish
+        joints, odometry = self._state_wire.pack(plant.state)
+        if with_reference:
+            deputy = pose_row(plant.deputy.deputy_in_world)
+            publish[SAMPLED_JOINT_STATES](joints)
+            publish[SAMPLED_BASE_ODOMETRY](odometry)
+            publish[DEPUTY_POSE](self._pose_wire.pack(plant.stamp_ns, deputy))
+        publish[JOINT_STATES](joints)
+        publish[BASE_ODOMETRY](odometry)
+
+    def publish_rest(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
+        """Publish what nobody in the loop waits for: tools, momenta, energy, the clock."""
+        now_ns, publish = plant.stamp_ns, self._publish
+        if with_reference:
+            receipt = plant.receipt
+            for arm, pose in plant.tools_in_world.items():
+                publish[tool_pose(arm)](self._pose_wire.pack(now_ns, pose_row(pose)))
+            energy = np.array([receipt.kinetic_energy, plant.work])
+            publish[LINEAR_MOMENTUM](self._vector_wire.pack(now_ns, receipt.linear_momentum))
+            publish[ANGULAR_MOMENTUM](self._vector_wire.pack(now_ns, receipt.angular_momentum))
+            publish[ENERGY](self._energy_wire.pack(now_ns, energy))
+        if now_ns % CLOCK_PERIOD_NS == 0:
+            publish[CLOCK](Clock(clock=time_message(now_ns)))
