@@ -91,6 +91,7 @@ setup(
             "playwright>=1.50,<2",  # drives a Chromium that the machine has
             "pyarrow>=18,<27",
             "pytest>=8.4",
+            "rerun-sdk>=0.41,<0.42",  # another reader of our bags
             "ruff>=0.6",
             "types-PyYAML",
             "types-setuptools",

@@ -49,7 +49,12 @@ def write_finished(folder: Path, *, finished: bool = True, skipped: int = 0, pub
         record_run(recording, run)
         if finished:
             state = TYPES.make(
-                f"{OURS}/RunState", header=header(int(run.tick_ns[-1])), state=3, tick=200, detail="done"
+                f"{OURS}/RunState",
+                header=header(int(run.tick_ns[-1])),
+                state=3,
+                tick=200,
+                wall_time=0.1,
+                detail="done",
             )
             receive("/run/state", TYPES.serialize(state), 0)
             for node in LOOP_NODES:

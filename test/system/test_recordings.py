@@ -3,6 +3,7 @@
 import json
 import shutil
 import subprocess
+import sys
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -241,9 +242,7 @@ def test_the_layouts_for_other_tools_find_everything_they_name(bag: Path) -> Non
 
 
 def test_rerun_opens_a_bag_with_robot_and_transforms(bag: Path, tmp_path: Path) -> None:
-    rerun = shutil.which("rerun")
-    if rerun is None:
-        pytest.skip("rerun is not installed: pip install rerun-sdk")
+    rerun = str(Path(sys.executable).with_name("rerun"))
     convert = [rerun, "mcap", "convert", str(bag / "bag_0.mcap"), "-o", str(tmp_path / "run.rrd")]
     done = subprocess.run(convert, capture_output=True, text=True, check=True)
     listed = done.stdout + done.stderr
