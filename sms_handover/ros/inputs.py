@@ -3,7 +3,7 @@
 A node gets the messages, requests and answers of its loop by an :class:`Inputs`, everything else by
 rclpy as usual. There are two, chosen by the parameter ``transport``: this file's leaves all to an
 executor; :mod:`sms_handover.ros.direct_inputs` takes them from the middleware itself. Both hand over
-the same bytes in the same order of each topic. What each costs is in docs/performance.md.
+the same bytes in the same order of each topic; `make bench` measures what each costs.
 """
 
 from abc import ABC, abstractmethod
