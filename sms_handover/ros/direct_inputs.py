@@ -3,7 +3,8 @@
 An executor wakes Python for each message by itself. Here the node sleeps on the one message that it
 cannot go on without, and then takes all there are. This file alone uses names that rclpy keeps for its
 own executors: the lists of a node's entities, ``WaitSet``, ``take_message``, ``take_response``,
-``send_request``, ``service_take_request`` and ``service_send_response``. Where they change, the parameter ``transport`` offers the public way.
+``send_request``, ``service_take_request`` and ``service_send_response``. Where they change, the
+parameter ``transport`` offers the public way.
 """
 
 from abc import ABC, abstractmethod
