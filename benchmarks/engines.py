@@ -16,13 +16,13 @@ from benchmarks.contestants import InDrake, InMujoco, Ours
 from benchmarks.handover_task import Contestant, HandoverTask, State
 from benchmarks.machine import versions
 from benchmarks.mujoco_model import apart
-from benchmarks.results import FIGURES, Result, Table, publish, row
+from benchmarks.results import DIAGRAMS, Result, Table, publish, row
 from sms_handover.model.conserved import physics_receipt
 from sms_handover.plant.integrators import TABLEAUS, Tableau
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
 
-FIGURE = "work_precision.svg"
+DIAGRAM = "work_precision.svg"
 REFERENCE_STEPS = 4  # per tick: what is then left of the error is rounding
 EULER = Tableau(1, ((),), (0,), ((1.0,),))
 KUTTA = Tableau(3, ((), (1 / 3,), (0.0, 2 / 3)), (0, 0, 0), ((1 / 3, 0.0, 0.0), (-1 / 12, 0.0, 3 / 4)))
@@ -113,8 +113,8 @@ def draw(points: Mapping[str, list[Point]]) -> None:
     )
     axes.grid(True, which="major", alpha=0.3)
     axes.legend()
-    FIGURES.mkdir(parents=True, exist_ok=True)
-    figure.savefig(FIGURES / FIGURE, metadata={"Date": None}, bbox_inches="tight")
+    DIAGRAMS.mkdir(parents=True, exist_ok=True)
+    figure.savefig(DIAGRAMS / DIAGRAM, metadata={"Date": None}, bbox_inches="tight")
 
 
 def compare(
@@ -167,7 +167,7 @@ def main() -> None:
                 f"{simulated:g} s of simulated time, {simulated / whole:.1f} times real time.",
             ],
             tables=[table],
-            figures=[FIGURE],
+            diagrams=[DIAGRAM],
             values={"simulate_s": whole, "points": points},
         )
     )

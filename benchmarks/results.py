@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "build" / "bench"
-FIGURES = ROOT / "docs" / "figures"
+DIAGRAMS = ROOT / "docs" / "images"
 
 
 @dataclass(frozen=True)
@@ -47,21 +47,21 @@ class Result:
     """The answer of one script.
 
     ``name`` is the script's module name, ``values`` are the figures themselves for other programs,
-    ``figures`` the files below docs/figures that show them, ``notes`` what a reader must know.
+    ``diagrams`` the files below docs/images that show them, ``notes`` what a reader must know.
     """
 
     name: str
     question: str
     tables: Sequence[Table]
     notes: Sequence[str] = ()
-    figures: Sequence[str] = ()
+    diagrams: Sequence[str] = ()
     values: Mapping[str, object] = field(default_factory=dict)
 
     def markdown(self) -> str:
         """Return the section of this script in docs/performance.md."""
         parts = [f"## {self.question}", f"`python -m benchmarks.{self.name}`", *self.notes]
         parts += [table.markdown() for table in self.tables]
-        parts += [f"![{self.question}](figures/{name})" for name in self.figures]
+        parts += [f"![{self.question}](images/{name})" for name in self.diagrams]
         return "\n\n".join(parts)
 
 

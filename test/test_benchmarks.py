@@ -17,7 +17,7 @@ def result() -> Result:
         question="How fast?",
         tables=[Table(["who", "time [us]"], [["ours | theirs", "12.5"]])],
         notes=["A note."],
-        figures=["pace.svg"],
+        diagrams=["pace.svg"],
         values={"us": 12.5},
     )
 
@@ -35,7 +35,7 @@ def test_the_document_has_every_part_of_a_result(result: Result) -> None:
         "## How fast?",
         "A note.",
         "| who | time [us] |",
-        "(figures/pace.svg)",
+        "(images/pace.svg)",
     ):
         assert part in text
     assert "| ours \\| theirs | 12.5 |" in text
