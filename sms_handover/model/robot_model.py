@@ -11,7 +11,7 @@ import pinocchio as pin
 from sms_handover.errors import RobotDescriptionError, UnknownNameError
 from sms_handover.frames import tool_frame
 from sms_handover.model.description import RobotDescription, load_robot
-from sms_handover.model.poses import pose_of, se3_of
+from sms_handover.model.poses import pose_of, se3_of, twist_of
 from sms_handover.model.urdf import to_urdf
 from sms_handover.types import BASE_NQ, BASE_NV, Array, Pose, Twist, read_only
 
@@ -111,7 +111,7 @@ class RobotModel:
         motion = pin.getFrameVelocity(
             self.pin, self.data, self.tool_frame_id[arm], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         )
-        return Twist(motion.linear, motion.angular)
+        return twist_of(motion)
 
     def integrate_base(self, base_in_world: Pose, twist_base_in_base: Array, duration: float) -> Pose:
         """Return the base pose after a constant body twist (6,) over ``duration`` s."""
