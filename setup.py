@@ -16,6 +16,7 @@ ROS_EXECUTABLES = [
     "trajectory = sms_handover.nodes.trajectory:main",
     "ik = sms_handover.nodes.ik:main",
     "controller = sms_handover.nodes.controller:main",
+    "container = sms_handover.nodes.container:main",
     "recorder = sms_handover.nodes.recorder:main",
     "viewer = sms_handover.nodes.viewer:main",
     "player = sms_handover.nodes.player:main",

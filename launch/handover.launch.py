@@ -11,7 +11,8 @@ from launch.events.process import ProcessExited
 from launch_ros.actions import Node
 
 from sms_handover.errors import GraphError
-from sms_handover.ros.launch_arguments import ARGUMENTS, node_arguments
+from sms_handover.ros.launch_arguments import ARGUMENTS, launch_processes
+from sms_handover.topics import CONTAINER
 
 PACKAGE = "sms_handover"
 OWN_ARGUMENTS = (
@@ -20,6 +21,12 @@ OWN_ARGUMENTS = (
     ),
     DeclareLaunchArgument(
         "record", default_value="true", choices=["true", "false"], description="whether to record the graph"
+    ),
+    DeclareLaunchArgument(
+        "compose",
+        default_value="false",
+        choices=["true", "false"],
+        description="whether plant, trajectory, ik and controller share one process, which is faster",
     ),
     DeclareLaunchArgument("namespace", default_value="", description="namespace of nodes and topics"),
     DeclareLaunchArgument("log_level", default_value="info", description="least severity that is logged"),
@@ -36,20 +43,21 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def start(context: LaunchContext) -> list[Node]:
-    """Return the nodes that the arguments ask for."""
+    """Return the processes that the arguments ask for."""
     given = context.launch_configurations
+    record, compose = (given[name] == "true" for name in ("record", "compose"))
     return [
         Node(
             package=PACKAGE,
             executable=name,
-            name=name,
+            name=None if name == CONTAINER else name,
             namespace=given["namespace"],
             output="screen",
             ros_arguments=[*arguments, "--log-level", given["log_level"]],
             additional_env={"OPENBLAS_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"},
             on_exit=end,
         )
-        for name, arguments in node_arguments(given, record=given["record"] == "true").items()
+        for name, arguments in launch_processes(given, record=record, compose=compose).items()
     ]
 
 

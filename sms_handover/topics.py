@@ -19,6 +19,9 @@ VIEWER = "viewer"  # stands outside the graph: it shows what goes on
 TOPIC_RECORDER = "topic_recorder"  # stands outside the graph: it records any topics
 LOOP_NODES = (PLANT, TRAJECTORY, IK, CONTROLLER)
 NODES = (*LOOP_NODES, RECORDER)
+CONTAINER = (
+    "container"  # the process that runs all of the loop's nodes, where they have no processes of their own
+)
 
 CLOCK_PERIOD_NS = 10_000_000  # [ns] of simulation time between two /clock messages
 

@@ -18,11 +18,11 @@ from sms_handover_interfaces.msg import RunState
 from sms_handover.cli.display import Display
 from sms_handover.cli.processes import Death, NodeProcesses
 from sms_handover.errors import GraphError
+from sms_handover.ros.composition import process_arguments
 from sms_handover.ros.main import EXIT_LOSS, EXIT_OK
 from sms_handover.ros.monitor import RunMonitor
-from sms_handover.ros.parameters import as_arguments
 from sms_handover.simulation.scenario import COMMON, Scenario
-from sms_handover.topics import LOOP_NODES, RECORDER
+from sms_handover.topics import RECORDER
 from sms_handover.types import GraspEvent
 from sms_handover.units import ns_to_seconds
 
@@ -36,13 +36,14 @@ _DRAIN_PATIENCE_S = 60.0  # [s] of wall time for the recorder to finish
 
 @dataclass(frozen=True)
 class LaunchPlan:
-    """What to start and where its logs, and if wanted its bag, go."""
+    """What to start and where its logs, and if wanted its bag, go; ``compose``: the loop in one process."""
 
     scenario: Scenario
     parameter_files: tuple[Path, ...]
     domain: int
     log_folder: Path
     bag: Path | None
+    compose: bool = False
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ def launch(plan: LaunchPlan) -> Outcome:
         executor.add_node(node)
         monitor = RunMonitor(node, plan.scenario.robot.arms)
         with NodeProcesses(plan.log_folder, environment) as processes:
-            for name, arguments in node_arguments(plan).items():
+            for name, arguments in arguments_of(plan).items():
                 processes.start(name, arguments)
             outcome = _Watch(plan, monitor, executor, processes).to_the_end()
         node.destroy_node()
@@ -87,19 +88,14 @@ def graph_environment(plan: LaunchPlan) -> dict[str, str]:
     }
 
 
-def node_arguments(plan: LaunchPlan) -> Mapping[str, list[str]]:
-    """Return the ROS arguments of every node to start."""
-    nodes = (*LOOP_NODES, RECORDER) if plan.bag else LOOP_NODES
-    overrides = plan.scenario.overrides
-    common = {**overrides.get(COMMON, {}), "peers": nodes}
-    files = [part for path in plan.parameter_files for part in ("--params-file", str(path))]
-    arguments = {}
-    for name in nodes:
-        own = dict(overrides.get(name, {}))
-        if name == RECORDER:
-            own["folder"] = str(plan.bag)
-        arguments[name] = files + as_arguments({**common, **own})
-    return arguments
+def arguments_of(plan: LaunchPlan) -> Mapping[str, list[str]]:
+    """Return the ROS arguments of every process to start."""
+    own = {name: dict(values) for name, values in plan.scenario.overrides.items()}
+    if plan.bag:
+        own.setdefault(RECORDER, {})["folder"] = str(plan.bag)
+    files = [str(path) for path in plan.parameter_files]
+    common = own.get(COMMON, {})
+    return process_arguments(common, own, files, record=plan.bag is not None, compose=plan.compose)
 
 
 class _Watch:

@@ -8,7 +8,7 @@ parameter ``transport`` offers the public way.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from time import monotonic, time_ns
 from typing import Any
 
@@ -35,6 +35,7 @@ class DirectInputs(Inputs):
         """Serve a node."""
         self._node = node
         self._sources: dict[str, _Source] = {}
+        self._others: tuple[Inputs, ...] = ()
         self._serve_at = self._hot_until = 0.0
         self._slept = False
 
@@ -58,9 +59,14 @@ class DirectInputs(Inputs):
         self._node._services.remove(entity)
         self._sources[service] = _Requests(self._node, entity, answer)
 
+    def accompany(self, others: Sequence[Inputs]) -> None:
+        """Serve those of other nodes of the same process and thread too, in this order."""
+        self._others = tuple(others)
+
     def poll(self) -> int:
         """Hand over everything that has come, in the order in which the inputs were made."""
-        return sum([source.take_all() for source in self._sources.values()])
+        found = sum([source.take_all() for source in self._sources.values()])
+        return found + sum([other.poll() for other in self._others])
 
     def spin_once(self, executor: Executor, timeout_s: float, awaited: str = "") -> None:
         """Handle what has come; else sleep until ``awaited`` comes, with turns of the executor between."""

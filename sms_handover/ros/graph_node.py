@@ -1,6 +1,6 @@
 """What every node of the graph does alike: parameters, matching, readiness, counts, diagnostics."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -60,6 +60,10 @@ class GraphNode(RunnableNode, Generic[P]):
         while not stop.asked:
             self.inputs.spin_once(executor, WAIT_S, self.awaited)
         return EXIT_OK
+
+    def accompany(self, others: Sequence[RunnableNode]) -> None:
+        """Serve the inputs of other nodes of the same process in the loop of this one."""
+        self.inputs.accompany([other.inputs for other in others if isinstance(other, GraphNode)])
 
     @property
     def awaited(self) -> str:

@@ -48,9 +48,30 @@ EXAMPLES: dict[str, dict[str, object]] = {
 
 
 def show_help(node: str, cls: object) -> None:
-    """Print the help of a node; a reader such as ``head`` need not take all of it."""
+    """Print the help of a node."""
+    _show(node_help(node, cls))
+
+
+def show_container_help(container: str, nodes: Iterable[str], does: str) -> None:
+    """Print the help of what runs some nodes of the graph in one process."""
+    examples = {PLANT: EXAMPLES[PLANT], CONTROLLER: EXAMPLES[CONTROLLER]}
+    values = [(f"{node}:{name}", value) for node, own in examples.items() for name, value in own.items()]
+    given = " ".join(f"-p {name}:={_shell(value)}" for name, value in values)
+    parts = [
+        _usage(container, "-p [NODE:]NAME:=VALUE"),
+        does,
+        _section("Nodes, each with a --help of its own:", (f"  {node}" for node in nodes)),
+        f"Example:\n  ros2 run sms_handover {container} --ros-args {given}\n"
+        f"  ros2 launch sms_handover handover.launch.py compose:=true   # with a recorder",
+        _EXIT_CODES,
+    ]
+    _show("\n\n".join(parts))
+
+
+def _show(text: str) -> None:
+    """Print a text; a reader such as ``head`` need not take all of it."""
     try:
-        print(node_help(node, cls), flush=True)
+        print(text, flush=True)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
@@ -62,9 +83,9 @@ def node_help(node: str, cls: object) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
-def _usage(node: str) -> str:
+def _usage(node: str, parameter: str = "-p NAME:=VALUE") -> str:
     """Return how the node is called."""
-    options = "--ros-args [-p NAME:=VALUE ...] [--params-file FILE]"
+    options = f"--ros-args [{parameter} ...] [--params-file FILE]"
     return (
         f"usage: ros2 run sms_handover {node} {options}\n       python -m sms_handover.nodes.{node} {options}"
     )

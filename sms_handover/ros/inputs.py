@@ -7,7 +7,7 @@ the same bytes in the same order of each topic; `make bench` measures what each 
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from time import time_ns
 from typing import Any
 
@@ -55,6 +55,9 @@ class Inputs(ABC):
 
     def destroy(self) -> None:  # noqa: B027  an executor's entities are destroyed with the node
         """Give back to the middleware what the node does not know of."""
+
+    def accompany(self, others: Sequence["Inputs"]) -> None:  # noqa: B027  an executor serves every node
+        """Serve those of other nodes of the same process and thread too, in this order."""
 
     @abstractmethod
     def poll(self) -> int:

@@ -9,9 +9,9 @@ from typing import get_type_hints
 
 from sms_handover.errors import ConfigurationError
 from sms_handover.parameters import ParameterSpec, spec_of
-from sms_handover.ros.parameters import as_arguments
+from sms_handover.ros.composition import process_arguments
 from sms_handover.ros.reference import COMMON_GROUP, OWN_GROUPS, ParameterGroup
-from sms_handover.topics import CONTROLLER, LOOP_NODES, RECORDER, TRAJECTORY
+from sms_handover.topics import CONTROLLER, RECORDER, TRAJECTORY
 
 _EVERY_NODE = ""
 
@@ -56,20 +56,20 @@ ARGUMENTS = {
 }
 
 
-def node_arguments(given: Mapping[str, str], *, record: bool) -> dict[str, list[str]]:
-    """Return the nodes to start, each with the ROS arguments that the launch arguments make.
+def launch_processes(given: Mapping[str, str], *, record: bool, compose: bool) -> dict[str, list[str]]:
+    """Return the processes to start, each with the ROS arguments that the launch arguments make.
 
     ``given`` may hold other launch arguments too; '' is one that was not given. Raises
     ConfigurationError on a number that is none.
     """
-    nodes = (*LOOP_NODES, RECORDER) if record else LOOP_NODES
-    files = ["--params-file", given["params_file"]] if given.get("params_file") else []
-    values: dict[str, dict[str, object]] = {node: {"peers": nodes} for node in nodes}
+    values: dict[str, dict[str, object]] = {}
     for name, argument in ARGUMENTS.items():
         if given.get(name):
-            for node in nodes if argument.node == _EVERY_NODE else {argument.node} & set(nodes):
-                values[node][argument.parameter] = _typed(argument, name, given[name])
-    return {node: files + as_arguments(values[node]) for node in nodes}
+            of_node = values.setdefault(argument.node, {})
+            of_node[argument.parameter] = _typed(argument, name, given[name])
+    files = [given["params_file"]] if given.get("params_file") else []
+    common = values.get(_EVERY_NODE, {})
+    return process_arguments(common, values, files, record=record, compose=compose)
 
 
 def _typed(argument: LaunchArgument, name: str, text: str) -> object:

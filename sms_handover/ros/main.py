@@ -60,6 +60,9 @@ class RunnableNode(Node, ABC):
     def settle(self) -> None:
         """Set up the process before the node runs; raises ConfigurationError. A node may override this."""
 
+    def accompany(self, others: Sequence["RunnableNode"]) -> None:
+        """Let the loop of this node serve other nodes of the same process too."""
+
     @abstractmethod
     def run(self, executor: Executor, stop: Stop) -> int:
         """Work until asked to stop; return the exit code."""
@@ -71,9 +74,6 @@ def run_node(
     """Run the node that ``make`` returns until a signal ends it; return the exit code.
 
     ``name`` stands before an error as long as there is no node. ``--help`` tells what the node is for.
-
-    The executor is only ever used with a timeout: without one, EventsExecutor does not return in
-    the wheels of rclpy 7.1.
     """
     arguments = list(sys.argv if args is None else args)
     if {"-h", "--help"} & set(arguments[1:]):
@@ -81,20 +81,36 @@ def run_node(
 
         show_help(name, make)
         return EXIT_OK
+    return run_nodes([make], arguments, name=name)
+
+
+def run_nodes(makes: Sequence[Callable[[], RunnableNode]], arguments: list[str], *, name: str) -> int:
+    """Run nodes in this process and thread until a signal ends them; return the exit code.
+
+    The loop is that of the first node. ``name`` stands before an error as long as there is no node.
+
+    The executor is only ever used with a timeout: without one, EventsExecutor does not return in
+    the wheels of rclpy 7.1.
+    """
     stop = Stop()
     atexit.register(_ignore_signals)
-    node = None
+    nodes: list[RunnableNode] = []
     try:
         _init(arguments)
-        node = make()
-        name = node.get_name()
         executor = EventsExecutor()
-        executor.add_node(node)
-        os.nice(node.niceness)
-        node.settle()
+        for make in makes:
+            nodes.append(make())
+            executor.add_node(nodes[-1])
+        first, *others = nodes
+        if others:
+            first.accompany(others)
+        else:
+            name = first.get_name()
+        os.nice(first.niceness)
+        first.settle()
         gc.collect()
         gc.freeze()  # what start-up has made lives to the end; no collection needs to look at it again
-        return node.run(executor, stop)
+        return first.run(executor, stop)
     except ConfigurationError as error:
         _tell(name, error)
         return EXIT_USAGE
@@ -102,7 +118,7 @@ def run_node(
         _tell(name, error)
         return EXIT_FAILED
     finally:
-        if node is not None:
+        for node in nodes:
             node.destroy_node()
         rclpy.try_shutdown()
 

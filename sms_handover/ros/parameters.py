@@ -47,9 +47,13 @@ def refuse_unknown(node: Node, *groups: type[object]) -> None:
             raise UnknownNameError("parameter", name, known, node.get_name())
 
 
-def as_arguments(values: Mapping[str, object]) -> list[str]:
-    """Return command-line arguments that set parameters of a node: ``-p name:=value``."""
-    return [part for name, value in values.items() for part in ("-p", f"{name}:={_yaml(value)}")]
+def as_arguments(values: Mapping[str, object], node: str = "") -> list[str]:
+    """Return command-line arguments that set parameters: ``-p name:=value`` of every node of a process.
+
+    With ``node`` they are those of one node of the process: ``-p node:name:=value``.
+    """
+    of = f"{node}:" if node else ""
+    return [part for name, value in values.items() for part in ("-p", f"{of}{name}:={_yaml(value)}")]
 
 
 def _yaml(value: object) -> str:

@@ -31,7 +31,7 @@ from sms_handover.ros.reference import (
     topics_of,
 )
 from sms_handover.share import config_file
-from sms_handover.topics import CLOCK, NODES, PLAYER, RUN_STATE, TF, Rate, graph_topics
+from sms_handover.topics import CLOCK, CONTAINER, LOOP_NODES, NODES, PLAYER, RUN_STATE, TF, Rate, graph_topics
 
 from ..workspace import ROOT, executables
 from .bench import Bench
@@ -123,7 +123,7 @@ def test_examples_are_accepted(name: str) -> None:
 
 def test_every_node_has_a_reference_and_an_example() -> None:
     files = {path.stem for path in (ROOT / "sms_handover" / "nodes").glob("[!_]*.py")}
-    assert files == set(OWN_GROUPS) == set(EXAMPLES)
+    assert files - {CONTAINER} == set(OWN_GROUPS) == set(EXAMPLES)
     assert files <= set(executables())
 
 
@@ -133,6 +133,13 @@ def test_a_node_shows_its_help_without_starting_ros(capfd: pytest.CaptureFixture
     assert main(["plant", "--ros-args", "-p", "integrator:=nothing", "-h"]) == 0
     assert not rclpy.ok()
     assert capfd.readouterr().out == 2 * (node_help("plant", PlantNode) + "\n")
+
+
+def test_the_container_tells_which_nodes_it_runs(capfd: pytest.CaptureFixture[str]) -> None:
+    assert import_module("sms_handover.nodes.container").main(["container", "--help"]) == 0
+    text = capfd.readouterr().out
+    assert all(f"\n  {node}\n" in text for node in LOOP_NODES)
+    assert "-p controller:law:=pid" in text
 
 
 def test_a_reader_need_not_take_the_whole_help() -> None:

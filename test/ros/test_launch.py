@@ -14,9 +14,9 @@ import pytest
 
 from sms_handover.errors import ConfigurationError, GraphError
 from sms_handover.parameters import build, read_parameter_files
-from sms_handover.ros.launch_arguments import ARGUMENTS, node_arguments
+from sms_handover.ros.launch_arguments import ARGUMENTS, launch_processes
 from sms_handover.share import config_file
-from sms_handover.topics import LOOP_NODES, RECORDER
+from sms_handover.topics import CONTAINER, LOOP_NODES, RECORDER
 
 from ..workspace import ROOT, executables
 
@@ -39,7 +39,7 @@ def assigned(arguments: list[str]) -> list[str]:
 
 
 def test_without_arguments_nodes_only_learn_their_peers() -> None:
-    nodes = node_arguments(dict.fromkeys(ARGUMENTS, ""), record=True)
+    nodes = launch_processes(dict.fromkeys(ARGUMENTS, ""), record=True, compose=False)
     assert list(nodes) == [*LOOP_NODES, RECORDER]
     for arguments in nodes.values():
         (peers,) = assigned(arguments)
@@ -47,7 +47,7 @@ def test_without_arguments_nodes_only_learn_their_peers() -> None:
 
 
 def test_without_a_recorder_nobody_waits_for_one() -> None:
-    nodes = node_arguments({"bag": "mine"}, record=False)
+    nodes = launch_processes({"bag": "mine"}, record=False, compose=False)
     assert list(nodes) == list(LOOP_NODES)
     assert all(RECORDER not in " ".join(arguments) for arguments in nodes.values())
 
@@ -55,11 +55,24 @@ def test_without_a_recorder_nobody_waits_for_one() -> None:
 @pytest.mark.parametrize("name", list(ARGUMENTS))
 def test_an_argument_reaches_its_nodes_and_no_other(name: str) -> None:
     argument = ARGUMENTS[name]
-    nodes = node_arguments({name: SAMPLES[name]}, record=True)
+    nodes = launch_processes({name: SAMPLES[name]}, record=True, compose=False)
     reached = {
-        node for node, arguments in nodes.items() if f"-p {argument.parameter}:=" in " ".join(arguments)
+        node
+        for node, arguments in nodes.items()
+        if any(f"-p {of}{argument.parameter}:=" in " ".join(arguments) for of in ("", f"{node}:"))
     }
     assert reached == ({argument.node} if argument.node else set(nodes))
+
+
+def test_a_container_gets_what_its_nodes_would_get() -> None:
+    given = {"controller": "pid", "time_law": "quintic", "duration": "5", "bag": "mine"}
+    apart = launch_processes(given, record=True, compose=False)
+    together = launch_processes(given, record=True, compose=True)
+    assert list(together) == [CONTAINER, RECORDER]
+    assert together[RECORDER] == apart[RECORDER]
+    inside = {value for node in LOOP_NODES for value in assigned(apart[node])}
+    assert set(assigned(together[CONTAINER])) == inside
+    assert {"controller:law:='pid'", "trajectory:time_law:='quintic'", "duration:=5.0"} < inside
 
 
 @pytest.mark.parametrize("name", list(ARGUMENTS))
@@ -75,15 +88,15 @@ def test_every_sample_is_a_value_of_its_parameter(name: str) -> None:
 
 
 def test_arguments_lie_over_the_parameter_file() -> None:
-    nodes = node_arguments({"params_file": "mine.yaml", "controller": "pid"}, record=False)
+    nodes = launch_processes({"params_file": "mine.yaml", "controller": "pid"}, record=False, compose=False)
     assert nodes["controller"][:2] == ["--params-file", "mine.yaml"]
-    assert nodes["controller"][-2:] == ["-p", "law:='pid'"]
+    assert nodes["controller"][-2:] == ["-p", "controller:law:='pid'"]
     assert nodes["plant"][:2] == ["--params-file", "mine.yaml"]
 
 
 def test_a_number_that_is_none_is_refused() -> None:
     with pytest.raises(ConfigurationError, match="launch argument 'duration' is 'long', expected a number s"):
-        node_arguments({"duration": "long"}, record=True)
+        launch_processes({"duration": "long"}, record=True, compose=False)
 
 
 class Action(SimpleNamespace):
@@ -120,9 +133,11 @@ def test_the_launch_file_declares_every_argument_and_starts_every_node(launch_fi
     nodes = start(SimpleNamespace(launch_configurations={**declared, "controller": "pid"}))
     assert [node.executable for node in nodes] == [*LOOP_NODES, RECORDER]
     assert {node.executable for node in nodes} <= set(executables())
-    assert all("law:='pid'" in node.ros_arguments for node in nodes if node.name == "controller")
+    assert all("controller:law:='pid'" in node.ros_arguments for node in nodes if node.name == "controller")
     without = start(SimpleNamespace(launch_configurations={**declared, "record": "false"}))
     assert [node.name for node in without] == list(LOOP_NODES)
+    composed = start(SimpleNamespace(launch_configurations={**declared, "compose": "true"}))
+    assert [(node.executable, node.name) for node in composed] == [(CONTAINER, None), (RECORDER, RECORDER)]
 
 
 def test_the_launch_ends_with_the_recorder_and_fails_with_any_node(launch_file: dict[str, Any]) -> None:

@@ -7,6 +7,7 @@ import pytest
 from sms_handover.analysis.equality import compare_runs
 from sms_handover.bag.reader import read_run
 from sms_handover.run_data import RunData
+from sms_handover.topics import CONTAINER, RECORDER
 from sms_handover.types import GraspStatus
 
 from .conftest import LAWS, TICKS
@@ -47,6 +48,19 @@ def test_further_run(
     else:
         ended = sms_handover(*arguments, cwd=tmp_path)
     assert ended.code == 0, ended
+    assert_same_bits(read_run(tmp_path / "out" / "bag"), simulated[law])
+
+
+@pytest.mark.parametrize("transport", ["direct", "executor"])
+@pytest.mark.parametrize("law", LAWS)
+def test_run_in_one_process(
+    law: str, transport: str, schedule: Path, simulated: dict[str, RunData], tmp_path: Path
+) -> None:
+    """The nodes of the loop in a container, each with a parameter of its own, and a recorder outside."""
+    arguments = ["run", "--compose", "--controller", law, "--schedule", schedule, "-o", "out"]
+    ended = sms_handover(*arguments, "-p", f"common.transport:={transport}", cwd=tmp_path)
+    assert ended.code == 0, ended
+    assert {path.stem for path in (tmp_path / "out" / "log").glob("*.log")} == {CONTAINER, RECORDER}
     assert_same_bits(read_run(tmp_path / "out" / "bag"), simulated[law])
 
 
