@@ -14,7 +14,7 @@ MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evi
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover figures report simulate test verify measure bench reference lint install colcon clean
+.PHONY: help handover figures report simulate test verify measure bench faults reference lint install colcon clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -50,6 +50,9 @@ measure: $(VENV)/.verify  ## the measurements of verify alone: nothing is broken
 
 bench: $(VENV)/.bench  ## measure how long things take, against other engines too; write docs/performance.md
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.performance
+
+faults: $(VENV)/.test  ## inject every fault, check what is promised for it, write docs/reliability.md
+	$(BIN)/python test/faults --write docs/reliability.md
 
 reference: install  ## write docs/parameters.md and docs/topics.md from the code
 	$(BIN)/python -m docs.reference

@@ -1,0 +1,180 @@
+"""The campaign notices every way to break a promise; a few real faults are tried in each run of the tests."""
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from . import leftovers
+from .attempt import attempt, read_outcome, write_outcome
+from .command import EXIT_USAGE, main
+from .discover import chosen, families
+from .fault import Family, Fault
+from .leftovers import MARK, end_all, of_trial
+from .outcome import NOTHING_LOST, CannotTry, Kept, Loss, Outcome, Status, require
+from .page import page
+from .runner import run_one
+from .trial import Trial
+
+pytestmark = pytest.mark.system
+
+SAMPLE = ("processes/controller-killed", "processes/launcher-killed")
+SEED = 3
+
+Check = Callable[[Trial, None], Kept]
+
+
+def nothing(trial: Trial) -> None:
+    """Inject nothing."""
+
+
+def fault(check: Check) -> Fault[None]:
+    return Fault("made", "nothing", "nothing", nothing, check)
+
+
+@pytest.fixture
+def mark(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Mark what this test starts; nobody is waited for, so that an orphan is found at once."""
+    monkeypatch.setenv(MARK, tmp_path.name)
+    monkeypatch.setattr(leftovers, "GRACE_S", 0.0)
+    return tmp_path.name
+
+
+def outcome_of(check: Check, folder: Path) -> Outcome:
+    return attempt(fault(check), "family", SEED, folder)
+
+
+def breaks(trial: Trial, seen: None) -> Kept:
+    require(1 > 2, "one is less")
+    return Kept()
+
+
+def asserts(trial: Trial, seen: None) -> Kept:
+    assert trial.domain < 0, "it is positive"
+    return Kept()
+
+
+def fails(trial: Trial, seen: None) -> Kept:
+    raise OSError("no such thing")
+
+
+def hangs(trial: Trial, seen: None) -> Kept:
+    trial.command(["sleep", "60"], timeout_s=0.1)
+    return Kept()
+
+
+def leaves_a_process(trial: Trial, seen: None) -> Kept:
+    trial.command(["sh", "-c", "setsid sleep 61 >/dev/null 2>&1 &"])
+    return Kept()
+
+
+@pytest.mark.parametrize(
+    ("check", "reason"),
+    [
+        (breaks, "one is less"),
+        (asserts, "it is positive"),
+        (fails, "OSError: no such thing"),
+        (hangs, "sleep hung for 0.1 s"),
+        (leaves_a_process, "sleep 61"),
+    ],
+)
+def test_a_broken_promise_is_noticed(check: Check, reason: str, tmp_path: Path, mark: str) -> None:
+    try:
+        outcome = outcome_of(check, tmp_path)
+    finally:
+        end_all(of_trial(mark, without=os.getpid()))
+    assert outcome.status is Status.BROKEN
+    assert reason in outcome.reason
+    assert not of_trial(mark, without=os.getpid())
+
+
+def test_what_cannot_be_tried_is_neither_kept_nor_broken(tmp_path: Path, mark: str) -> None:
+    def check(trial: Trial, seen: None) -> Kept:
+        raise CannotTry("not root")
+
+    outcome = outcome_of(check, tmp_path)
+    assert (outcome.status, outcome.reason) == (Status.NOT_TRIED, "not root")
+
+
+def test_an_outcome_survives_its_file(tmp_path: Path, mark: str) -> None:
+    kept = Kept(3, Loss(2, 1.5), "a note")
+    outcome = outcome_of(lambda trial, seen: kept, tmp_path)
+    assert (outcome.status, outcome.exit_code, outcome.lost, outcome.note) == (
+        Status.KEPT,
+        3,
+        Loss(2, 1.5),
+        "a note",
+    )
+    write_outcome(outcome, tmp_path)
+    assert read_outcome(tmp_path) == outcome
+    assert read_outcome(tmp_path / "nowhere") is None
+
+
+def test_the_seed_and_the_name_decide_what_is_random(tmp_path: Path, mark: str) -> None:
+    drawn: list[float] = []
+
+    def draw(trial: Trial, seen: None) -> Kept:
+        drawn.append(trial.random.random())
+        return Kept()
+
+    made = fault(draw)
+    for name, seed in ((made.name, 1), (made.name, 1), (made.name, 2), ("other", 1)):
+        attempt(replace(made, name=name), "family", seed, tmp_path)
+    assert drawn[0] == drawn[1]
+    assert len(set(drawn)) == 3
+
+
+def test_an_attempt_that_does_not_end_is_ended_and_nothing_of_it_is_left() -> None:
+    ((family, slow),) = chosen(families(), (), ("processes/plant-killed",))
+    before = set(_marked())
+    outcome = run_one(family, replace(slow, timeout_s=0.5), SEED)
+    assert outcome.status is Status.BROKEN
+    assert "not at an end after 0.5 s" in outcome.reason
+    assert not set(_marked()) - before
+
+
+def _marked() -> dict[int, str]:
+    """Return every process of any trial."""
+    found = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdecimal():
+            try:
+                if f"{MARK}=".encode() in (entry / "environ").read_bytes():
+                    found[int(entry.name)] = (entry / "cmdline").read_text()
+            except OSError:
+                continue
+    return found
+
+
+def test_the_page_shows_what_came_of_each() -> None:
+    family = Family("made", "Made up", (fault(breaks), replace(fault(breaks), name="other")))
+    outcomes = [
+        Outcome("made/made", Status.KEPT, exit_code=1, lost=NOTHING_LOST),
+        Outcome("made/other", Status.BROKEN, "it | did not", lost=Loss(ms=45.0)),
+    ]
+    text = page([family], outcomes, SEED)
+    assert "**2 faults: 1 promises kept, 1 broken, 0 could not be tried on this machine.**" in text
+    assert "| `made` | nothing | nothing | yes | nothing | 1 |" in text
+    assert "| `other` | nothing | nothing | **NO**: it \\| did not | 45 ms | - |" in text
+
+
+def test_wrong_names_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--list", "--family", "dsik"]) == EXIT_USAGE
+    assert main(["--list", "--only", "processes/no-such"]) == EXIT_USAGE
+    assert capsys.readouterr().err.count("error:") == 2
+
+
+def test_every_table_is_well_formed() -> None:
+    names = [fault.name for family in families() for fault in family.faults]
+    assert len(names) > 5
+    assert [name for name in names if name != name.lower() or " " in name] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SAMPLE)
+def test_a_sample_of_the_campaign(name: str) -> None:
+    ((family, chosen_fault),) = chosen(families(), (), (name,))
+    outcome = run_one(family, chosen_fault, SEED)
+    assert outcome.status is Status.KEPT, outcome
