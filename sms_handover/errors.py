@@ -39,6 +39,10 @@ class UnstableLoopError(ConfigurationError):
     """The sampled closed loop of gains and tick diverges at the start configuration."""
 
 
+class ControllerError(SmsHandoverError):
+    """A controller from outside the package gave efforts that are none."""
+
+
 class BagError(SmsHandoverError):
     """A recording cannot be written, opened or trusted."""
 

@@ -7,7 +7,7 @@ The numbers live in ``config/``, never here.
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import Field, dataclass, field, fields
+from dataclasses import MISSING, Field, dataclass, field, fields
 from math import inf, isfinite
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
@@ -51,10 +51,14 @@ def parameter(
     minimum: float | None = None,
     maximum: float | None = None,
     choices: Sequence[str] = (),
+    default: Any = MISSING,
 ) -> Any:
-    """Return a dataclass field that carries a :class:`ParameterSpec`; bounds are inclusive."""
+    """Return a dataclass field that carries a :class:`ParameterSpec`; bounds are inclusive.
+
+    The parameters of this package have their defaults in ``config/``; others may give a ``default`` here.
+    """
     spec = ParameterSpec(description, unit, minimum, maximum, tuple(choices))
-    return field(metadata={_SPEC: spec})
+    return field(default=default, metadata={_SPEC: spec})
 
 
 def spec_of(item: "Field[Any]") -> ParameterSpec:
@@ -75,6 +79,7 @@ def build(cls: type[T], values: Mapping[str, object], where: str) -> T:
     for name in values:
         if name not in known:
             raise UnknownNameError("parameter", name, known, where)
+    values = {**defaults_of(cls), **values}
     missing = [name for name in known if name not in values]
     if missing:
         raise ConfigurationError(f"{where}: parameter {missing[0]!r} is missing")
@@ -83,6 +88,12 @@ def build(cls: type[T], values: Mapping[str, object], where: str) -> T:
         for name, item in known.items()
     }
     return cls(**checked)
+
+
+def defaults_of(cls: type[object]) -> dict[str, object]:
+    """Return the defaults that the fields of a parameter group have themselves."""
+    all_fields = fields(cls)  # type: ignore[arg-type]
+    return {item.name: item.default for item in all_fields if item.default is not MISSING}
 
 
 def read_parameter_files(paths: Sequence[Path], section: str) -> dict[str, object]:

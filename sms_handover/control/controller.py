@@ -8,6 +8,7 @@ import numpy as np
 from sms_handover.control.base import ControlLaw
 from sms_handover.control.nmpc import NmpcGains, NmpcLaw
 from sms_handover.control.pid import PidGains, PidLaw
+from sms_handover.control.protocol import Guidance
 from sms_handover.control.reference_track import ReferenceTrack
 from sms_handover.control.stability import LoopStability, loop_stability
 from sms_handover.errors import UnstableLoopError
@@ -43,6 +44,11 @@ class JointController:
         self._law = make_law(self._robot, self._gains_by_phase[0])
         self._track.reset()
         self._phase = 0
+
+    def guide(self, guidance: Guidance) -> None:
+        """Take over the gains of the phase and the joint reference; these laws follow joints, not tools."""
+        self.enter(guidance.phase)
+        self.track(guidance.reference)
 
     def enter(self, phase: TaskPhase) -> None:
         """Take over the gains of a phase, if it is a new one."""

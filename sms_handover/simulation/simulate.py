@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from sms_handover.control.protocol import CheckedController, Controller, Guidance
 from sms_handover.ik.levenberg_marquardt import solve_ik
 from sms_handover.run_data import RunData
 from sms_handover.simulation.recorder import RunRecorder
@@ -13,19 +14,31 @@ from sms_handover.types import TaskPhase
 Progress = Callable[[int, TaskPhase], None]
 
 
-def simulate(scenario: Scenario | None = None, *, progress: Progress | None = None) -> RunData:
+def simulate(
+    scenario: Scenario | None = None,
+    *,
+    controller: Controller | None = None,
+    progress: Progress | None = None,
+) -> RunData:
     """Return the run of a scenario, by default the shipped one over its whole schedule.
 
     Per tick: the plant gives its state; each reference period the trajectory generator gives phase,
     targets and, through inverse kinematics, the joint reference; the controller answers; the plant
     carries out grasp commands and integrates. The last state is answered too, but not integrated.
-    ``progress`` is called with the time in ns and the phase each reference period.
+    ``controller`` takes the place of the one that the scenario names; it is reset first. Raises
+    ControllerError if its efforts are no numbers. ``progress`` is called with the time in ns and the
+    phase each reference period.
     """
     scenario = scenario or load_scenario()
     parameters, robot, schedule = scenario.parameters, scenario.robot, scenario.schedule
     common = parameters.common
     plant = make_plant(robot, schedule, common, parameters.plant)
-    controller = make_controller(robot, schedule, common, parameters.controller)
+    law: Controller
+    if controller is None:
+        law = make_controller(robot, schedule, common, parameters.controller)
+    else:
+        law = CheckedController(controller, robot.joint_names)
+        law.reset()
     generator = TrajectoryGenerator(robot, schedule, parameters.trajectory)
     last_tick = common.last_tick(schedule.end_ns)
     periods = last_tick // common.ticks_per_reference + 1
@@ -42,12 +55,11 @@ def simulate(scenario: Scenario | None = None, *, progress: Progress | None = No
             joints = solution.joint_position if solution else targets.joint_position
             reference, targets_in_world = generator.reference(state, targets, joints)
             recorder.reference(phase, reference, targets_in_world, solution)
-            controller.enter(phase)
-            controller.track(reference)
+            law.guide(Guidance(phase, reference, targets_in_world))
             recorder.events(plant.execute(phase.commands))
             if progress:
                 progress(stamp_ns, phase)
-        effort = controller.effort(stamp_ns, plant.q, plant.v)
+        effort = law.effort(stamp_ns, plant.q, plant.v)
         recorder.tick(stamp_ns, plant.q, plant.v, plant.joint_effort, effort)
         if tick < last_tick:
             plant.apply(effort)

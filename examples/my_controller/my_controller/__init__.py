@@ -1,0 +1,1 @@
+"""A torque law of one's own for sms_handover."""
