@@ -28,19 +28,32 @@ class TopicCount:
     message_count: int
 
 
-def bag_information(
-    file_name: str, start_ns: int, end_ns: int, topics: Sequence[TopicCount]
-) -> dict[str, Any]:
-    """Return the body of the metadata for a bag of one MCAP file."""
+@dataclass(frozen=True)
+class FileSpan:
+    """One file of a bag: its first and last log time, both 0 without a message, and how many it holds."""
+
+    name: str
+    start_ns: int
+    end_ns: int
+    message_count: int
+
+
+def bag_information(files: Sequence[FileSpan], topics: Sequence[TopicCount]) -> dict[str, Any]:
+    """Return the body of the metadata for a bag of these MCAP files."""
+    filled = [file for file in files if file.message_count]
+    start_ns = min((file.start_ns for file in filled), default=0)
+    end_ns = max((file.end_ns for file in filled), default=0)
     return {
         "version": _VERSION,
         "storage_identifier": "mcap",
-        **_span(start_ns, end_ns, topics),
+        **_span(start_ns, end_ns, sum(topic.message_count for topic in topics)),
         "topics_with_message_count": [_topic_information(topic) for topic in topics],
         "compression_format": "",
         "compression_mode": "",
-        "relative_file_paths": [file_name],
-        "files": [{"path": file_name, **_span(start_ns, end_ns, topics)}],
+        "relative_file_paths": [file.name for file in files],
+        "files": [
+            {"path": file.name, **_span(file.start_ns, file.end_ns, file.message_count)} for file in files
+        ],
         "custom_data": None,
         "ros_distro": _ROS_DISTRO,
     }
@@ -91,12 +104,12 @@ def qos_text(profiles: Sequence[Mapping[str, object]]) -> str:
     return to_yaml([dict(profile) for profile in profiles]).strip() if profiles else ""
 
 
-def _span(start_ns: int, end_ns: int, topics: Sequence[TopicCount]) -> dict[str, Any]:
+def _span(start_ns: int, end_ns: int, message_count: int) -> dict[str, Any]:
     """Return what both a bag and a file of it tell; a new object each time, so YAML needs no anchors."""
     return {
         "duration": {"nanoseconds": end_ns - start_ns},
         "starting_time": {"nanoseconds_since_epoch": start_ns},
-        "message_count": sum(topic.message_count for topic in topics),
+        "message_count": message_count,
     }
 
 

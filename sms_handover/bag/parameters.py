@@ -2,8 +2,12 @@
 
 from dataclasses import dataclass
 
+from sms_handover.bag.split import Split
 from sms_handover.bag.topic_choice import TopicChoice
 from sms_handover.parameters import parameter
+from sms_handover.units import seconds_to_ns
+
+_BYTES_PER_MB = 1e6
 
 
 @dataclass(frozen=True)
@@ -17,9 +21,20 @@ class RecorderParameters:
         minimum=0,
         maximum=19,
     )
+    split_duration: float = parameter(
+        "simulated time after which the bag goes on in a new file; 0: never", unit="s", minimum=0.0
+    )
+    split_size: float = parameter(
+        "size after which the bag goes on in a new file; 0: never", unit="MB", minimum=0.0
+    )
     drain_timeout: float = parameter(
         "wall time without any message after which the end is not waited for", unit="s", minimum=0.1
     )
+
+    @property
+    def split(self) -> Split:
+        """Return when the bag goes on in a new file."""
+        return Split(seconds_to_ns(self.split_duration), round(self.split_size * _BYTES_PER_MB))
 
 
 @dataclass(frozen=True)

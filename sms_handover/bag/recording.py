@@ -11,6 +11,7 @@ from sms_handover.bag.ledger import LEDGER_RECORD, PERIODS_RECORD, Ledger
 from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.provenance import PROVENANCE_RECORD
 from sms_handover.bag.qos import Qos
+from sms_handover.bag.split import Split
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.bag.writer import BagWriter
 from sms_handover.errors import BagError
@@ -28,9 +29,11 @@ class Recording:
     message without a stamp, or with one of the wall clock, gets the newest simulation time.
     """
 
-    def __init__(self, folder: Path, *, types: MessageTypes | None = None) -> None:
+    def __init__(
+        self, folder: Path, *, types: MessageTypes | None = None, split: Split | None = None
+    ) -> None:
         """Create the bag; raises BagError if ``folder`` exists or cannot be made."""
-        self.writer = BagWriter(folder, types=types)
+        self.writer = BagWriter(folder, types=types, split=split)
         self._types = self.writer.types
         self._keeper = LedgerKeeper()
         self._stamped: dict[str, bool] = {}

@@ -1,26 +1,26 @@
-"""Write a recording: one MCAP file and ``metadata.yaml`` in a new folder, as rosbag2 lays it out.
+"""Write a recording: MCAP files and ``metadata.yaml`` in a new folder, as rosbag2 lays it out.
 
 ``log_time`` of a message is simulation time, so readers and players see the run's own clock;
 ``publish_time`` is wall time, so what happened to the messages on the way stays visible.
 """
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from errno import ENOENT
-from io import BufferedWriter
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 
 from mcap.records import Schema as McapSchema
-from mcap.writer import CompressionType, Writer
 
+from sms_handover.bag.bag_file import BagFile
 from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.metadata import (
     METADATA_FILE,
     ROSBAG2_KEY,
     ROSBAG2_RECORD,
+    FileSpan,
     TopicCount,
     bag_information,
     qos_text,
@@ -28,23 +28,18 @@ from sms_handover.bag.metadata import (
 )
 from sms_handover.bag.qos import Qos, profiles_of
 from sms_handover.bag.scan import Source
+from sms_handover.bag.split import Split
 from sms_handover.errors import BagError
 
 CHUNK_SIZE = 64 * 1024  # [byte] of uncompressed messages held back at most
 FLUSH_PERIOD_NS = 20_000_000  # [ns] of log time held back at most
 
-_PROFILE = "ros2"
-LIBRARY = "sms_handover"  # what the header of our bags names
-
 
 @dataclass
 class _Topic:
-    """An open channel; ``count`` grows with each message."""
+    """A topic and its channel in the present file; ``count`` grows with each message."""
 
-    name: str
-    type: str
-    encoding: str
-    type_hash: str
+    source: Source
     qos: Sequence[Mapping[str, object]]
     channel: int
     count: int = 0
@@ -60,28 +55,37 @@ class BagWriter:
         types: MessageTypes | None = None,
         chunk_size: int = CHUNK_SIZE,
         flush_period_ns: int = FLUSH_PERIOD_NS,
+        split: Split | None = None,
     ) -> None:
-        """Create ``folder`` and ``<folder>/<name>_0.mcap``; raises BagError if it cannot."""
+        """Create ``folder`` and ``<folder>/<name>_0.mcap``; raises BagError if it cannot.
+
+        With a ``split`` the recording goes on in ``<name>_1.mcap`` and so on. Each file is complete
+        by itself: it has every topic, attachment and record that was there before it.
+        """
         self.folder = Path(folder)
-        self.path = self.folder / f"{self.folder.name}_0.mcap"
         self.types = MessageTypes() if types is None else types
+        self._chunk_size = chunk_size
         self._flush_period_ns = flush_period_ns
+        self._split = Split() if split is None else split
         self._flushed_ns = 0
-        self._start_ns: int | None = None
-        self._end_ns = 0
         self._topics: dict[str, _Topic] = {}
-        self._schemas: dict[tuple[str, str, bytes], int] = {}
+        self._repeated: list[Callable[[BagFile], None]] = []  # what goes into every later file too
+        self._finished: list[FileSpan] = []
         self._closed = False
         self._writable = True
         self._failure: BagError | None = None
-        self._stream = _create(self.folder, self.path)
-        self._handle = os.open(self.folder, os.O_RDONLY)  # finds the folder even if it is moved
-        self._mcap = Writer(self._stream, chunk_size=chunk_size, compression=CompressionType.ZSTD)
+        self._handle = _create(self.folder)  # finds the folder even if it is moved
+        try:
+            self._file = BagFile(self._handle, self._next_name, chunk_size)
+        except OSError as error:
+            os.close(self._handle)
+            self.folder.rmdir()
+            path = self.folder / self._next_name
+            raise BagError(f"cannot create the recording {path}: {error.strerror}") from error
         try:
             with self._reported():
-                self._mcap.start(profile=_PROFILE, library=LIBRARY)
-                self._describe()  # a file that is never closed still tells how its QoS texts are to be read
-                self._stream.flush()
+                self._begin_file()
+                self._file.flush()
         except BagError:
             self.abandon()
             raise
@@ -109,13 +113,18 @@ class BagWriter:
         return self._closed
 
     @property
+    def path(self) -> Path:
+        """Return the file that is being written."""
+        return self.folder / self._file.name
+
+    @property
     def message_counts(self) -> dict[str, int]:
         """Return the number of messages written so far, by topic."""
         return {name: topic.count for name, topic in self._topics.items()}
 
     def topic_of(self, key: str) -> str:
         """Return the name of the topic that messages are written to by ``key``."""
-        return self._topics[key].name
+        return self._topics[key].source.topic
 
     def add_topic(self, name: str, type_name: str, qos: Sequence[Qos] = ()) -> None:
         """Open a topic for writing; raises BagError on a second topic of that name or an unknown type."""
@@ -143,14 +152,10 @@ class BagWriter:
         if not self._writable or entry is None or log_time_ns < 0 or publish_time_ns < 0:
             raise self._refusal(topic)
         try:
-            self._mcap.add_message(entry.channel, log_time_ns, data, publish_time_ns, sequence)
+            self._file.write(entry.channel, log_time_ns, data, publish_time_ns, sequence)
         except OSError as error:
             raise self._failed(error) from error
         entry.count += 1
-        if self._start_ns is None or log_time_ns < self._start_ns:
-            self._start_ns = log_time_ns
-        if log_time_ns > self._end_ns:
-            self._end_ns = log_time_ns
         if log_time_ns - self._flushed_ns >= self._flush_period_ns:
             self.flush()
 
@@ -160,10 +165,11 @@ class BagWriter:
         Raises BagError if the disk refuses, or if the file has been deleted meanwhile.
         """
         self._require_open()
-        self._flushed_ns = self._end_ns
+        self._flushed_ns = self._file.end_ns
         with self._reported():
-            self._mcap.flush()  # type: ignore[no-untyped-call]
-            self._require_there()
+            self._file.flush()
+            if self._split.due(self._file.duration_ns, self._file.size):
+                self._go_on_in_a_new_file()
 
     def attach(
         self,
@@ -176,14 +182,17 @@ class BagWriter:
         """Store a whole file in the bag, e.g. ``robot.urdf``."""
         self._require_open()
         created_ns = log_time_ns if create_time_ns is None else create_time_ns
+        values = (name, media_type, content, log_time_ns, created_ns)
         with self._reported():
-            self._mcap.add_attachment(created_ns, log_time_ns, name, media_type, content)
+            self._file.attach(*values)
+        self._repeated.append(lambda file: file.attach(*values))
 
     def record(self, name: str, values: Mapping[str, str]) -> None:
         """Store a metadata record: a name with keys and texts."""
         self._require_open()
         with self._reported():
-            self._mcap.add_metadata(name, dict(values))
+            self._file.record(name, values)
+        self._repeated.append(partial(BagFile.record, name=name, values=dict(values)))
 
     def close(self) -> None:
         """Complete the bag and wait until it is on the disk; a second call does nothing.
@@ -198,18 +207,12 @@ class BagWriter:
         self._closed, self._writable = True, False
         if self._failure is not None:
             with suppress(OSError):
-                self._stream.close()
+                self._file.close()
             os.close(self._handle)
             raise self._failure
         try:
             with self._reported():
-                with self._stream as stream:
-                    self._mcap.flush()  # type: ignore[no-untyped-call]
-                    self._require_there()
-                    self._describe()
-                    self._mcap.finish()  # type: ignore[no-untyped-call]
-                    stream.flush()
-                    os.fsync(stream.fileno())
+                self._end_file()
                 _write_synced(self._handle, METADATA_FILE, to_yaml({ROSBAG2_KEY: self._information()}))
                 with suppress(OSError):  # not every file system can wait for the names in a folder
                     os.fsync(self._handle)
@@ -221,44 +224,62 @@ class BagWriter:
         if not self._closed:
             self._closed, self._writable = True, False
             with suppress(OSError):
-                self._stream.close()
+                self._file.close()
             os.close(self._handle)
-        for file in (self.path, self.folder / METADATA_FILE):
-            file.unlink(missing_ok=True)
+        for name in (*(file.name for file in self._finished), self._file.name, METADATA_FILE):
+            (self.folder / name).unlink(missing_ok=True)
         with suppress(OSError):
             self.folder.rmdir()
 
     def _open(self, key: str, source: Source, profiles: Sequence[Mapping[str, object]]) -> None:
-        """Open a channel, and its schema unless another channel has the same."""
-        schema = source.schema
-        same = (schema.name, schema.encoding, schema.data)
-        if same not in self._schemas:
-            self._schemas[same] = self._mcap.register_schema(*same) if schema.name else 0
-        channel = self._mcap.register_channel(
-            source.topic, source.encoding, self._schemas[same], dict(source.metadata)
-        )
-        type_hash = source.metadata.get("topic_type_hash", "")
-        self._topics[key] = _Topic(
-            source.topic, schema.name, source.encoding, type_hash, tuple(profiles), channel
-        )
+        """Open a channel for a topic."""
+        self._topics[key] = _Topic(source, tuple(profiles), self._file.open_channel(source))
 
-    def _require_there(self) -> None:
-        """Raise OSError if the file has been deleted: what is written to it would be gone with it."""
-        if os.fstat(self._stream.fileno()).st_nlink == 0:
-            raise FileNotFoundError(ENOENT, "it was deleted while it was being written")
+    @property
+    def _next_name(self) -> str:
+        """Return the name of the next file."""
+        return f"{self.folder.name}_{len(self._finished)}.mcap"
+
+    def _begin_file(self) -> None:
+        """Write the head of a file; one that is never closed still tells how its QoS texts are to be read."""
+        self._file.start()
+        self._describe()
+
+    def _end_file(self) -> None:
+        """Complete the present file."""
+        self._file.flush()
+        self._describe()
+        self._file.finish()
+
+    def _go_on_in_a_new_file(self) -> None:
+        """Complete the present file and open the next one, with all that stands before the messages."""
+        self._end_file()
+        self._finished.append(_span(self._file))
+        self._file = BagFile(self._handle, self._next_name, self._chunk_size)
+        self._begin_file()
+        for topic in self._topics.values():
+            topic.channel = self._file.open_channel(topic.source)
+        for repeat in self._repeated:
+            repeat(self._file)
 
     def _describe(self) -> None:
         """Write the record from which rosbag2 reads the metadata if ``metadata.yaml`` is lost."""
-        self._mcap.add_metadata(ROSBAG2_RECORD, {"serialized_metadata": to_yaml(self._information())})
+        self._file.record(ROSBAG2_RECORD, {"serialized_metadata": to_yaml(self._information())})
 
     def _information(self) -> dict[str, object]:
         """Return the metadata of what has been written so far."""
         topics = [
-            TopicCount(topic.name, topic.type, topic.encoding, topic.type_hash, topic.qos, topic.count)
+            TopicCount(
+                topic.source.topic,
+                topic.source.schema.name,
+                topic.source.encoding,
+                topic.source.metadata.get("topic_type_hash", ""),
+                topic.qos,
+                topic.count,
+            )
             for topic in self._topics.values()
         ]
-        start_ns = 0 if self._start_ns is None else self._start_ns
-        return bag_information(self.path.name, start_ns, max(start_ns, self._end_ns), topics)
+        return bag_information([*self._finished, _span(self._file)], topics)
 
     def _require_open(self) -> None:
         """Raise BagError if nothing can be written any more."""
@@ -284,14 +305,16 @@ class BagWriter:
     def _failed(self, error: OSError) -> BagError:
         """Remember that the disk refused something: what follows would not be a readable file."""
         self._writable = False
-        self._failure = BagError(f"cannot write the recording {self.path}: {error.strerror}")
+        path = self.folder / (error.filename or self._file.name)
+        self._failure = BagError(f"cannot write the recording {path}: {error.strerror}")
         return self._failure
 
 
-def _create(folder: Path, path: Path) -> BufferedWriter:
-    """Create the folder, which must not exist, and open the file in it."""
+def _create(folder: Path) -> int:
+    """Create the folder, which must not exist, and open it."""
     try:
         folder.mkdir()
+        return os.open(folder, os.O_RDONLY)
     except FileExistsError:
         raise BagError(
             f"{folder} exists already: a recording never overwrites, choose another output folder"
@@ -300,11 +323,12 @@ def _create(folder: Path, path: Path) -> BufferedWriter:
         raise BagError(f"cannot create {folder}: its parent folder does not exist") from None
     except OSError as error:
         raise BagError(f"cannot create the recording {folder}: {error.strerror}") from error
-    try:
-        return path.open("xb")
-    except OSError as error:
-        folder.rmdir()
-        raise BagError(f"cannot create the recording {path}: {error.strerror}") from error
+
+
+def _span(file: BagFile) -> FileSpan:
+    """Return what is told of a file in the metadata."""
+    start_ns = 0 if file.start_ns is None else file.start_ns
+    return FileSpan(file.name, start_ns, max(start_ns, file.end_ns), file.message_count)
 
 
 def _write_synced(folder: int, name: str, text: str) -> None:

@@ -70,7 +70,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
         schedule = load_task(self.common, self.robot)
         folder = self.parameters.folder or datetime.now().strftime("handover_%Y_%m_%d-%H_%M_%S")
         try:
-            self._recording = Recording(Path(folder))
+            self._recording = Recording(Path(folder), split=self.parameters.split)
         except BagError as error:
             raise ConfigurationError(str(error)) from error
         self._recording.describe(urdf=self.robot.urdf, schedule=schedule.text, provenance=provenance())
