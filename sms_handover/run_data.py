@@ -7,6 +7,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from sms_handover.events import RunEvent
 from sms_handover.types import GraspEvent, TaskPhase
 
 Array = npt.NDArray[np.float64]
@@ -50,6 +51,7 @@ class RunData:
     ik_status: npt.NDArray[np.int64]
     phases: tuple[TaskPhase, ...]
     grasp_events: tuple[GraspEvent, ...]
+    run_events: tuple[RunEvent, ...] = ()
 
     def __post_init__(self) -> None:
         """Make every array read-only and the mappings immutable."""

@@ -80,6 +80,7 @@ DEPUTY_MARKER = "deputy/marker"
 RUN_STATE = "run/state"
 RUN_READY = "run/ready"
 RUN_PUBLISHED = "run/published"
+RUN_EVENTS = "run/events"  # what nodes have decided by themselves
 RUN_RECORDED = "run/recorded"  # up to which stamp everything is in the bag
 LOOP_TIMING = "loop_timing"
 CLOCK = "/clock"
@@ -116,6 +117,7 @@ def graph_topics(arms: Iterable[str]) -> tuple[Topic, ...]:
         Topic(RUN_STATE, f"{_OURS}/RunState", (PLANT,), everyone_else, Rate.CHANGE),
         Topic(RUN_READY, text, everyone_else, (PLANT,), Rate.CHANGE),
         Topic(RUN_PUBLISHED, f"{_OURS}/PublishedCounts", LOOP_NODES, (), Rate.CHANGE),
+        Topic(RUN_EVENTS, f"{_OURS}/RunEvent", LOOP_NODES, (), Rate.CHANGE),
         Topic(RUN_RECORDED, "std_msgs/msg/Header", (RECORDER,), (PLANT,), Rate.WALL),
         Topic(LOOP_TIMING, f"{_OURS}/LoopTiming", (PLANT,), (), Rate.WALL),
         Topic(CLOCK, "rosgraph_msgs/msg/Clock", (PLANT,), (), Rate.CLOCK),

@@ -19,6 +19,7 @@ FOUNDATION_MODULES = {
     "__init__",
     "types",
     "errors",
+    "events",
     "units",
     "frames",
     "topics",

@@ -15,6 +15,7 @@ from sms_handover.analysis.metrics import PhaseMetrics, RunMetrics
 from sms_handover.analysis.torque import JointTorque
 from sms_handover.analysis.tracking import ToolTracking
 from sms_handover.analysis.work import JointWork
+from sms_handover.events import RunEvent
 from sms_handover.types import GraspEvent
 from sms_handover.units import ns_to_seconds
 
@@ -41,6 +42,7 @@ def _run(metrics: RunMetrics, drift: Mapping[str, BaseMotion]) -> Summary:
         "ik": _values(metrics.ik),
         "loop": _values(metrics.loop) if metrics.loop else None,
         "grasp_events": [_event(event) for event in metrics.run.grasp_events],
+        "run_events": [_run_event(event) for event in metrics.run.run_events],
     }
 
 
@@ -87,6 +89,12 @@ def _event(event: GraspEvent) -> Summary:
         "relative_speed": _plain(event.relative_speed),
         "detail": event.detail,
     }
+
+
+def _run_event(event: RunEvent) -> Summary:
+    """Return what a node has decided."""
+    figures = _values(event)
+    return {"time": ns_to_seconds(figures.pop("stamp_ns")), **figures}
 
 
 def _claim(claim: Claim) -> Summary:

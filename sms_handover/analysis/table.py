@@ -1,5 +1,6 @@
 """A comparison of runs as plain text: metrics, receipts, and the verdicts on the paper's claims."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import isnan
@@ -14,6 +15,7 @@ from sms_handover.analysis.loop_timing import LoopTiming
 from sms_handover.analysis.metrics import PhaseMetrics, RunMetrics
 from sms_handover.analysis.numbers import largest, lengths
 from sms_handover.analysis.tracking import Motion, ToolTracking
+from sms_handover.events import Severity
 from sms_handover.run_data import RunData
 from sms_handover.types import GraspAction, GraspCommand, GraspEvent
 from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
@@ -52,6 +54,7 @@ def figure_sections(comparison: Comparison, tolerance: Tolerance | None = None) 
     runs = list(comparison.runs.values())
     return (
         Section("Grasp events", _grasp_rows(runs, tolerance)),
+        *_run_event_section(runs),
         *(_phase_section(comparison, name) for name in comparison.phase_names),
         Section("Torque over the whole run, peak / RMS [N m]", _torque_rows(runs)),
         Section("Physics and inverse kinematics", _receipt_rows(runs)),
@@ -74,6 +77,21 @@ def _grasp_rows(runs: Sequence[RunMetrics], tolerance: Tolerance | None) -> tupl
                 allowed = f", allowed {limit(tolerance):g}" if tolerance else ""
                 rows.append(_cost(f"  {what}{allowed}", events, value))
     return tuple(rows) or (Row("none"),)
+
+
+def _run_event_section(runs: Sequence[RunMetrics]) -> tuple[Section, ...]:
+    """Return how often the nodes told of each kind of warning or error, if they did."""
+    counts = [
+        Counter(
+            f"{event.kind} ({event.severity.value})"
+            for event in item.run.run_events
+            if event.severity is not Severity.INFO
+        )
+        for item in runs
+    ]
+    kinds = dict.fromkeys(kind for count in counts for kind in count)
+    rows = [Row(kind, tuple(str(count[kind]) for count in counts)) for kind in kinds]
+    return (Section("Decisions of the nodes", tuple(rows)),) if rows else ()
 
 
 _REACHED: tuple[tuple[str, Callable[[GraspEvent], float], Callable[[Tolerance], float]], ...] = (

@@ -8,6 +8,7 @@ from sms_handover.bag.decode import (
     energy_values,
     grasp_event,
     pose_values,
+    run_event,
     status_values,
     task_phase,
     vector_values,
@@ -18,6 +19,7 @@ from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.series import RowCollector
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.errors import BagError
+from sms_handover.events import RunEvent
 from sms_handover.types import GraspEvent, TaskPhase
 
 JOINT_TOPICS = (topics.JOINT_STATES, topics.JOINT_COMMAND, topics.JOINT_REFERENCE)
@@ -52,6 +54,7 @@ class RunCollector:
         }
         self.phases: list[TaskPhase] = []
         self.events: list[GraspEvent] = []
+        self.run_events: list[RunEvent] = []
         self._first_ns: int | None = None
         self._newest_ns = 0
 
@@ -63,6 +66,9 @@ class RunCollector:
             topics.TASK_PHASE: self._decoded(topics.TASK_PHASE, lambda m: self.phases.append(task_phase(m))),
             topics.GRASP_EVENT: self._decoded(
                 topics.GRASP_EVENT, lambda m: self.events.append(grasp_event(m))
+            ),
+            topics.RUN_EVENTS: self._decoded(
+                topics.RUN_EVENTS, lambda m: self.run_events.append(run_event(m))
             ),
         }
         takers.update(
@@ -80,6 +86,7 @@ class RunCollector:
             self._first_ns = time_ns
         elif time_ns < self._newest_ns and time_ns <= self._first_ns:
             self.events.clear()
+            self.run_events.clear()
         self._newest_ns = time_ns
         self.joints[topics.JOINT_STATES].add(data)
 

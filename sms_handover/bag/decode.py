@@ -2,11 +2,13 @@
 
 from typing import Any
 
+from sms_handover.events import RunEvent, Severity
 from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, TaskPhase
 from sms_handover.units import NS_PER_S
 
 _ACTIONS = (GraspAction.GRASP, GraspAction.RELEASE, GraspAction.TRANSFER)  # by number in the message
 _STATUSES = (GraspStatus.SUCCEEDED, GraspStatus.MISSED, GraspStatus.REJECTED)
+_SEVERITIES = (Severity.INFO, Severity.WARNING, Severity.ERROR)
 
 
 def pose_values(message: Any) -> tuple[float, ...]:
@@ -56,4 +58,19 @@ def grasp_event(message: Any) -> GraspEvent:
         angle_error=message.angle_error,
         relative_speed=message.relative_speed,
         detail=message.detail,
+    )
+
+
+def run_event(message: Any) -> RunEvent:
+    """Return a RunEvent message as its value."""
+    return RunEvent(
+        stamp_ns=header_ns(message),
+        node=message.node,
+        kind=message.kind,
+        severity=_SEVERITIES[message.severity],
+        detail=message.detail,
+        phase=message.phase,
+        value=message.value,
+        limit=message.limit,
+        unit=message.unit,
     )

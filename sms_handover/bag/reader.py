@@ -83,6 +83,7 @@ def _assemble(collector: RunCollector) -> RunData:
         ik_status=np.nan_to_num(rows(topics.IK_STATUS)[:, 0], nan=_NO_IK).astype(np.int64),
         phases=_last_run(collector.phases),
         grasp_events=tuple(collector.events),
+        run_events=tuple(collector.run_events),
     )
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from time import monotonic
 
+from sms_handover.events import RunEvent
 from sms_handover.status_line import StatusLine
 from sms_handover.types import GraspEvent
 from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
@@ -38,9 +39,9 @@ class Display:
         if last:
             self._line.stay()
 
-    def event(self, event: GraspEvent) -> None:
-        """Show a grasp event in a line of its own."""
-        self._line.show(grasp_line(event))
+    def event(self, event: GraspEvent | RunEvent) -> None:
+        """Show an event in a line of its own."""
+        self._line.show(grasp_line(event) if isinstance(event, GraspEvent) else str(event))
         self._line.stay()
 
 

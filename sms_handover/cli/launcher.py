@@ -18,6 +18,7 @@ from sms_handover_interfaces.msg import RunState
 from sms_handover.cli.display import Display
 from sms_handover.cli.processes import Death, NodeProcesses
 from sms_handover.errors import GraphError
+from sms_handover.events import RunEvent
 from sms_handover.ros.composition import process_arguments
 from sms_handover.ros.main import EXIT_LOSS, EXIT_OK
 from sms_handover.ros.monitor import RunMonitor
@@ -48,11 +49,12 @@ class LaunchPlan:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a run ended: what the plant said, the grasp events, whether the bag has every message."""
+    """How a run ended: what the plant said, the events, whether the bag has every message."""
 
     detail: str
     stamp_ns: int
     events: tuple[GraspEvent, ...]
+    run_events: tuple[RunEvent, ...]
     recorder_code: int
     interrupted: bool
 
@@ -109,7 +111,7 @@ class _Watch:
         end_ns = common.last_tick(plan.scenario.schedule.end_ns) * common.tick_ns
         self._plan, self._monitor, self._executor, self._processes = plan, monitor, executor, processes
         self._display = Display(end_ns)
-        self._events_shown = 0
+        self._events_shown = self._run_events_shown = 0
         self._interrupts = 0
         self._recorder_seen_gone = 0.0
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -126,7 +128,14 @@ class _Watch:
         code = self._wait_for_recorder() if self._plan.bag else EXIT_OK
         progress = self._monitor.progress
         self._show(last=True)
-        return Outcome(progress.detail, progress.stamp_ns, tuple(progress.events), code, self._interrupts > 0)
+        return Outcome(
+            detail=progress.detail,
+            stamp_ns=progress.stamp_ns,
+            events=tuple(progress.events),
+            run_events=tuple(progress.run_events),
+            recorder_code=code,
+            interrupted=self._interrupts > 0,
+        )
 
     def _wait_for_start(self) -> None:
         """Wait until every endpoint has matched and the plant has begun."""
@@ -167,7 +176,7 @@ class _Watch:
                 )
 
     def _wait_for_events(self) -> None:
-        """Wait for the grasp events, which may come behind the news of the end."""
+        """Wait for the events, which may come behind the news of the end."""
         deadline = monotonic() + _NEWS_PATIENCE_S
         while not self._monitor.heard_every_event and self._interrupts < 2 and monotonic() < deadline:
             self._look()
@@ -203,11 +212,13 @@ class _Watch:
         return self._monitor.finished or monotonic() - self._recorder_seen_gone < _NEWS_PATIENCE_S
 
     def _show(self, *, last: bool = False) -> None:
-        """Show progress, and every grasp event once."""
+        """Show progress, and every event once."""
         progress = self._monitor.progress
         for event in progress.events[self._events_shown :]:
             self._display.event(event)
-        self._events_shown = len(progress.events)
+        for decision in progress.run_events[self._run_events_shown :]:
+            self._display.event(decision)
+        self._events_shown, self._run_events_shown = len(progress.events), len(progress.run_events)
         if last:
             self._display.finish(progress.wall_time)
         self._display.show(progress.stamp_ns, progress.phase, progress.tool_error, last=last)

@@ -11,6 +11,7 @@ from sms_handover.cli.folders import BAG, LOGS
 from sms_handover.cli.launcher import LaunchPlan, launch
 from sms_handover.cli.options import add_scenario_options, scenario_of
 from sms_handover.errors import ConfigurationError
+from sms_handover.events import graver_in_words
 from sms_handover.ros.main import EXIT_LOSS
 from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.parameters import LOCKSTEP, REALTIME
@@ -74,6 +75,8 @@ def command(options: Namespace) -> int:
         outcome = launch(plan)
     if plan.bag:
         print((plan.log_folder / "recorder.log").read_text(encoding="utf-8"), end="")
+    if told := graver_in_words(outcome.run_events):
+        print(f"the nodes told of {told}, see above")
     print(f"{outcome.detail} at {outcome.stamp_ns / 1e9:g} s of simulated time")
     if outcome.interrupted:
         return EXIT_INTERRUPTED

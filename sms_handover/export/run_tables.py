@@ -1,4 +1,4 @@
-"""A recorded run as tables: ticks, references and grasp events."""
+"""A recorded run as tables: ticks, references, grasp events and what the nodes have decided."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ class RunTable:
 
 def run_tables(run: RunData, wanted: Wanted) -> tuple[RunTable, ...]:
     """Return the tables of a run, of the rows whose stamps are ``wanted`` (a mask)."""
-    return _ticks(run, wanted), _references(run, wanted), _events(run, wanted)
+    return _ticks(run, wanted), _references(run, wanted), _events(run, wanted), _run_events(run, wanted)
 
 
 class _Columns:
@@ -122,3 +122,15 @@ def _events(run: RunData, wanted: Wanted) -> RunTable:
         columns.add(name, unit, np.array([getattr(event, name) for event in events], dtype=np.float64))
     columns.add_texts("detail", [event.detail for event in events])
     return columns.table("grasp_events")
+
+
+def _run_events(run: RunData, wanted: Wanted) -> RunTable:
+    """Return a row per decision of a node."""
+    events = run.run_events
+    columns = _Columns(np.array([event.stamp_ns for event in events], dtype=np.int64), wanted)
+    for name in ("node", "kind", "phase", "detail", "unit"):
+        columns.add_texts(name, [getattr(event, name) for event in events])
+    columns.add_texts("severity", [event.severity.value for event in events])
+    for name in ("value", "limit"):
+        columns.add(name, "", np.array([getattr(event, name) for event in events], dtype=np.float64))
+    return columns.table("run_events")

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from sms_handover.analysis.highlights import succeeded
 from sms_handover.bag.ledger import Ledger, ledger_table
+from sms_handover.events import graver_in_words
 from sms_handover.report.recorded_run import RecordedRun
 from sms_handover.report.styles import RunStyle
 from sms_handover.units import ns_to_seconds
@@ -37,7 +38,7 @@ def run_card(run: RecordedRun, style: RunStyle) -> RunCard:
         duration=ns_to_seconds(int(ticks[-1] - ticks[0])) if len(ticks) else 0.0,
         started=run.info.provenance.get("start", ""),
         messages=run.info.message_count,
-        verdicts=(_grasps(run), _recording(ledger)),
+        verdicts=(_grasps(run), *_decisions(run), _recording(ledger)),
         ledger="" if ledger is None else ledger_table(ledger),
     )
 
@@ -48,6 +49,12 @@ def _grasps(run: RecordedRun) -> Verdict:
     if not total:
         return Verdict("no grasp command recorded", None)
     return Verdict(f"{count} of {total} grasp commands succeeded", count == total)
+
+
+def _decisions(run: RecordedRun) -> tuple[Verdict, ...]:
+    """Tell how many warnings and errors the nodes told of, if there were any."""
+    words = graver_in_words(run.data.run_events)
+    return (Verdict(words, good=False),) if words else ()
 
 
 def _recording(ledger: Ledger | None) -> Verdict:

@@ -1,4 +1,4 @@
-"""What the scripts of the page need: plots, phases and grasp events as JSON values."""
+"""What the scripts of the page need: plots, phases and events as JSON values."""
 
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from sms_handover.analysis.phases import phase_spans
+from sms_handover.events import Severity
 from sms_handover.report.plots import Plot, PlotGroup
 from sms_handover.report.styles import RunStyle
 from sms_handover.run_data import RunData
@@ -19,6 +20,7 @@ PageData = dict[str, Any]
 def page_data(runs: Sequence[RunData], styles: Sequence[RunStyle], groups: Sequence[PlotGroup]) -> PageData:
     """Return the values that the scripts read; texts in it come from bags and are data, never markup."""
     first = runs[0]
+    names = [style.name for style in styles]
     return {
         "runs": [{"name": style.name, "colour": style.colour, "dash": style.dash} for style in styles],
         "span": _span(runs),
@@ -26,7 +28,7 @@ def page_data(runs: Sequence[RunData], styles: Sequence[RunStyle], groups: Seque
             {"name": span.name, "begin": ns_to_seconds(span.start_ns), "end": ns_to_seconds(span.end_ns)}
             for span in phase_spans(first)
         ],
-        "events": _events(runs, [style.name for style in styles]),
+        "events": _events(runs, names) + _run_events(runs, names),
         "plots": [_plot(plot) for group in groups for plot in group.plots],
     }
 
@@ -69,6 +71,20 @@ def _events(runs: Sequence[RunData], names: Sequence[str]) -> list[PageData]:
             "succeeded": set(found.values()) == {GraspStatus.SUCCEEDED},
         }
         for (stamp_ns, command), found in sorted(statuses.items(), key=lambda item: item[0])
+    ]
+
+
+def _run_events(runs: Sequence[RunData], names: Sequence[str]) -> list[PageData]:
+    """Return the warnings and errors that nodes have told of, each with its run if there are several."""
+    return [
+        {
+            "time": ns_to_seconds(event.stamp_ns),
+            "text": f"{event.kind}: {event.detail}" + (f" in {name}" if len(runs) > 1 else ""),
+            "succeeded": False,
+        }
+        for run, name in zip(runs, names, strict=True)
+        for event in run.run_events
+        if event.severity is not Severity.INFO
     ]
 
 

@@ -22,6 +22,7 @@ _CONTENTS = {
     topics.RUN_STATE: "whether the run waits, runs, pauses or is over",
     topics.RUN_READY: "name of a node that is ready to begin",
     topics.RUN_PUBLISHED: "how many messages a node has published on each topic, told once at the end",
+    topics.RUN_EVENTS: "what a node has decided by itself: a watchdog, a refused input, a phase done again",
     topics.RUN_RECORDED: "up to which stamp all is in the bag; the plant goes at most 45 ms ahead",
     topics.LOOP_TIMING: "late ticks, held commands, the real period [s] and the real-time factor",
     topics.CLOCK: "simulation time",

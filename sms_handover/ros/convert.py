@@ -14,10 +14,12 @@ from sms_handover_interfaces.msg import EnergyStamped
 from sms_handover_interfaces.msg import GraspCommand as GraspCommandMessage
 from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
 from sms_handover_interfaces.msg import IkStatus as IkStatusMessage
+from sms_handover_interfaces.msg import RunEvent as RunEventMessage
 from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
 from std_msgs.msg import Header
 
 from sms_handover.errors import GraphError
+from sms_handover.events import RunEvent, Severity
 from sms_handover.frames import WORLD
 from sms_handover.types import (
     Array,
@@ -46,6 +48,12 @@ _IK_STATUS = {
     IkStatus.CONVERGED: IkStatusMessage.CONVERGED,
     IkStatus.STALLED: IkStatusMessage.STALLED,
     IkStatus.ITERATION_LIMIT: IkStatusMessage.ITERATION_LIMIT,
+}
+
+_SEVERITY = {
+    Severity.INFO: RunEventMessage.INFO,
+    Severity.WARNING: RunEventMessage.WARNING,
+    Severity.ERROR: RunEventMessage.ERROR,
 }
 
 
@@ -129,6 +137,21 @@ def event_message(event: GraspEvent) -> GraspEventMessage:
         angle_error=event.angle_error,
         relative_speed=event.relative_speed,
         detail=event.detail,
+    )
+
+
+def run_event_message(event: RunEvent) -> RunEventMessage:
+    """Return what a node has decided as a message."""
+    return RunEventMessage(
+        header=header(event.stamp_ns),
+        node=event.node,
+        kind=event.kind,
+        severity=_SEVERITY[event.severity],
+        phase=event.phase,
+        detail=event.detail,
+        value=event.value,
+        limit=event.limit,
+        unit=event.unit,
     )
 
 

@@ -14,13 +14,22 @@ from sms_handover.parameters import EVERY_NODE
 from sms_handover.ros.convert import time_message
 from sms_handover.ros.direct_inputs import DirectInputs
 from sms_handover.ros.endpoints import Endpoints
+from sms_handover.ros.event_publisher import EventPublisher
 from sms_handover.ros.inputs import ExecutorInputs, Inputs
 from sms_handover.ros.main import EXIT_OK, WAIT_S, RunnableNode, Stop
 from sms_handover.ros.parameters import declare, refuse_unknown
 from sms_handover.ros.process import settle
 from sms_handover.simulation.parameters import DIRECT, EXECUTOR, CommonParameters
 from sms_handover.simulation.scenario import load_robot_model
-from sms_handover.topics import DIAGNOSTICS, PLANT, RUN_PUBLISHED, RUN_READY, RUN_STATE, graph_topics
+from sms_handover.topics import (
+    DIAGNOSTICS,
+    PLANT,
+    RUN_EVENTS,
+    RUN_PUBLISHED,
+    RUN_READY,
+    RUN_STATE,
+    graph_topics,
+)
 
 P = TypeVar("P")
 
@@ -48,6 +57,7 @@ class GraphNode(RunnableNode, Generic[P]):
         self.inputs: Inputs = INPUTS[self.common.transport](self)
         self.finished = False
         self._counts = self.endpoints.publisher(RUN_PUBLISHED)
+        self.events = EventPublisher(self, self.endpoints.publisher(RUN_EVENTS))
         self._diagnostics = self.endpoints.publisher(DIAGNOSTICS)
         if name != PLANT:
             self._ready = self.endpoints.publisher(RUN_READY)

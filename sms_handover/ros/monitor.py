@@ -12,14 +12,17 @@ from rclpy.node import Node
 from rclpy.qos import QoSHistoryPolicy, QoSProfile, QoSReliabilityPolicy
 from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
 from sms_handover_interfaces.msg import PublishedCounts, RunState, TaskPhase
+from sms_handover_interfaces.msg import RunEvent as RunEventMessage
 from std_srvs.srv import Trigger
 
-from sms_handover.bag.decode import grasp_event, header_ns
+from sms_handover.bag.decode import grasp_event, header_ns, run_event
+from sms_handover.events import RunEvent
 from sms_handover.ros.qos import LATCHED
 from sms_handover.topics import (
     DIAGNOSTICS,
     GRASP_EVENT,
     PLANT,
+    RUN_EVENTS,
     RUN_PUBLISHED,
     RUN_STATE,
     TASK_PHASE,
@@ -48,6 +51,7 @@ class Progress:
     phase: str = ""
     tool_error: dict[str, float] = field(default_factory=dict)
     events: list[GraspEvent] = field(default_factory=list)
+    run_events: list[RunEvent] = field(default_factory=list)
     waiting: dict[str, str] = field(default_factory=dict)
 
 
@@ -58,10 +62,11 @@ class RunMonitor:
         """Subscribe to what tells the progress of the run."""
         self.progress = Progress()
         self._targets: dict[str, PoseStamped] = {}
-        self._events_published: int | None = None
+        self._published: dict[str, dict[str, int]] = {}
         self._finish = node.create_client(Trigger, f"{PLANT}/finish")
         node.create_subscription(RunState, RUN_STATE, self._on_state, LATCHED)
         node.create_subscription(GraspEventMessage, GRASP_EVENT, self._on_event, LATCHED)
+        node.create_subscription(RunEventMessage, RUN_EVENTS, self._on_run_event, LATCHED)
         node.create_subscription(PublishedCounts, RUN_PUBLISHED, self._on_counts, LATCHED)
         node.create_subscription(TaskPhase, TASK_PHASE, self._on_phase, _NEWEST)
         node.create_subscription(DiagnosticArray, DIAGNOSTICS, self._on_diagnostics, _NEWEST)
@@ -77,8 +82,15 @@ class RunMonitor:
 
     @property
     def heard_every_event(self) -> bool:
-        """Tell whether every grasp event has come that the plant says, at its end, it has published."""
-        return self._events_published is not None and len(self.progress.events) >= self._events_published
+        """Tell whether every event has come that the nodes say, at their end, they have published.
+
+        The plant must have said so; a node that hangs is not waited for.
+        """
+        return (
+            PLANT in self._published
+            and len(self.progress.events) >= self._told(GRASP_EVENT)
+            and len(self.progress.run_events) >= self._told(RUN_EVENTS)
+        )
 
     def ask_to_finish(self) -> bool:
         """Ask the plant to end the run at the present tick; tell whether it could be asked."""
@@ -101,10 +113,20 @@ class RunMonitor:
     def _on_event(self, message: Any) -> None:
         self.progress.events.append(grasp_event(message))
 
+    def _on_run_event(self, message: Any) -> None:
+        self.progress.run_events.append(run_event(message))
+
     def _on_counts(self, message: Any) -> None:
-        if message.node == PLANT:
-            counts = dict(zip(message.topics, message.counts, strict=False))
-            self._events_published = next((n for t, n in counts.items() if t.endswith(GRASP_EVENT)), 0)
+        self._published[message.node] = dict(zip(message.topics, message.counts, strict=False))
+
+    def _told(self, name: str) -> int:
+        """Return how many messages of a topic the nodes say that they have published."""
+        return sum(
+            count
+            for counts in self._published.values()
+            for topic, count in counts.items()
+            if topic.endswith(f"/{name}")
+        )
 
     def _on_phase(self, message: Any) -> None:
         self.progress.phase = message.name

@@ -10,6 +10,7 @@ from sms_handover import topics
 from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.qos import Durability, Qos
 from sms_handover.bag.recording import Recording
+from sms_handover.events import RunEvent, Severity
 from sms_handover.run_data import Array, RunData
 from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, TaskPhase
 
@@ -23,6 +24,7 @@ JOINTS = tuple(f"{arm}_joint_{number}" for arm in ARMS for number in range(1, 8)
 TYPES = MessageTypes()
 
 _ACTIONS = (GraspAction.GRASP, GraspAction.RELEASE, GraspAction.TRANSFER)
+_SEVERITIES = (Severity.INFO, Severity.WARNING, Severity.ERROR)
 _STATUSES = (GraspStatus.SUCCEEDED, GraspStatus.MISSED, GraspStatus.REJECTED)
 
 
@@ -124,6 +126,24 @@ def task_phase(phase: TaskPhase) -> Any:
         index=phase.index,
         name=phase.name,
         commands=[grasp_command(command) for command in phase.commands],
+        state=0,
+        attempt=1,
+        end=TYPES.make("builtin_interfaces/msg/Time", sec=60, nanosec=0),
+    )
+
+
+def run_event(event: RunEvent) -> Any:
+    return TYPES.make(
+        f"{OURS}/RunEvent",
+        header=header(event.stamp_ns),
+        node=event.node,
+        kind=event.kind,
+        severity=_SEVERITIES.index(event.severity),
+        phase=event.phase,
+        detail=event.detail,
+        value=event.value,
+        limit=event.limit,
+        unit=event.unit,
     )
 
 
@@ -181,6 +201,10 @@ def made_up_run(ticks: int = 101, seed: int = 0) -> RunData:
             GraspEvent(REFERENCE_NS * 2, grasp, GraspStatus.SUCCEEDED, 1e-3, 2e-3, 3e-3, ""),
             GraspEvent(REFERENCE_NS * 2, transfer, GraspStatus.MISSED, 0.1, 0.2, float("nan"), "too far"),
         ),
+        run_events=(
+            RunEvent(0, "plant", "begun", Severity.INFO, "all is well"),
+            RunEvent(TICK_NS, "plant", "late", Severity.ERROR, "no command", "carry", 0.2, 0.1, "s"),
+        ),
     )
 
 
@@ -215,6 +239,9 @@ def record_run(recording: Recording, run: RunData, prefix: str = "") -> None:
         for event in run.grasp_events:
             if event.stamp_ns == stamp_ns:
                 receive(topics.GRASP_EVENT, grasp_event(event))
+        for decision in run.run_events:
+            if decision.stamp_ns == stamp_ns:
+                receive(topics.RUN_EVENTS, run_event(decision))
         receive(topics.JOINT_COMMAND, joint_state(stamp_ns, run.joint_names, effort=run.joint_command[k]))
 
 

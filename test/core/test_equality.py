@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sms_handover.analysis.equality import Difference, compare_runs
+from sms_handover.events import RunEvent, Severity
 from sms_handover.run_data import RunData
 from sms_handover.types import GraspStatus
 
@@ -15,7 +16,7 @@ from .bag_messages import made_up_run
 
 ARRAYS = [item.name for item in fields(RunData) if isinstance(getattr(made_up_run(3), item.name), np.ndarray)]
 PER_ARM = ("target_pose", "tool_pose")
-TEXTS = ("joint_names", "arms", "phases", "grasp_events")
+TEXTS = ("joint_names", "arms", "phases", "grasp_events", "run_events")
 
 
 @pytest.fixture
@@ -110,6 +111,13 @@ def test_names_phases_and_events_count(run: RunData) -> None:
     assert difference.detail == f"{len(run.phases)} items and {len(run.phases) - 1} items"
     (difference,) = compare_runs(run, replace(run, grasp_events=others["grasp_events"]))
     assert difference.detail.startswith("item 0 is ")
+
+
+def test_of_decisions_those_count_that_follow_from_the_numbers(run: RunData) -> None:
+    late = RunEvent(5, "plant", "late", Severity.WARNING, "the machine was busy")
+    assert compare_runs(run, replace(run, run_events=(*run.run_events, late))) == ()
+    (difference,) = compare_runs(run, replace(run, run_events=(replace(late, node="trajectory"),)))
+    assert difference.field == "run_events"
 
 
 def test_events_without_errors_are_the_same_as_themselves(run: RunData) -> None:

@@ -75,7 +75,7 @@ def bits(values: Any) -> bytes:
 def test_a_run_reads_back_bit_for_bit(tmp_path: Path, file_format: str) -> None:
     run = made_up_run()
     result = export(write_run(tmp_path / "bag", run), tmp_path / "out", file_format, EVERYTHING)
-    assert result.rows == {"ticks": 101, "references": 6, "grasp_events": 2}
+    assert result.rows == {"ticks": 101, "references": 6, "grasp_events": 2, "run_events": 2}
     ticks = read(result.folder, "ticks", file_format)
     assert ticks["stamp_ns"] == run.tick_ns.tolist()
     for place, joint in enumerate(JOINTS):
@@ -101,6 +101,11 @@ def test_a_run_reads_back_bit_for_bit(tmp_path: Path, file_format: str) -> None:
     assert events["status"] == ["succeeded", "missed"]
     assert events["from_arm"] == ["", "arm_a"]
     assert np.isnan(events["relative_speed"][1])
+    decisions = read(result.folder, "run_events", file_format)
+    assert decisions["kind"] == ["begun", "late"]
+    assert decisions["severity"] == ["info", "error"]
+    assert np.isnan(decisions["value"][0])
+    assert (decisions["value"][1], decisions["limit"][1], decisions["unit"][1]) == (0.2, 0.1, "s")
 
 
 @pytest.mark.parametrize("file_format", FORMATS)

@@ -7,6 +7,7 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
 from sms_handover_interfaces.msg import IkStatus as IkStatusMessage
+from sms_handover_interfaces.msg import RunEvent as RunEventMessage
 from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
 
 from sms_handover.bag.decode import (
@@ -14,11 +15,13 @@ from sms_handover.bag.decode import (
     grasp_event,
     header_ns,
     pose_values,
+    run_event,
     status_values,
     task_phase,
     vector_values,
 )
 from sms_handover.errors import GraphError
+from sms_handover.events import RunEvent, Severity
 from sms_handover.ros.convert import (
     energy_message,
     event_message,
@@ -30,6 +33,7 @@ from sms_handover.ros.convert import (
     pose_message,
     pose_of_message,
     pose_stamped,
+    run_event_message,
     stamp_ns_of,
     time_message,
     vector_stamped,
@@ -120,6 +124,15 @@ def test_event_comes_back(
 ) -> None:
     event = GraspEvent(5 * NS_PER_S, command, status, *errors, "because of this")
     assert repr(grasp_event(through_cdr(event_message(event)))) == repr(event)  # NaN differs from itself
+
+
+@pytest.mark.parametrize("severity", list(Severity))
+@pytest.mark.parametrize("figures", [(0.25, 0.1, "s"), (NAN, NAN, "")])
+def test_run_event_comes_back(severity: Severity, figures: tuple[float, float, str]) -> None:
+    event = RunEvent(5 * NS_PER_S, "plant", "command_lost", severity, "kein Befehl — none", "carry", *figures)
+    message = through_cdr(run_event_message(event))
+    assert repr(run_event(message)) == repr(event)
+    assert message.severity == getattr(RunEventMessage, severity.name)
 
 
 def test_numbers_of_grasp_messages_are_those_of_their_definitions() -> None:

@@ -14,12 +14,14 @@ from sms_handover_interfaces.msg import PublishedCounts, RunState
 from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
 from std_srvs.srv import Trigger
 
-from sms_handover.ros.convert import event_message, header, phase_message, pose_stamped
+from sms_handover.events import RunEvent, Severity
+from sms_handover.ros.convert import event_message, header, phase_message, pose_stamped, run_event_message
 from sms_handover.ros.monitor import RunMonitor
 from sms_handover.ros.qos import LATCHED, LOSSLESS
 from sms_handover.topics import (
     DIAGNOSTICS,
     GRASP_EVENT,
+    RUN_EVENTS,
     RUN_PUBLISHED,
     RUN_STATE,
     TASK_PHASE,
@@ -48,7 +50,7 @@ class FakeGraph:
 
     def say(self, topic: str, message: Any) -> None:
         """Publish a message, once there is somebody to hear it."""
-        profile = LATCHED if topic in (RUN_STATE, GRASP_EVENT, RUN_PUBLISHED) else LOSSLESS
+        profile = LATCHED if topic in (RUN_STATE, RUN_EVENTS, GRASP_EVENT, RUN_PUBLISHED) else LOSSLESS
         if topic not in self.publishers:
             self.publishers[topic] = self.node.create_publisher(type(message), topic, profile)
         publisher = self.publishers[topic]
@@ -146,6 +148,23 @@ def test_every_event_has_been_heard_when_the_plant_says_so(graph: FakeGraph) -> 
     graph.say(GRASP_EVENT, GraspEventMessage())
     graph.bench.until(lambda: monitor.heard_every_event, "the second event and the counts")
     assert len(monitor.progress.events) == 2
+
+
+def test_decisions_of_every_node_are_heard(graph: FakeGraph) -> None:
+    monitor = graph.monitor
+    events = [
+        RunEvent(20, "plant", "command_lost", Severity.WARNING, "no command", value=0.2, limit=0.1, unit="s"),
+        RunEvent(40, "trajectory", "phase_failed", Severity.ERROR, "out of reach", "carry"),
+    ]
+    for node, count in (("plant", 1), ("trajectory", 1)):
+        counts = PublishedCounts(node=node, topics=[f"/space/{RUN_EVENTS}"], counts=[count])
+        graph.say(RUN_PUBLISHED, counts)
+    graph.say(RUN_EVENTS, run_event_message(events[0]))
+    graph.bench.until(lambda: monitor.progress.run_events, "the first event")
+    assert not monitor.heard_every_event
+    graph.say(RUN_EVENTS, run_event_message(events[1]))
+    graph.bench.until(lambda: monitor.heard_every_event, "the second event and the counts")
+    assert repr(monitor.progress.run_events) == repr(events)
 
 
 def test_a_run_without_events_has_none_to_wait_for(graph: FakeGraph) -> None:

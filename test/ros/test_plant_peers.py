@@ -27,6 +27,7 @@ from sms_handover.topics import (
     JOINT_STATES,
     LOOP_TIMING,
     PLANT,
+    RUN_EVENTS,
     RUN_PUBLISHED,
     RUN_READY,
     RUN_RECORDED,
@@ -69,7 +70,7 @@ class FakeController:
         self._command = self._endpoints.publisher(JOINT_COMMAND)
         self._phase = self._endpoints.publisher(TASK_PHASE)
         self._ready = self._endpoints.publisher(RUN_READY)
-        for unused in (DIAGNOSTICS, RUN_PUBLISHED):
+        for unused in (DIAGNOSTICS, RUN_EVENTS, RUN_PUBLISHED):
             self._endpoints.publisher(unused)
         self._endpoints.subscribe(JOINT_STATES, self._on_state)
         self._endpoints.subscribe(BASE_ODOMETRY, lambda message: None)

@@ -18,6 +18,7 @@ from sms_handover.topics import (
     IK,
     IK_STATUS,
     JOINT_REFERENCE,
+    RUN_EVENTS,
     RUN_PUBLISHED,
     RUN_READY,
     RUN_STATE,
@@ -40,7 +41,7 @@ class FakeIk:
         self._endpoints = Endpoints(node, TOPICS, peers)
         self.requests: list[Any] = []
         self._ready = self._endpoints.publisher(RUN_READY)
-        for unused in (DIAGNOSTICS, RUN_PUBLISHED):
+        for unused in (DIAGNOSTICS, RUN_EVENTS, RUN_PUBLISHED):
             self._endpoints.publisher(unused)
         self._endpoints.subscribe(RUN_STATE, lambda message: None)
         node.create_service(SolveIK, SOLVE_IK, self._on_request)
