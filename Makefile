@@ -5,6 +5,7 @@ RUNS ?= runs
 FIGURES ?= figures
 REPORT ?= report
 MEASURED := build/verification
+SITE := build/docs/html
 
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint .ci/constraints.txt
@@ -14,10 +15,10 @@ MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evi
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover figures report simulate test verify measure bench faults reference lint install colcon clean
+.PHONY: help handover figures report simulate test verify measure bench docs faults reference lint install colcon clean
 
 help:  ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 
 handover: install  ## hand the deputy over under NMPC, then PID, over DDS in lock step; record both; compare
 	$(BIN)/sms-handover run --controller nmpc --output $(RUNS)/nmpc --overwrite
@@ -54,7 +55,13 @@ bench: $(VENV)/.bench  ## measure how long things take, against other engines to
 faults: $(VENV)/.test  ## inject every fault, check what is promised for it, write docs/reliability.md
 	$(BIN)/python test/faults --write docs/reliability.md
 
-reference: install  ## write docs/parameters.md and docs/topics.md from the code
+docs: $(VENV)/.docs  ## build the documentation as a site, every warning an error, and look at it in a browser
+	rm -rf build/docs docs/api
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -d build/docs/doctrees docs $(SITE)
+	$(BIN)/python -m pytest test/site --site $(SITE)
+	@echo "The site begins at $(SITE)/index.html"
+
+reference: install  ## write the pages of docs/ that list what is in the code
 	$(BIN)/python -m docs.reference
 
 lint: $(VENV)/.test  ## check style and types
@@ -68,7 +75,7 @@ colcon:  ## build the package as a ROS workspace does, with colcon, and list its
 	PYTHON="$(PYTHON)" .ci/colcon
 
 clean:  ## remove the environment and everything built; recordings stay
-	rm -rf $(VENV) build dist *.egg-info interfaces/build interfaces/*.egg-info .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) build dist docs/api *.egg-info interfaces/build interfaces/*.egg-info .mypy_cache .pytest_cache .ruff_cache
 
 # Stamps: each holds until a file it depends on changes.
 INTERFACES := $(wildcard interfaces/*.txt interfaces/*.xml interfaces/*.py interfaces/*.toml) \
@@ -96,6 +103,10 @@ $(VENV)/.test: $(VENV)/.package
 
 $(VENV)/.verify: $(VENV)/.test
 	$(PIP) --editable '.[analysis,test,verify]'
+	@touch $@
+
+$(VENV)/.docs: $(VENV)/.test
+	$(PIP) --editable '.[analysis,test,docs]'
 	@touch $@
 
 $(VENV)/.bench: $(VENV)/.verify

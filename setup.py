@@ -103,6 +103,12 @@ setup(
             "mink>=1.3,<2",
             "mujoco>=4.0,<5",
         ],
+        "docs": [  # the site; Sphinx 9 needs Python 3.11
+            "furo>=2025.7",
+            "myst-parser>=5.0,<6",
+            "sphinx>=9.0,<10",
+            "sphinx-copybutton>=0.5.2,<0.6",
+        ],
         "bench": [  # what the benchmarks compare with, beyond verify
             "drake>=1.51,<2",
             "matplotlib>=3.10,<4",

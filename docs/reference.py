@@ -1,8 +1,11 @@
-"""Write docs/parameters.md and docs/topics.md from what the nodes are made from."""
+"""Write the pages of parameters, topics, commands and messages from what the package is made from."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from docs.commands import commands_page
+from docs.messages import messages_page
+from docs.tables import WRITTEN_BY, table
 from sms_handover.ros.contents import contents_of
 from sms_handover.ros.reference import (
     ANY_ARM,
@@ -18,14 +21,13 @@ from sms_handover.services import SERVICES
 from sms_handover.topics import CONTROLLER, NODES, RECORDER, graph_topics
 
 DOCS = Path(__file__).resolve().parent
-_WRITTEN_BY = "This page is written by `make reference`; a test fails when it is not up to date."
 
 
 def parameters_page() -> str:
     """Return the page of all parameters."""
     parts = [
         "# Parameters",
-        _WRITTEN_BY,
+        WRITTEN_BY,
         """\
 Every node reads its defaults from the files in [`config/`](../config), ROS 2 parameter files that give
 the reason for each number. On top of them come `--params-file FILE`, then `-p NAME:=VALUE` of the node, or
@@ -60,27 +62,32 @@ def topics_page() -> str:
     ]
     parts = [
         "# Topics and services",
-        _WRITTEN_BY,
+        WRITTEN_BY,
         f"""\
 Names without a leading `/` are relative: a namespace moves them. `{ANY_ARM}` stands for the name of each arm
 of the robot, as shipped `arm_a` and `arm_b`. The recorder subscribes to every topic. Frames, signs and stamps
-are in [conventions.md](conventions.md), our own types in [`interfaces/`](../interfaces).
+are in [conventions.md](conventions.md), our own types in [messages.md](messages.md).
 
 A subscription of yours may ask for less than is offered, say best effort; a reliable one that keeps up loses
 nothing. A reliable subscriber that does not keep up holds the loop back: to look at the state at 50 Hz, take
 the sampled topics.""",
         "## Topics",
-        _table(("Topic", "Type", "When", "Quality of service", "From", "Needed by", "Carries"), topics),
+        table(("Topic", "Type", "When", "Quality of service", "From", "Needed by", "Carries"), topics),
         "The recorder adds `/tf` to the bag, one message each reference period.",
         "## Services",
-        _table(("Service", "Type", "Offered by", "Called by", "Does"), services),
+        table(("Service", "Type", "Offered by", "Called by", "Does"), services),
     ]
     return "\n\n".join(parts) + "\n"
 
 
 def pages() -> dict[Path, str]:
     """Return the text of every page that is written here."""
-    return {DOCS / "parameters.md": parameters_page(), DOCS / "topics.md": topics_page()}
+    return {
+        DOCS / "parameters.md": parameters_page(),
+        DOCS / "topics.md": topics_page(),
+        DOCS / "commands.md": commands_page(),
+        DOCS / "messages.md": messages_page(),
+    }
 
 
 def _group(title: str, group: ParameterGroup) -> Iterator[str]:
@@ -91,7 +98,7 @@ def _group(title: str, group: ParameterGroup) -> Iterator[str]:
     ]
     yield f"## {title}"
     yield f"Defaults: [`config/{group.file}`](../config/{group.file})."
-    yield _table(("Parameter", "Type", "Default", "Unit", "Allowed", "Meaning"), rows)
+    yield table(("Parameter", "Type", "Default", "Unit", "Allowed", "Meaning"), rows)
     if group is OWN_GROUPS[CONTROLLER]:
         yield "The schedule may change the gains from phase to phase."
 
@@ -99,12 +106,6 @@ def _group(title: str, group: ParameterGroup) -> Iterator[str]:
 def _nodes(names: Iterable[str]) -> str:
     """Return the names of nodes."""
     return ", ".join(f"`{name}`" for name in names)
-
-
-def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table."""
-    cells = [head, ["---"] * len(head), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
-    return "\n".join("| " + " | ".join(row) + " |" for row in cells)
 
 
 def main() -> None:

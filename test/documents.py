@@ -1,4 +1,4 @@
-"""What README.md and docs/*.md show: fenced blocks, the commands in them, and commands in the text."""
+"""What README.md and docs/*.md show: fenced blocks, the commands in them, commands in the text, links."""
 
 import re
 import shlex
@@ -11,7 +11,9 @@ from .workspace import ROOT
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 SHELL = ("sh", "bash", "shell", "console")
 
-_FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_FENCE = re.compile(r"^```(\w*|\{\w+\}[^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
+_HEADING = re.compile(r"^#+ +(.*)$", re.MULTILINE)
 _INLINE = re.compile(r"`([^`]+)`")
 _SEPARATORS = {"&&", "||", ";", "|", "&", "(", ")"}
 _ASSIGNMENT = re.compile(r"\w+=.*")
@@ -39,6 +41,18 @@ def inline_code(path: Path) -> list[str]:
     """Return what stands between backticks in the text of a document."""
     text = _FENCE.sub("", path.read_text(encoding="utf-8"))
     return [" ".join(code.split()) for code in _INLINE.findall(text)]
+
+
+def links(path: Path) -> list[str]:
+    """Return where the links of a document lead that stay within the repository."""
+    found = _LINK.findall(_INLINE.sub("code", _FENCE.sub("", path.read_text(encoding="utf-8"))))
+    return [link for link in found if not re.match(r"\w+:", link)]
+
+
+def anchors(path: Path) -> set[str]:
+    """Return the anchors that GitHub gives the headings of a document."""
+    headings = _HEADING.findall(_FENCE.sub("", path.read_text(encoding="utf-8")))
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
 def commands(script: str) -> Iterator[list[str]]:

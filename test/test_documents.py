@@ -13,13 +13,14 @@ from pathlib import Path
 
 import pytest
 
+from docs.commands import sub_parsers
 from sms_handover.cli.main import _COMMANDS
 from sms_handover.ros.launch_arguments import ARGUMENTS
 from sms_handover.ros.reference import COMMON_GROUP, OWN_GROUPS, groups_of
 from sms_handover.services import SERVICES
 from sms_handover.topics import TF, graph_topics
 
-from .documents import DOCUMENTS, SHELL, Block, blocks, commands, inline_code
+from .documents import DOCUMENTS, SHELL, Block, anchors, blocks, commands, inline_code, links
 from .workspace import PACKAGE, ROOT, executables
 
 ELSEWHERE = {"apt", "cd", "colcon", "export", "git", "mkdir", "pip", "pre-commit", "rosdep", "ruff", "source"}
@@ -160,6 +161,38 @@ def test_commands_in_the_text_exist(path: Path) -> None:
         elif words[:1] == ["sms-handover"] and len(words) > 1 and words[1].islower():
             options = [word for word in words[2:] if word.startswith("--")]
             require(options, options_of(parser_of(words[1])), f"option of {words[1]}")
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+def test_links_lead_somewhere(path: Path) -> None:
+    """On GitHub; `make docs` follows those of the site."""
+    for link in links(path):
+        name, _, anchor = link.partition("#")
+        file = (path.parent / name).resolve() if name else path
+        if file.parent.name == "api":
+            continue  # made by `make docs`
+        assert file.exists(), f"{path.name} links to {link}, which is not there"
+        if anchor and file.suffix == ".md":
+            assert anchor in anchors(file), f"{path.name} links to {link}; {file.name} has no such heading"
+
+
+def test_every_page_is_in_the_navigation() -> None:
+    """The list stands at the end of docs/index.md; `make docs` does not know where a new page belongs."""
+    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    listed = [
+        name for toc in re.findall(r"^```\{toctree\}\n(.*?)^```$", index, re.M | re.S) for name in toc.split()
+    ]
+    pages = {path.stem for pattern in ("*.md", "*.rst") for path in (ROOT / "docs").glob(pattern)} - {"index"}
+    assert pages <= set(listed), f"add to docs/index.md: {sorted(pages - set(listed))}"
+
+
+@pytest.mark.parametrize("name", _COMMANDS)
+def test_examples_of_the_help_are_right(name: str) -> None:
+    parser = parser_of(name)
+    for text in (each.epilog or "" for each in (parser, *sub_parsers(parser))):
+        for line in re.findall(r"^  (sms-handover .*)$", text, re.MULTILINE):
+            command = re.split(r"\s{2,}", line)[0]  # what it does stands behind
+            check(next(commands(command)))
 
 
 @pytest.mark.parametrize("block", OF_PYTHON, ids=place)

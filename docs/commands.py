@@ -1,0 +1,109 @@
+"""The page of all commands, from their parsers.
+
+What argparse prints differs between versions of Python and with the width of the terminal, so only what it
+holds is taken.
+"""
+
+from argparse import (
+    ONE_OR_MORE,
+    OPTIONAL,
+    ZERO_OR_MORE,
+    Action,
+    ArgumentParser,
+    RawDescriptionHelpFormatter,
+    _HelpAction,
+)
+from collections.abc import Iterable, Iterator
+from importlib import import_module
+
+from docs.tables import WRITTEN_BY, plain, table
+from sms_handover.cli.main import _COMMANDS
+
+_EXIT_CODES = [
+    ("0", "done, and nothing is wrong"),
+    ("1", "failed, or what was looked for is not so: runs differ, a bag is damaged, a node died"),
+    ("2", "wrong input; nothing was started or written"),
+    ("3", "done, but messages of the recording are missing"),
+    ("4", "done, but a grasp missed"),
+    ("130", "interrupted"),
+]
+
+
+def commands_page() -> str:
+    """Return the page."""
+    parts = [
+        "# Commands",
+        WRITTEN_BY,
+        """\
+After `make handover` the command is `.venv/bin/sms-handover`; in a ROS workspace it is on the path. `--help`
+behind any command prints what stands here. Errors are one line on standard error that names the value, its
+unit and what is allowed.""",
+        table(("Exit code", "Means"), _EXIT_CODES),
+        table(
+            ("Command", "Does"), [(f"[`{name}`](#sms-handover-{name})", t) for name, t in _COMMANDS.items()]
+        ),
+    ]
+    for name in _COMMANDS:
+        parser = ArgumentParser(prog=f"sms-handover {name}")
+        import_module(f"sms_handover.cli.{name}").add_parser(parser)
+        parts += _command(parser, "##")
+    return "\n\n".join(parts) + "\n"
+
+
+def sub_parsers(parser: ArgumentParser) -> list[ArgumentParser]:
+    """Return the parsers of the commands of a command, in their order."""
+    nested = [action.choices for action in parser._actions if isinstance(action.choices, dict)]
+    return [sub for group in nested for sub in group.values()]
+
+
+def _command(parser: ArgumentParser, level: str) -> Iterator[str]:
+    """Yield the sections of a command and of its own commands."""
+    yield f"{level} {parser.prog}"
+    yield from _text(parser.description or "", parser)
+    subs = sub_parsers(parser)
+    taken = [action for action in parser._actions if not isinstance(action, _HelpAction)]
+    if not subs:
+        words = [parser.prog, *(_positional(a) for a in taken if not a.option_strings)]
+        yield f"```text\n{' '.join(words)} [options]\n```"
+        yield table(("Argument", "Means"), _rows(taken))
+    yield from _text(parser.epilog or "", parser)
+    for sub in subs:
+        yield from _command(sub, level + "#")
+
+
+def _text(text: str, parser: ArgumentParser) -> Iterator[str]:
+    """Yield the paragraphs of a text; one that is laid out in lines keeps them."""
+    for paragraph in text.split("\n\n"):
+        laid_out = parser.formatter_class is RawDescriptionHelpFormatter and "\n  " in paragraph
+        if laid_out:
+            yield f"```text\n{paragraph.strip()}\n```"
+        elif paragraph.strip():
+            words = " ".join(paragraph.split())
+            yield plain(words[:1].upper() + words[1:])
+
+
+def _rows(actions: Iterable[Action]) -> Iterator[tuple[str, str]]:
+    """Yield what a command takes and what it means."""
+    for action in actions:
+        forms = [f"`{form}{_value(action)}`" for form in action.option_strings]
+        meaning = (action.help or "") % {**vars(action), "prog": ""}
+        yield ", ".join(forms) or f"`{_positional(action)}`", plain(meaning)
+
+
+def _positional(action: Action) -> str:
+    """Return an argument without a name as a usage line has it."""
+    return _times(str(action.metavar or action.dest.upper()), action)
+
+
+def _value(action: Action) -> str:
+    """Return what follows an option, with a space before it; '' for a flag."""
+    if action.nargs == 0:
+        return ""
+    choices = "|".join(map(str, action.choices or []))
+    return " " + _times(str(action.metavar or choices or action.dest.upper()), action)
+
+
+def _times(name: str, action: Action) -> str:
+    """Return a name as often as it may be given."""
+    forms = {ONE_OR_MORE: f"{name} [{name} ...]", ZERO_OR_MORE: f"[{name} ...]", OPTIONAL: f"[{name}]"}
+    return forms.get(str(action.nargs), name)
