@@ -23,7 +23,6 @@ from sms_handover.ros.endpoints import Endpoints
 from sms_handover.ros.main import use_profile
 from sms_handover.ros.wire import JointStateWire, OdometryWire
 from sms_handover.topics import BASE_ODOMETRY, CONTROLLER, JOINT_COMMAND, JOINT_STATES, PLANT, graph_topics
-from sms_handover.types import Pose, Twist
 
 _ARMS = ("arm_a", "arm_b")
 NAMES = [f"{arm}_joint_{number}" for arm in _ARMS for number in range(1, 8)]
@@ -50,11 +49,10 @@ class Side:
         while endpoints.unmatched:
             self._executor.spin_once(timeout_sec=_WAIT_S)
         zeros = np.zeros(len(NAMES))
-        still, level = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
+        pose, twist = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]), np.zeros(6)
         states = JointStateWire(NAMES, ("position", "velocity", "effort"))
         odometry = OdometryWire(WORLD, BASE)
         commands = JointStateWire(NAMES, ("effort",))
-        pose, twist = Pose(still, level), Twist(still, still)
         pack: dict[str, Callable[[int], bytes]] = {
             JOINT_STATES: lambda stamp: states.pack(stamp, position=zeros, velocity=zeros, effort=zeros),
             BASE_ODOMETRY: lambda stamp: odometry.pack(stamp, pose, twist),

@@ -64,9 +64,15 @@ class DirectInputs(Inputs):
         self._others = tuple(others)
 
     def poll(self) -> int:
-        """Hand over everything that has come, in the order in which the inputs were made."""
+        """Hand over everything that has come, in the order in which the inputs were made.
+
+        Other nodes have their turn when nothing has come, so that what is not urgent does not hold up
+        what is: the plant and the controller answer each other before a reference is worked out.
+        """
         found = sum([source.take_all() for source in self._sources.values()])
-        return found + sum([other.poll() for other in self._others])
+        for other in self._others:
+            found = found or other.poll()
+        return found
 
     def spin_once(self, executor: Executor, timeout_s: float, awaited: str = "") -> None:
         """Handle what has come; else sleep until ``awaited`` comes, with turns of the executor between."""
