@@ -26,7 +26,7 @@ OWN_ARGUMENTS = (
         "compose",
         default_value="false",
         choices=["true", "false"],
-        description="whether plant, trajectory, ik and controller share one process, which is faster",
+        description="whether nodes that wait for each other share one process, which is faster",
     ),
     DeclareLaunchArgument("namespace", default_value="", description="namespace of nodes and topics"),
     DeclareLaunchArgument("log_level", default_value="info", description="least severity that is logged"),
@@ -53,7 +53,8 @@ def start(context: LaunchContext) -> list[Node]:
             name=None if name == CONTAINER else name,
             namespace=given["namespace"],
             output="screen",
-            ros_arguments=[*arguments, "--log-level", given["log_level"]],
+            arguments=list(arguments.nodes),
+            ros_arguments=[*arguments.ros, "--log-level", given["log_level"]],
             additional_env={"OPENBLAS_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"},
             on_exit=end,
         )

@@ -19,7 +19,7 @@ from sms_handover.cli.display import Display
 from sms_handover.cli.processes import Death, NodeProcesses
 from sms_handover.errors import GraphError
 from sms_handover.events import RunEvent
-from sms_handover.ros.composition import process_arguments
+from sms_handover.ros.composition import ProcessArguments, nodes_together, process_arguments
 from sms_handover.ros.main import EXIT_LOSS, EXIT_OK
 from sms_handover.ros.monitor import RunMonitor
 from sms_handover.simulation.scenario import COMMON, Scenario
@@ -37,7 +37,7 @@ _DRAIN_PATIENCE_S = 60.0  # [s] of wall time for the recorder to finish
 
 @dataclass(frozen=True)
 class LaunchPlan:
-    """What to start and where its logs, and if wanted its bag, go; ``compose``: the loop in one process."""
+    """What to start and where its logs, and if wanted its bag, go; ``compose``: few processes."""
 
     scenario: Scenario
     parameter_files: tuple[Path, ...]
@@ -70,7 +70,7 @@ def launch(plan: LaunchPlan) -> Outcome:
         monitor = RunMonitor(node, plan.scenario.robot.arms)
         with NodeProcesses(plan.log_folder, environment) as processes:
             for name, arguments in arguments_of(plan).items():
-                processes.start(name, arguments)
+                processes.start(name, arguments.line)
             outcome = _Watch(plan, monitor, executor, processes).to_the_end()
         node.destroy_node()
         return outcome
@@ -90,14 +90,15 @@ def graph_environment(plan: LaunchPlan) -> dict[str, str]:
     }
 
 
-def arguments_of(plan: LaunchPlan) -> Mapping[str, list[str]]:
-    """Return the ROS arguments of every process to start."""
+def arguments_of(plan: LaunchPlan) -> Mapping[str, ProcessArguments]:
+    """Return what every process is to be started with."""
     own = {name: dict(values) for name, values in plan.scenario.overrides.items()}
     if plan.bag:
         own.setdefault(RECORDER, {})["folder"] = str(plan.bag)
     files = [str(path) for path in plan.parameter_files]
+    together = nodes_together(plan.scenario.parameters.common.mode) if plan.compose else ()
     common = own.get(COMMON, {})
-    return process_arguments(common, own, files, record=plan.bag is not None, compose=plan.compose)
+    return process_arguments(common, own, files, record=plan.bag is not None, together=together)
 
 
 class _Watch:

@@ -48,8 +48,8 @@ class NodeProcesses:
         self.end()
 
     def start(self, node: str, arguments: Sequence[str]) -> None:
-        """Start a node with ROS arguments."""
-        command = [sys.executable, "-m", f"sms_handover.nodes.{node}", "--ros-args", *arguments]
+        """Start the executable of a node, or the container, with its arguments."""
+        command = [sys.executable, "-m", f"sms_handover.nodes.{node}", *arguments]
         with self.log_of(node).open("wb") as log:
             self._processes[node] = subprocess.Popen(
                 command,

@@ -48,8 +48,8 @@ def add_parser(parser: ArgumentParser) -> None:
     group.add_argument(
         "--compose",
         action="store_true",
-        help="run plant, trajectory, ik and controller as four nodes of one process, which is several times "
-        "as fast; the recorder keeps its own",
+        help="run nodes that wait for each other in one process, which is several times as fast: in lock "
+        "step plant, trajectory, ik and controller, in real time plant and controller",
     )
     group.add_argument(
         "--domain-id", type=int, metavar="N", help="ROS domain (default: a free one of this machine's)"

@@ -42,7 +42,6 @@ from sms_handover.types import JointCommand
 
 _COMMAND = (JOINT_COMMAND,)
 _PHASE_AND_COMMAND = (TASK_PHASE, JOINT_COMMAND)
-_MARGIN_S = 0.0002  # [s] before a deadline from which on nothing but the deadline is waited for
 _MOST_UNRECORDED_NS = 45_000_000  # [ns] of simulation time that may be lost with the recorder
 _TIMING_PERIOD_S = 1.0  # [s] of wall time
 
@@ -107,11 +106,12 @@ class PlantNode(GraphNode[PlantParameters]):
         gc.disable()  # a collection takes as long as ticks do; there is one of the young after each report
         try:
             while not stop.asked:
-                self.inputs.spin_once(executor, max(clock.wait_s() - _MARGIN_S, 0.0), self.awaited)
-                if self._command.stamp_ns == self._plant.stamp_ns or clock.wait_s() <= _MARGIN_S:
-                    clock.sleep()
+                left_s = clock.wait_s() - self.parameters.busy_wait
+                if left_s > 0.0:
+                    self.inputs.spin_once(executor, left_s, self.awaited)
+                    continue
+                self.inputs.poll()
                 if clock.due():
-                    self.inputs.poll()
                     self._tick_now()
         finally:
             gc.enable()

@@ -29,6 +29,13 @@ class PlantParameters:
         minimum=0.05,
         maximum=3600.0,
     )
+    busy_wait: float = parameter(
+        "real time: wall time before a deadline in which the processor is kept, so that the tick begins on "
+        "time; a sleep ends late by as much as the system is noisy",
+        unit="s",
+        minimum=0.0,
+        maximum=0.01,
+    )
 
     @property
     def grasp_tolerance(self) -> GraspTolerance:

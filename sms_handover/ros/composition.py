@@ -1,26 +1,59 @@
-"""Which processes a graph consists of, and the ROS arguments of each."""
+"""Which processes a graph consists of, and what each is started with."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 from sms_handover.ros.parameters import as_arguments
-from sms_handover.topics import CONTAINER, LOOP_NODES, RECORDER
+from sms_handover.simulation.parameters import LOCKSTEP
+from sms_handover.topics import CONTAINER, CONTROLLER, LOOP_NODES, PLANT, RECORDER
 
 Values = Mapping[str, object]
 
 
-def process_arguments(
-    common: Values, own: Mapping[str, Values], files: Sequence[str], *, record: bool, compose: bool
-) -> dict[str, list[str]]:
-    """Return the ROS arguments of every process of a graph.
+@dataclass(frozen=True)
+class ProcessArguments:
+    """What an executable of this package is started with: nodes to run, if it is the container, and ROS's."""
 
-    A process is a node, or with ``compose`` the container that runs all nodes of the loop. ``common``
-    are the parameters of every node, ``own`` those of single ones; both lie over the parameter files.
+    nodes: tuple[str, ...]
+    ros: tuple[str, ...]
+
+    @property
+    def line(self) -> tuple[str, ...]:
+        """All of them as on a command line."""
+        return (*self.nodes, "--ros-args", *self.ros)
+
+
+def nodes_together(mode: str) -> tuple[str, ...]:
+    """Return the nodes that are best run in one process in a mode.
+
+    In lock step no two nodes of the loop ever work at the same time. In real time the trajectory and
+    the inverse kinematics have twenty ticks for what may take longer than one, so they stay apart.
+    """
+    return LOOP_NODES if mode == LOCKSTEP else (PLANT, CONTROLLER)
+
+
+def process_arguments(
+    common: Values,
+    own: Mapping[str, Values],
+    files: Sequence[str],
+    *,
+    record: bool,
+    together: Collection[str],
+) -> dict[str, ProcessArguments]:
+    """Return the processes of a graph by executable, with their arguments.
+
+    A process is a node, or the container that runs the nodes of ``together``. ``common`` are the
+    parameters of every node, ``own`` those of single ones; both lie over the parameter files.
     """
     nodes = (*LOOP_NODES, RECORDER) if record else LOOP_NODES
     begin = [part for file in files for part in ("--params-file", file)]
     begin += as_arguments({**common, "peers": nodes})
-    arguments = {node: as_arguments(own.get(node, {}), node) for node in nodes}
-    if compose:
-        inside = [part for node in LOOP_NODES for part in arguments.pop(node)]
-        arguments = {CONTAINER: inside, **arguments}
-    return {process: begin + values for process, values in arguments.items()}
+    inside = tuple(node for node in nodes if node in together)
+    groups = {CONTAINER: inside} if inside else {}
+    groups.update({node: (node,) for node in nodes if node not in together})
+    processes = {}
+    for name, group in groups.items():
+        values = [part for node in group for part in as_arguments(own.get(node, {}), node)]
+        named = group if name == CONTAINER else ()
+        processes[name] = ProcessArguments(named, (*begin, *values))
+    return processes

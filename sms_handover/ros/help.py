@@ -58,9 +58,11 @@ def show_container_help(container: str, nodes: Iterable[str], does: str) -> None
     values = [(f"{node}:{name}", value) for node, own in examples.items() for name, value in own.items()]
     given = " ".join(f"-p {name}:={_shell(value)}" for name, value in values)
     parts = [
-        _usage(container, "-p [NODE:]NAME:=VALUE"),
+        _usage(f"{container} [NODE ...]", "-p [NODE:]NAME:=VALUE"),
         does,
-        _section("Nodes, each with a --help of its own:", (f"  {node}" for node in nodes)),
+        _section(
+            "Nodes, each with a --help of its own when it is run alone:", (f"  {node}" for node in nodes)
+        ),
         f"Example:\n  ros2 run sms_handover {container} --ros-args {given}\n"
         f"  ros2 launch sms_handover handover.launch.py compose:=true   # with a recorder",
         _EXIT_CODES,

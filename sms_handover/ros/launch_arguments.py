@@ -9,8 +9,9 @@ from typing import get_type_hints
 
 from sms_handover.errors import ConfigurationError
 from sms_handover.parameters import ParameterSpec, spec_of
-from sms_handover.ros.composition import process_arguments
+from sms_handover.ros.composition import ProcessArguments, nodes_together, process_arguments
 from sms_handover.ros.reference import COMMON_GROUP, OWN_GROUPS, ParameterGroup
+from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.topics import CONTROLLER, RECORDER, TRAJECTORY
 
 _EVERY_NODE = ""
@@ -56,8 +57,8 @@ ARGUMENTS = {
 }
 
 
-def launch_processes(given: Mapping[str, str], *, record: bool, compose: bool) -> dict[str, list[str]]:
-    """Return the processes to start, each with the ROS arguments that the launch arguments make.
+def launch_processes(given: Mapping[str, str], *, record: bool, compose: bool) -> dict[str, ProcessArguments]:
+    """Return the processes to start, each with the arguments that the launch arguments make.
 
     ``given`` may hold other launch arguments too; '' is one that was not given. Raises
     ConfigurationError on a number that is none.
@@ -68,8 +69,9 @@ def launch_processes(given: Mapping[str, str], *, record: bool, compose: bool) -
             of_node = values.setdefault(argument.node, {})
             of_node[argument.parameter] = _typed(argument, name, given[name])
     files = [given["params_file"]] if given.get("params_file") else []
+    together = nodes_together(given.get("mode") or LOCKSTEP) if compose else ()
     common = values.get(_EVERY_NODE, {})
-    return process_arguments(common, values, files, record=record, compose=compose)
+    return process_arguments(common, values, files, record=record, together=together)
 
 
 def _typed(argument: LaunchArgument, name: str, text: str) -> object:

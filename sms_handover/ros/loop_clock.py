@@ -3,7 +3,7 @@
 from array import array
 from dataclasses import dataclass, field
 from math import ceil, sqrt
-from time import monotonic, sleep
+from time import monotonic
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from sms_handover_interfaces.msg import LoopTiming
@@ -77,11 +77,6 @@ class LoopClock:
         if self._deadline is None:
             return _IDLE_S
         return min(max(self._deadline - monotonic(), 0.0), _IDLE_S)
-
-    def sleep(self) -> None:
-        """Sleep until the next deadline, if there is one and it is not further than a short while away."""
-        if self._deadline is not None:
-            sleep(self.wait_s())
 
     def due(self) -> bool:
         """Tell whether the deadline has come."""

@@ -14,9 +14,10 @@ import pytest
 
 from sms_handover.errors import ConfigurationError, GraphError
 from sms_handover.parameters import build, read_parameter_files
+from sms_handover.ros.composition import ProcessArguments
 from sms_handover.ros.launch_arguments import ARGUMENTS, launch_processes
 from sms_handover.share import config_file
-from sms_handover.topics import CONTAINER, LOOP_NODES, RECORDER
+from sms_handover.topics import CONTAINER, CONTROLLER, IK, LOOP_NODES, PLANT, RECORDER, TRAJECTORY
 
 from ..workspace import ROOT, executables
 
@@ -33,9 +34,9 @@ SAMPLES = {
 }
 
 
-def assigned(arguments: list[str]) -> list[str]:
+def assigned(arguments: ProcessArguments) -> list[str]:
     """Return the assignments behind ``-p``."""
-    return [value for flag, value in pairwise(arguments) if flag == "-p"]
+    return [value for flag, value in pairwise(arguments.ros) if flag == "-p"]
 
 
 def test_without_arguments_nodes_only_learn_their_peers() -> None:
@@ -49,7 +50,7 @@ def test_without_arguments_nodes_only_learn_their_peers() -> None:
 def test_without_a_recorder_nobody_waits_for_one() -> None:
     nodes = launch_processes({"bag": "mine"}, record=False, compose=False)
     assert list(nodes) == list(LOOP_NODES)
-    assert all(RECORDER not in " ".join(arguments) for arguments in nodes.values())
+    assert all(RECORDER not in " ".join(arguments.ros) for arguments in nodes.values())
 
 
 @pytest.mark.parametrize("name", list(ARGUMENTS))
@@ -59,7 +60,7 @@ def test_an_argument_reaches_its_nodes_and_no_other(name: str) -> None:
     reached = {
         node
         for node, arguments in nodes.items()
-        if any(f"-p {of}{argument.parameter}:=" in " ".join(arguments) for of in ("", f"{node}:"))
+        if any(f"-p {of}{argument.parameter}:=" in " ".join(arguments.ros) for of in ("", f"{node}:"))
     }
     assert reached == ({argument.node} if argument.node else set(nodes))
 
@@ -69,10 +70,17 @@ def test_a_container_gets_what_its_nodes_would_get() -> None:
     apart = launch_processes(given, record=True, compose=False)
     together = launch_processes(given, record=True, compose=True)
     assert list(together) == [CONTAINER, RECORDER]
+    assert together[CONTAINER].line[:5] == (*LOOP_NODES, "--ros-args")
     assert together[RECORDER] == apart[RECORDER]
     inside = {value for node in LOOP_NODES for value in assigned(apart[node])}
     assert set(assigned(together[CONTAINER])) == inside
     assert {"controller:law:='pid'", "trajectory:time_law:='quintic'", "duration:=5.0"} < inside
+
+
+def test_in_real_time_what_may_take_longer_than_a_tick_stays_apart() -> None:
+    processes = launch_processes({"mode": "realtime"}, record=True, compose=True)
+    assert list(processes) == [CONTAINER, TRAJECTORY, IK, RECORDER]
+    assert processes[CONTAINER].nodes == (PLANT, CONTROLLER)
 
 
 @pytest.mark.parametrize("name", list(ARGUMENTS))
@@ -89,9 +97,9 @@ def test_every_sample_is_a_value_of_its_parameter(name: str) -> None:
 
 def test_arguments_lie_over_the_parameter_file() -> None:
     nodes = launch_processes({"params_file": "mine.yaml", "controller": "pid"}, record=False, compose=False)
-    assert nodes["controller"][:2] == ["--params-file", "mine.yaml"]
-    assert nodes["controller"][-2:] == ["-p", "controller:law:='pid'"]
-    assert nodes["plant"][:2] == ["--params-file", "mine.yaml"]
+    assert nodes["controller"].ros[:2] == ("--params-file", "mine.yaml")
+    assert nodes["controller"].ros[-2:] == ("-p", "controller:law:='pid'")
+    assert nodes["plant"].ros[:2] == ("--params-file", "mine.yaml")
 
 
 def test_a_number_that_is_none_is_refused() -> None:
