@@ -30,8 +30,8 @@ from sms_handover.bag.recovery import Recovery
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.errors import BagError
 from sms_handover.ros.direct_inputs import DirectInputs
-from sms_handover.ros.main import LAUNCHER_PID
 from sms_handover.ros.message_types import message_class
+from sms_handover.ros.parent import LAUNCHER_PID
 from sms_handover.ros.qos import LOSSLESS
 from sms_handover.topics import BASE_ODOMETRY, JOINT_STATES
 from sms_handover.units import NS_PER_S

@@ -5,6 +5,8 @@ With a recorder it ends when the bag is complete. A node that fails ends it with
 node starts, and shows progress.
 """
 
+import os
+
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
 from launch.events.process import ProcessExited
@@ -12,6 +14,7 @@ from launch_ros.actions import Node
 
 from sms_handover.errors import GraphError
 from sms_handover.ros.launch_arguments import ARGUMENTS, launch_processes
+from sms_handover.ros.parent import LAUNCHER_PID
 from sms_handover.topics import CONTAINER
 
 PACKAGE = "sms_handover"
@@ -55,7 +58,11 @@ def start(context: LaunchContext) -> list[Node]:
             output="screen",
             arguments=list(arguments.nodes),
             ros_arguments=[*arguments.ros, "--log-level", given["log_level"]],
-            additional_env={"OPENBLAS_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"},
+            additional_env={
+                "OPENBLAS_NUM_THREADS": "1",
+                "PYTHONUNBUFFERED": "1",
+                LAUNCHER_PID: str(os.getpid()),  # the nodes end when this process is gone
+            },
             on_exit=end,
         )
         for name, arguments in launch_processes(given, record=record, compose=compose).items()

@@ -10,7 +10,7 @@ from pathlib import Path
 from time import monotonic
 from types import TracebackType
 
-from sms_handover.ros.main import LAUNCHER_PID
+from sms_handover.ros.parent import LAUNCHER_PID
 
 _GRACE_S = 10.0  # [s] of wall time a process gets to end after a signal
 _LAST_LINES = 12  # of a log shown when its process died

@@ -1,6 +1,7 @@
 """Runs one node as a process: start, spin, orderly end, and one line of text for every error."""
 
 import atexit
+import faulthandler
 import gc
 import os
 import signal
@@ -16,29 +17,34 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from sms_handover.errors import ConfigurationError, SmsHandoverError
+from sms_handover.ros.parent import launcher_of_this_process, wake_when_parent_ends
 from sms_handover.share import config_file
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
 EXIT_LOSS = 3  # the recorder: the bag is whole, but messages are missing in it
 EXIT_STOPPED = 130  # the recorder: the bag is whole, but the run was not over when a signal came
 
-LAUNCHER_PID = "SMS_HANDOVER_LAUNCHER_PID"  # environment variable, set for the nodes that a launcher starts
-
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 _FAST_DDS_FILE = "FASTRTPS_DEFAULT_PROFILES_FILE"  # environment variable that Fast DDS reads
 
 WAIT_S = 0.2  # [s] longest wait for an event, so that a signal is noticed
 
+_TEARDOWN_S = 15.0  # [s] of wall time for the middleware to let go; less than a launcher waits
+_STANDARD_ERROR = 2  # file descriptor, whatever stands in for the stream
+
 
 class Stop:
-    """Asked for by SIGINT, SIGTERM or SIGHUP, and when the launcher that started this process is gone."""
+    """Asked for by a signal that ends things, and when the launcher that started this process is gone."""
 
     def __init__(self) -> None:
-        """Install the handlers."""
+        """Install the handlers; a hang-up that is ignored, as under nohup(1), stays ignored."""
         self._signalled = False
-        self._launcher = int(os.environ.get(LAUNCHER_PID, "0"))
+        self._launcher = launcher_of_this_process()
+        if self._launcher:
+            wake_when_parent_ends()
         for number in _SIGNALS:
-            signal.signal(number, self._on_signal)
+            if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, self._on_signal)
 
     @property
     def asked(self) -> bool:
@@ -118,9 +124,20 @@ def run_nodes(makes: Sequence[Callable[[], RunnableNode]], arguments: list[str],
         _tell(name, error)
         return EXIT_FAILED
     finally:
-        for node in nodes:
-            node.destroy_node()
-        rclpy.try_shutdown()
+        _tear_down(nodes)
+
+
+def _tear_down(nodes: Sequence[RunnableNode]) -> None:
+    """Let go of the middleware; if it hangs, write to the log where, and exit with 1.
+
+    The watch is a thread of faulthandler's, which needs neither the interpreter nor any lock, so that
+    not even a deadlock leaves a process behind when the launcher is gone.
+    """
+    faulthandler.dump_traceback_later(_TEARDOWN_S, exit=True, file=_STANDARD_ERROR)
+    for node in nodes:
+        node.destroy_node()
+    rclpy.try_shutdown()
+    faulthandler.cancel_dump_traceback_later()
 
 
 def _tell(name: str, error: SmsHandoverError) -> None:

@@ -3,6 +3,7 @@
 No wheel carries ``launch`` and ``launch_ros``; docs/ros2.md tells what was tried with the real ones.
 """
 
+import os
 import runpy
 import sys
 from itertools import pairwise
@@ -16,6 +17,7 @@ from sms_handover.errors import ConfigurationError, GraphError
 from sms_handover.parameters import build, read_parameter_files
 from sms_handover.ros.composition import ProcessArguments
 from sms_handover.ros.launch_arguments import ARGUMENTS, launch_processes
+from sms_handover.ros.parent import LAUNCHER_PID
 from sms_handover.share import config_file
 from sms_handover.topics import CONTAINER, CONTROLLER, IK, LOOP_NODES, PLANT, RECORDER, TRAJECTORY
 
@@ -141,6 +143,7 @@ def test_the_launch_file_declares_every_argument_and_starts_every_node(launch_fi
     nodes = start(SimpleNamespace(launch_configurations={**declared, "controller": "pid"}))
     assert [node.executable for node in nodes] == [*LOOP_NODES, RECORDER]
     assert {node.executable for node in nodes} <= set(executables())
+    assert all(node.additional_env[LAUNCHER_PID] == str(os.getpid()) for node in nodes)
     assert all("controller:law:='pid'" in node.ros_arguments for node in nodes if node.name == "controller")
     without = start(SimpleNamespace(launch_configurations={**declared, "record": "false"}))
     assert [node.name for node in without] == list(LOOP_NODES)

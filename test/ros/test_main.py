@@ -13,13 +13,14 @@ from rclpy.executors import Executor
 
 from sms_handover.errors import BagError, ConfigurationError, GraphError
 from sms_handover.nodes import controller, ik, plant, recorder, trajectory
-from sms_handover.ros.main import EXIT_FAILED, EXIT_OK, EXIT_USAGE, LAUNCHER_PID, RunnableNode, Stop, run_node
+from sms_handover.ros.main import EXIT_FAILED, EXIT_OK, EXIT_USAGE, RunnableNode, Stop, run_node
+from sms_handover.ros.parent import LAUNCHER_PID
 
 from .bench import Bench
 
 pytestmark = pytest.mark.ros
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 MAINS = {
     module.__name__.rsplit(".", 1)[1]: module.main for module in (plant, trajectory, ik, controller, recorder)
 }
@@ -187,6 +188,29 @@ def test_a_signal_on_the_way_out_keeps_the_exit_code() -> None:
         while process.poll() is None:
             process.send_signal(signal.SIGINT)
         assert process.returncode == 3
+
+
+HANGING = """
+from sms_handover.ros import main
+from sms_handover.ros.main import RunnableNode, run_node
+
+class Worker(RunnableNode):
+    def run(self, executor, stop):
+        return 0
+
+    def destroy_node(self):
+        while True:
+            pass
+
+main._TEARDOWN_S = 0.2
+raise SystemExit(run_node(lambda: Worker("worker"), ["worker"]))
+"""
+
+
+def test_a_node_that_hangs_at_its_end_tells_where_and_ends() -> None:
+    done = subprocess.run([sys.executable, "-c", HANGING], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "in destroy_node" in done.stderr
 
 
 @pytest.mark.parametrize("name", list(MAINS))

@@ -11,7 +11,7 @@ from pathlib import Path
 from select import select
 from time import monotonic
 
-from sms_handover.ros.main import LAUNCHER_PID
+from sms_handover.ros.parent import LAUNCHER_PID
 
 DEADLINE_S = 180.0  # s of wall time after which something that hangs has failed; nothing is measured by it
 
