@@ -24,6 +24,11 @@ class Trial:
     mark: str
     own_mounts: bool
 
+    @property
+    def is_root(self) -> bool:
+        """Tell whether permissions do not hold for this process."""
+        return os.geteuid() == 0
+
     def environment(self, more: Mapping[str, str] | None = None) -> dict[str, str]:
         """Return the environment of a process of this trial."""
         return {**os.environ, MARK: self.mark, "ROS_DOMAIN_ID": str(self.domain), **(more or {})}
