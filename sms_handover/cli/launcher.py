@@ -56,6 +56,7 @@ class Outcome:
     events: tuple[GraspEvent, ...]
     run_events: tuple[RunEvent, ...]
     recorder_code: int
+    recorder_said: str
     interrupted: bool
 
 
@@ -135,6 +136,7 @@ class _Watch:
             events=tuple(progress.events),
             run_events=tuple(progress.run_events),
             recorder_code=code,
+            recorder_said=self._processes.text_of(RECORDER) if self._plan.bag else "",
             interrupted=self._interrupts > 0,
         )
 

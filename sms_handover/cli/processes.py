@@ -10,10 +10,10 @@ from pathlib import Path
 from time import monotonic
 from types import TracebackType
 
+from sms_handover.cli.node_log import NodeLog
 from sms_handover.ros.parent import LAUNCHER_PID
 
 _GRACE_S = 10.0  # [s] of wall time a process gets to end after a signal
-_LAST_LINES = 12  # of a log shown when its process died
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,7 @@ class NodeProcesses:
         self._folder = log_folder
         self._environment = {**os.environ, **environment, LAUNCHER_PID: str(os.getpid())}
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._logs: dict[str, NodeLog] = {}
 
     def __enter__(self) -> "NodeProcesses":
         """Return the processes."""
@@ -46,23 +47,25 @@ class NodeProcesses:
     ) -> None:
         """End every process that is still there."""
         self.end()
+        for log in self._logs.values():
+            log.close()
 
     def start(self, node: str, arguments: Sequence[str]) -> None:
-        """Start the executable of a node, or the container, with its arguments."""
+        """Start the executable of a node, or the container; raises GraphError if its log cannot be written."""
         command = [sys.executable, "-m", f"sms_handover.nodes.{node}", *arguments]
-        with self.log_of(node).open("wb") as log:
-            self._processes[node] = subprocess.Popen(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                env=self._environment,
-                start_new_session=True,
-            )
+        log = self._logs[node] = NodeLog(self._folder / f"{node}.log")
+        self._processes[node] = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=log.stream,
+            stderr=subprocess.STDOUT,
+            env=self._environment,
+            start_new_session=True,
+        )
 
-    def log_of(self, node: str) -> Path:
-        """Return where a node's output goes."""
-        return self._folder / f"{node}.log"
+    def text_of(self, node: str) -> str:
+        """Return what a node has printed so far."""
+        return self._logs[node].text
 
     def exit_code(self, node: str) -> int | None:
         """Return the exit code of a node that has ended, else None."""
@@ -71,7 +74,9 @@ class NodeProcesses:
     def dead(self) -> list[Death]:
         """Return the processes that have ended by themselves."""
         codes = {name: process.poll() for name, process in self._processes.items()}
-        return [Death(name, code, self._tail(name)) for name, code in codes.items() if code is not None]
+        return [
+            Death(name, code, self._logs[name].last_lines) for name, code in codes.items() if code is not None
+        ]
 
     def end(self) -> None:
         """End every process: ask by SIGINT, then SIGTERM, then kill, and wait for each."""
@@ -85,11 +90,3 @@ class NodeProcesses:
                     process.wait(max(deadline - monotonic(), 0.01))
                 except subprocess.TimeoutExpired:
                     break
-
-    def _tail(self, name: str) -> str:
-        """Return the last lines of a node's log."""
-        try:
-            lines = self.log_of(name).read_text(encoding="utf-8", errors="replace").splitlines()
-        except OSError:
-            return ""
-        return "\n".join(lines[-_LAST_LINES:])

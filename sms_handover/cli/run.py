@@ -73,8 +73,7 @@ def command(options: Namespace) -> int:
         )
         print(f"running on ROS domain {domain}, this machine only; output in {options.output or output}")
         outcome = launch(plan)
-    if plan.bag:
-        print((plan.log_folder / "recorder.log").read_text(encoding="utf-8"), end="")
+    print(outcome.recorder_said, end="")
     if told := graver_in_words(outcome.run_events):
         print(f"the nodes told of {told}, see above")
     print(f"{outcome.detail} at {outcome.stamp_ns / 1e9:g} s of simulated time")

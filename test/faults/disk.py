@@ -100,7 +100,8 @@ def ends_full(reason: str, trial: Trial, seen: tuple[Ended, int]) -> Kept:
     ended, published_ns = seen
     exit_code(ended, 1)
     require("Traceback" not in ended.err, "a traceback")
-    require(reason in ended.err, f"{reason!r} is not said: {ended.err[-300:]}")
+    said = reason in ended.err or (_NO_LOG in ended.err and reason == _FULL)
+    require(said, f"{reason!r} is not said: {ended.err[-300:]}")
     path = readable(trial, trial.folder / "small" / "run" / "bag")
     lost = lost_since(path, published_ns, bound_ms=_BOUND_MS) if published_ns >= 0 else Loss()
     return Kept(ended.code, lost)
@@ -247,6 +248,7 @@ def _own_disk(trial: Trial) -> Path:
 
 
 _FULL = "No space left on device"
+_NO_LOG = "is full, so its log may be cut short"  # where the log of the recorder had no room for the reason
 _SHORT = ("--duration", "8")  # [s] of the shipped schedule: enough to be in the middle of it
 
 FAULTS = (
