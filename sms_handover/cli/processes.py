@@ -51,7 +51,7 @@ class NodeProcesses:
             log.close()
 
     def start(self, node: str, arguments: Sequence[str]) -> None:
-        """Start the executable of a node, or the container; raises GraphError if its log cannot be written."""
+        """Start a node, or the container; raises GraphError if its log cannot be written."""
         command = [sys.executable, "-m", f"sms_handover.nodes.{node}", *arguments]
         log = self._logs[node] = NodeLog(self._folder / f"{node}.log")
         self._processes[node] = subprocess.Popen(
