@@ -20,6 +20,7 @@ from sms_handover.cli.processes import Death, NodeProcesses
 from sms_handover.errors import GraphError
 from sms_handover.events import RunEvent
 from sms_handover.ros.composition import ProcessArguments, nodes_together, process_arguments
+from sms_handover.ros.graph_node import INPUTS
 from sms_handover.ros.main import EXIT_LOSS, EXIT_OK
 from sms_handover.ros.monitor import RunMonitor
 from sms_handover.simulation.scenario import COMMON, Scenario
@@ -66,13 +67,15 @@ def launch(plan: LaunchPlan) -> Outcome:
     rclpy.init(domain_id=plan.domain, signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = Node("launcher", start_parameter_services=False, enable_rosout=False)
+        inputs = INPUTS[plan.scenario.parameters.common.transport](node)
+        monitor = RunMonitor(node, plan.scenario.robot.arms, inputs)
         executor = EventsExecutor()
         executor.add_node(node)
-        monitor = RunMonitor(node, plan.scenario.robot.arms)
         with NodeProcesses(plan.log_folder, environment) as processes:
             for name, arguments in arguments_of(plan).items():
                 processes.start(name, arguments.line)
             outcome = _Watch(plan, monitor, executor, processes).to_the_end()
+        inputs.destroy()
         node.destroy_node()
         return outcome
     finally:
@@ -200,6 +203,7 @@ class _Watch:
     def _look(self) -> None:
         """Handle what has come, and raise GraphError if a node has died."""
         self._executor.spin_once(timeout_sec=_POLL_S)
+        self._monitor.look()
         for death in self._processes.dead():
             if not self._recorder_is_done(death):
                 raise GraphError(_obituary(death))

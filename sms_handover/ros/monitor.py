@@ -1,6 +1,6 @@
 """The launcher's ear on a running graph: how far it is, what was grasped, what it waits for."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -10,6 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from rclpy.node import Node
 from rclpy.qos import QoSHistoryPolicy, QoSProfile, QoSReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
 from sms_handover_interfaces.msg import PublishedCounts, RunState, TaskPhase
 from sms_handover_interfaces.msg import RunEvent as RunEventMessage
@@ -17,6 +18,7 @@ from std_srvs.srv import Trigger
 
 from sms_handover.bag.decode import grasp_event, header_ns, run_event
 from sms_handover.events import RunEvent
+from sms_handover.ros.inputs import Inputs
 from sms_handover.ros.qos import LATCHED
 from sms_handover.topics import (
     DIAGNOSTICS,
@@ -31,9 +33,7 @@ from sms_handover.topics import (
 )
 from sms_handover.types import GraspEvent
 
-_NEWEST = QoSProfile(
-    history=QoSHistoryPolicy.KEEP_LAST, depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT
-)  # a display must never hold the loop back
+_EVERY_NODE = 16  # [messages] of which the newest may not push out those of other nodes
 
 
 @dataclass
@@ -56,11 +56,17 @@ class Progress:
 
 
 class RunMonitor:
-    """Listens to a graph without taking part in it."""
+    """Listens to a graph without taking part in it.
 
-    def __init__(self, node: Node, arms: tuple[str, ...]) -> None:
+    What decides comes by the executor of the node. What comes every reference period is for show, so
+    it is taken by ``inputs`` when :meth:`look` is called, and only the newest: a display that handled
+    each message would keep a processor from the loop.
+    """
+
+    def __init__(self, node: Node, arms: tuple[str, ...], inputs: Inputs) -> None:
         """Subscribe to what tells the progress of the run."""
         self.progress = Progress()
+        self._inputs = inputs
         self._targets: dict[str, PoseStamped] = {}
         self._published: dict[str, dict[str, int]] = {}
         self._finish = node.create_client(Trigger, f"{PLANT}/finish")
@@ -68,12 +74,26 @@ class RunMonitor:
         node.create_subscription(GraspEventMessage, GRASP_EVENT, self._on_event, LATCHED)
         node.create_subscription(RunEventMessage, RUN_EVENTS, self._on_run_event, LATCHED)
         node.create_subscription(PublishedCounts, RUN_PUBLISHED, self._on_counts, LATCHED)
-        node.create_subscription(TaskPhase, TASK_PHASE, self._on_phase, _NEWEST)
-        node.create_subscription(DiagnosticArray, DIAGNOSTICS, self._on_diagnostics, _NEWEST)
+        self._show(TaskPhase, TASK_PHASE, self._on_phase)
+        self._show(DiagnosticArray, DIAGNOSTICS, self._on_diagnostics, depth=_EVERY_NODE)
         for arm in arms:
-            target, tool = partial(self._on_target, arm), partial(self._on_tool, arm)
-            node.create_subscription(PoseStamped, target_pose(arm), target, _NEWEST)
-            node.create_subscription(PoseStamped, tool_pose(arm), tool, _NEWEST)
+            self._show(PoseStamped, target_pose(arm), partial(self._on_target, arm))
+            self._show(PoseStamped, tool_pose(arm), partial(self._on_tool, arm))
+
+    def look(self) -> None:
+        """Take the newest of what is only for show."""
+        self._inputs.poll()
+
+    def _show(self, kind: Any, topic: str, show: Callable[[Any], None], *, depth: int = 1) -> None:
+        """Hand the newest messages of a topic to ``show``."""
+        profile = QoSProfile(
+            history=QoSHistoryPolicy.KEEP_LAST, depth=depth, reliability=QoSReliabilityPolicy.BEST_EFFORT
+        )  # a display must never hold the loop back
+
+        def receive(data: bytes, sent_ns: int) -> None:
+            show(deserialize_message(data, kind))
+
+        self._inputs.subscribe(kind, topic, profile, receive)
 
     @property
     def finished(self) -> bool:

@@ -1,6 +1,6 @@
 """The launcher's ear: progress, grasp events, who waits for whom, and the request to finish."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,8 @@ from std_srvs.srv import Trigger
 
 from sms_handover.events import RunEvent, Severity
 from sms_handover.ros.convert import event_message, header, phase_message, pose_stamped, run_event_message
+from sms_handover.ros.graph_node import INPUTS
+from sms_handover.ros.inputs import ExecutorInputs, Inputs
 from sms_handover.ros.monitor import RunMonitor
 from sms_handover.ros.qos import LATCHED, LOSSLESS
 from sms_handover.topics import (
@@ -40,12 +42,15 @@ LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
 class FakeGraph:
     """A node named plant that says whatever it is told to, and a monitor that listens."""
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: Bench, inputs: Callable[[Node], Inputs]) -> None:
         """Start ROS and match what is volatile."""
         bench.start()
         self.bench = bench
         self.node: Node = bench.plain("plant")
-        self.monitor = RunMonitor(bench.plain("launcher"), ("arm_a", "arm_b"))
+        launcher = bench.loose("launcher")
+        self._inputs = inputs(launcher)
+        self.monitor = RunMonitor(launcher, ("arm_a", "arm_b"), self._inputs)
+        bench.spin(launcher)
         self.publishers: dict[str, Publisher] = {}
 
     def say(self, topic: str, message: Any) -> None:
@@ -63,18 +68,25 @@ class FakeGraph:
         def heard() -> object:
             for topic, message in said:
                 self.say(topic, message)
+            self.monitor.look()
             return condition()
 
         self.bench.until(heard, what)
+
+    def destroy(self) -> None:
+        """Give back to the middleware what no node knows of."""
+        self._inputs.destroy()
 
     def state(self, state: int, stamp_ns: int, detail: str = "") -> None:
         """Say in which state the run is."""
         self.say(RUN_STATE, RunState(header=header(stamp_ns), state=state, detail=detail))
 
 
-@pytest.fixture
-def graph(bench: Bench) -> FakeGraph:
-    return FakeGraph(bench)
+@pytest.fixture(params=list(INPUTS))
+def graph(request: pytest.FixtureRequest, bench: Bench) -> Iterator[FakeGraph]:
+    graph = FakeGraph(bench, INPUTS[request.param])
+    yield graph
+    graph.destroy()
 
 
 def test_progress_is_followed(graph: FakeGraph) -> None:
@@ -218,5 +230,6 @@ def test_late_listeners_hear_what_was_said(bench: Bench) -> None:
     plant = bench.plain("plant")
     plant.create_publisher(RunState, RUN_STATE, LATCHED).publish(RunState(state=RunState.FINISHED))
     plant.create_publisher(GraspEventMessage, GRASP_EVENT, LATCHED).publish(GraspEventMessage())
-    monitor = RunMonitor(bench.plain("launcher"), ("arm_a",))
+    launcher = bench.plain("launcher")
+    monitor = RunMonitor(launcher, ("arm_a",), ExecutorInputs(launcher))
     bench.until(lambda: monitor.finished and monitor.progress.events, "what was said before")
