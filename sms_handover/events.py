@@ -11,6 +11,12 @@ from math import isnan, nan
 
 from sms_handover.units import ns_to_seconds
 
+COMMAND_LOST, TORQUE_ZERO, COMMAND_BACK = "command_lost", "torque_zero", "command_back"
+REFERENCE_LOST, REFERENCE_BACK = "reference_lost", "reference_back"
+NO_ANSWER = "no_answer"
+GRASP_MISSED, PHASE_RETRIED, GRASP_FAILED = "grasp_missed", "phase_retried", "grasp_failed"
+IK_FAILED = "ik_failed"
+
 
 class Severity(Enum):
     """How grave an event is; the value is what a user reads."""

@@ -6,7 +6,7 @@ value that went over DDS and one that did not are equal bit for bit.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 from types import MappingProxyType
@@ -246,14 +246,38 @@ class GraspEvent:
     detail: str
 
 
+class PhaseState(Enum):
+    """Whether a phase is carried out, or given up with the joints held where they were."""
+
+    ACTIVE = "active"
+    FAILED = "failed"
+
+
 @dataclass(frozen=True)
 class TaskPhase:
-    """The phase of the schedule in force at ``stamp_ns`` and the grasp commands due at that instant."""
+    """The phase of the schedule in force at ``stamp_ns`` and the grasp commands due at that instant.
+
+    ``attempt`` is 1 the first time, and one more whenever the phase is done again. ``end_ns`` is when
+    the task ends if nothing else happens; 0 where that is not told.
+    """
 
     stamp_ns: int
     index: int
     name: str
     commands: tuple[GraspCommand, ...] = ()
+    state: PhaseState = PhaseState.ACTIVE
+    attempt: int = 1
+    end_ns: int = field(default=0, repr=False)  # recordings of older versions do not tell it
+
+    @property
+    def failed(self) -> bool:
+        """Tell whether the phase has been given up."""
+        return self.state is PhaseState.FAILED
+
+    @property
+    def entry(self) -> tuple[int, int, PhaseState]:
+        """Return what differs from the period before where a phase begins, begins again or is given up."""
+        return self.index, self.attempt, self.state
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,13 +1,15 @@
 """Decoded messages as the values of the core; used for the topics that are not worth a fast path."""
 
+from dataclasses import replace
 from typing import Any
 
 from sms_handover.events import RunEvent, Severity
-from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, TaskPhase
+from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, PhaseState, TaskPhase
 from sms_handover.units import NS_PER_S
 
 _ACTIONS = (GraspAction.GRASP, GraspAction.RELEASE, GraspAction.TRANSFER)  # by number in the message
 _STATUSES = (GraspStatus.SUCCEEDED, GraspStatus.MISSED, GraspStatus.REJECTED)
+_PHASE_STATES = (PhaseState.ACTIVE, PhaseState.FAILED)
 _SEVERITIES = (Severity.INFO, Severity.WARNING, Severity.ERROR)
 
 
@@ -34,13 +36,22 @@ def status_values(message: Any) -> tuple[float, ...]:
 
 def header_ns(message: Any) -> int:
     """Return the stamp in the header of a message."""
-    return int(message.header.stamp.sec) * NS_PER_S + int(message.header.stamp.nanosec)
+    return time_ns(message.header.stamp)
+
+
+def time_ns(message: Any) -> int:
+    """Return a Time message in ns."""
+    return int(message.sec) * NS_PER_S + int(message.nanosec)
 
 
 def task_phase(message: Any) -> TaskPhase:
     """Return a TaskPhase message as its value."""
     commands = tuple(grasp_command(command) for command in message.commands)
-    return TaskPhase(header_ns(message), int(message.index), message.name, commands)
+    phase = TaskPhase(header_ns(message), int(message.index), message.name, commands)
+    if not hasattr(message, "state"):
+        return phase  # recorded before phases could fail
+    state, attempt = _PHASE_STATES[message.state], int(message.attempt)
+    return replace(phase, state=state, attempt=attempt, end_ns=time_ns(message.end))
 
 
 def grasp_command(message: Any) -> GraspCommand:

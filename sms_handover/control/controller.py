@@ -14,7 +14,7 @@ from sms_handover.control.stability import LoopStability, loop_stability
 from sms_handover.errors import UnstableLoopError
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.types import Array, JointCommand, JointReference, RobotState, TaskPhase, frozen
+from sms_handover.types import Array, JointCommand, JointReference, PhaseState, RobotState, TaskPhase, frozen
 from sms_handover.units import ns_to_seconds
 
 Gains = NmpcGains | PidGains
@@ -36,14 +36,14 @@ class JointController:
         self._dt = ns_to_seconds(tick_ns)
         self._law = make_law(robot, self._gains_by_phase[0])
         self._track = ReferenceTrack()
-        self._phase = 0
+        self._entry = (0, 1, PhaseState.ACTIVE)
         check_stability(robot, self._gains_by_phase, self._dt, base_configuration)
 
     def reset(self) -> None:
         """Go back to the start of the run."""
         self._law = make_law(self._robot, self._gains_by_phase[0])
         self._track.reset()
-        self._phase = 0
+        self._entry = (0, 1, PhaseState.ACTIVE)
 
     def guide(self, guidance: Guidance) -> None:
         """Take over the gains of the phase and the joint reference; these laws follow joints, not tools."""
@@ -51,9 +51,9 @@ class JointController:
         self.track(guidance.reference)
 
     def enter(self, phase: TaskPhase) -> None:
-        """Take over the gains of a phase, if it is a new one."""
-        if phase.index != self._phase:
-            self._phase = phase.index
+        """Take over the gains of a phase, if it begins, begins again or is given up."""
+        if phase.entry != self._entry:
+            self._entry = phase.entry
             self._law.use(self._gains_by_phase[phase.index])
             self._track.restart()
 

@@ -29,6 +29,7 @@ from sms_handover.types import (
     GraspStatus,
     IkResult,
     IkStatus,
+    PhaseState,
     Pose,
     TaskPhase,
 )
@@ -50,6 +51,10 @@ _IK_STATUS = {
     IkStatus.ITERATION_LIMIT: IkStatusMessage.ITERATION_LIMIT,
 }
 
+_PHASE_STATE = {
+    PhaseState.ACTIVE: TaskPhaseMessage.ACTIVE,
+    PhaseState.FAILED: TaskPhaseMessage.FAILED,
+}
 _SEVERITY = {
     Severity.INFO: RunEventMessage.INFO,
     Severity.WARNING: RunEventMessage.WARNING,
@@ -124,6 +129,9 @@ def phase_message(phase: TaskPhase) -> TaskPhaseMessage:
         index=phase.index,
         name=phase.name,
         commands=[_command_message(command) for command in phase.commands],
+        state=_PHASE_STATE[phase.state],
+        attempt=phase.attempt,
+        end=time_message(phase.end_ns),
     )
 
 

@@ -65,10 +65,10 @@ class CommonParameters:
         """The reference period in ns."""
         return seconds_to_ns(self.reference_period)
 
-    def last_tick(self, schedule_end_ns: int) -> int:
-        """Return the number of ticks that the run integrates."""
-        end_ns = seconds_to_ns(self.duration) if self.duration > 0.0 else schedule_end_ns
-        return end_ns // self.tick_ns
+    def last_tick(self, task_end_ns: int, *, failed: bool = False) -> int:
+        """Return the number of ticks that the run integrates; a task that has failed ends it early."""
+        end_ns = seconds_to_ns(self.duration) if self.duration > 0.0 else task_end_ns
+        return (min(end_ns, task_end_ns) if failed else end_ns) // self.tick_ns
 
     @property
     def ticks_per_reference(self) -> int:

@@ -1,9 +1,12 @@
 """Collects the rows of a run while it happens and gives them back as arrays."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
+from sms_handover.events import RunEvent
 from sms_handover.model.conserved import PhysicsReceipt
 from sms_handover.model.poses import pose_row
 from sms_handover.run_data import RunData
@@ -18,6 +21,8 @@ from sms_handover.types import (
     Pose,
     TaskPhase,
 )
+
+N = TypeVar("N", bound=np.generic)
 
 IK_STATUS_NUMBER: Mapping[IkStatus, int] = {status: number for number, status in enumerate(IkStatus)}
 
@@ -42,8 +47,17 @@ class RunRecorder:
         self._ik_status = np.full(periods, -1, dtype=np.int64)
         self._phases: list[TaskPhase] = []
         self._events: list[GraspEvent] = []
+        self._decisions: list[RunEvent] = []
         self._tick = 0
         self._period = 0
+
+    def make_room(self, ticks: int, periods: int) -> None:
+        """Make room for as many states and references in all, if there is less."""
+        for name in ("_tick_ns", "_q", "_v", "_effort", "_command"):
+            setattr(self, name, _longer(getattr(self, name), ticks, 0))
+        for name in ("_reference_ns", "_deputy", "_receipts", "_ik_status"):
+            setattr(self, name, _longer(getattr(self, name), periods, 0))
+        self._reference, self._poses = _longer(self._reference, periods, 1), _longer(self._poses, periods, 2)
 
     def tick(self, stamp_ns: int, q: Array, v: Array, effort: Array, command: Array) -> None:
         """Add the row of one tick: state, the efforts (n,) that led to it, and those that answer it."""
@@ -86,9 +100,13 @@ class RunRecorder:
         self._receipts[row, 3:6] = receipt.angular_momentum
         self._receipts[row, 6:] = receipt.kinetic_energy, work
 
-    def events(self, events: tuple[GraspEvent, ...]) -> None:
+    def events(self, events: Iterable[GraspEvent]) -> None:
         """Add grasp events."""
         self._events.extend(events)
+
+    def decisions(self, events: Iterable[RunEvent]) -> None:
+        """Add what has been decided about the task."""
+        self._decisions.extend(events)
 
     def data(self) -> RunData:
         """Return what has been collected so far."""
@@ -120,4 +138,11 @@ class RunRecorder:
             ik_status=self._ik_status[periods].copy(),
             phases=tuple(self._phases),
             grasp_events=tuple(self._events),
+            run_events=tuple(self._decisions),
         )
+
+
+def _longer(array: npt.NDArray[N], size: int, axis: int) -> npt.NDArray[N]:
+    """Return an array that has at least ``size`` rows along an axis; new ones are -1, no status of IK."""
+    missing = [(0, max(size - length, 0) if place == axis else 0) for place, length in enumerate(array.shape)]
+    return np.pad(array, missing, constant_values=array.dtype.type(-1)) if size > array.shape[axis] else array

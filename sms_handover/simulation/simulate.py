@@ -9,7 +9,7 @@ from sms_handover.simulation.recorder import RunRecorder
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.wiring import make_controller, make_plant
 from sms_handover.trajectory.generator import TrajectoryGenerator
-from sms_handover.types import TaskPhase
+from sms_handover.types import IkStatus, TaskPhase
 
 Progress = Callable[[int, TaskPhase], None]
 
@@ -24,7 +24,8 @@ def simulate(
 
     Per tick: the plant gives its state; each reference period the trajectory generator gives phase,
     targets and, through inverse kinematics, the joint reference; the controller answers; the plant
-    carries out grasp commands and integrates. The last state is answered too, but not integrated.
+    carries out grasp commands and integrates. The last state is answered too, but not integrated. What
+    came of a grasp or of inverse kinematics the generator takes into account in the next period.
     ``controller`` takes the place of the one that the scenario names; it is reset first. Raises
     ControllerError if its efforts are no numbers. ``progress`` is called with the time in ns and the
     phase each reference period.
@@ -43,7 +44,8 @@ def simulate(
     last_tick = common.last_tick(schedule.end_ns)
     periods = last_tick // common.ticks_per_reference + 1
     recorder = RunRecorder(robot.joint_names, robot.arms, last_tick + 1, periods)
-    for tick in range(last_tick + 1):
+    tick = 0
+    while tick <= last_tick:
         stamp_ns = plant.stamp_ns
         if tick % common.ticks_per_reference == 0:
             state = plant.state
@@ -56,11 +58,19 @@ def simulate(
             reference, targets_in_world = generator.reference(state, targets, joints)
             recorder.reference(phase, reference, targets_in_world, solution)
             law.guide(Guidance(phase, reference, targets_in_world))
-            recorder.events(plant.execute(phase.commands))
+            events = plant.execute(phase.commands)
+            generator.grasped(events)
+            if solution:
+                generator.solved(converged=solution.status is IkStatus.CONVERGED)
+            recorder.events(events)
+            recorder.decisions(generator.take_decisions())
+            last_tick = common.last_tick(phase.end_ns, failed=phase.failed)
+            recorder.make_room(last_tick + 1, last_tick // common.ticks_per_reference + 1)
             if progress:
                 progress(stamp_ns, phase)
         effort = law.effort(stamp_ns, plant.q, plant.v)
         recorder.tick(stamp_ns, plant.q, plant.v, plant.joint_effort, effort)
         if tick < last_tick:
             plant.apply(effort)
+        tick += 1
     return recorder.data()

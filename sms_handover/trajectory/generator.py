@@ -1,11 +1,12 @@
 """The trajectory generator: from the schedule and the present state to targets and joint reference."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 
+from sms_handover.events import RunEvent
 from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.model.reduced import generalized_jacobian
 from sms_handover.model.robot_model import RobotModel
@@ -15,13 +16,14 @@ from sms_handover.trajectory.schedule import (
     DeputyDescription,
     GraspFrameTarget,
     JointTarget,
-    Phase,
     Schedule,
     ToolTarget,
 )
+from sms_handover.trajectory.task_progress import Stage, TaskProgress
 from sms_handover.trajectory.time_law import TIME_LAWS, Progress
 from sms_handover.types import (
     Array,
+    GraspEvent,
     IkRequest,
     JointReference,
     Pose,
@@ -65,27 +67,41 @@ class TrajectoryGenerator:
         """Set up at the start of the schedule."""
         self._robot = robot
         self._schedule = schedule
+        self._progress = TaskProgress(schedule, parameters)
         self._time_law = TIME_LAWS[parameters.time_law]
         self._damping = parameters.jacobian_damping
         self.reset()
 
     def reset(self) -> None:
         """Go back to the start of the schedule."""
-        self._index = -1
+        self._progress.reset()
         self._joints_at_start: Array = np.zeros(self._robot.n_joints)
         self._tools_at_start: Mapping[str, Pose] = {}
 
     def targets(self, state: RobotState, deputy_in_world: Pose) -> tuple[TaskPhase, Targets]:
         """Return the phase in force and the targets of the arms; enters a new phase when it is due."""
-        index = self._schedule.phase_index(state.stamp_ns)
-        phase = self._schedule.phases[index]
-        entered = index != self._index
-        if entered:
-            self._index = index
+        stage = self._progress.at(state.stamp_ns)
+        if stage.begins:
             self._joints_at_start = state.joint_position
             self._tools_at_start = self._robot.tools_at(state.q)
-        task = TaskPhase(state.stamp_ns, index, phase.name, phase.commands if entered else ())
-        return task, self._targets_of(phase, state, deputy_in_world)
+        return stage.task, self._targets_of(stage, state, deputy_in_world)
+
+    @property
+    def awaits_grasps(self) -> bool:
+        """Tell whether a command has been given of which it is not known yet what came of it."""
+        return self._progress.awaits_grasps
+
+    def grasped(self, events: Iterable[GraspEvent]) -> None:
+        """Take what came of the commands that were given last."""
+        self._progress.grasped(events)
+
+    def solved(self, *, converged: bool) -> None:
+        """Take how inverse kinematics ended for the targets that were given last."""
+        self._progress.solved(converged=converged)
+
+    def take_decisions(self) -> tuple[RunEvent, ...]:
+        """Return what has been decided about the task since this was asked last."""
+        return self._progress.take_decisions()
 
     def ik_request(self, state: RobotState, targets: Targets) -> IkRequest:
         """Return what to ask of inverse kinematics: the base locked where it is, the present joints as seed.
@@ -110,16 +126,16 @@ class TrajectoryGenerator:
             velocity = self._resolve_rates(state, targets, velocity)
         return JointReference(state.stamp_ns, joint_position, velocity), poses
 
-    def _targets_of(self, phase: Phase, state: RobotState, deputy_in_world: Pose) -> Targets:
+    def _targets_of(self, stage: Stage, state: RobotState, deputy_in_world: Pose) -> Targets:
         """Return the targets of every arm at the time of a state."""
         progress = self._time_law(
-            ns_to_seconds(state.stamp_ns - phase.start_ns), ns_to_seconds(phase.motion_ns)
+            ns_to_seconds(state.stamp_ns - stage.start_ns), ns_to_seconds(stage.phase.motion_ns)
         )
         poses: dict[str, Pose] = {}
         twists: dict[str, Twist] = {}
         position = np.array(state.joint_position)
         velocity = np.zeros(self._robot.n_joints)
-        for arm, target in phase.targets.items():
+        for arm, target in stage.targets.items():
             joints = self._robot.arm_joints[arm]
             start = self._joints_at_start[joints]
             if isinstance(target, ToolTarget | GraspFrameTarget):

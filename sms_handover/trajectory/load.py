@@ -1,5 +1,6 @@
 """Reading a task schedule from its YAML file, checked whole against the robot."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from sms_handover.trajectory.schedule import (
     GraspFrameTarget,
     Hold,
     JointTarget,
+    MissAction,
+    OnMiss,
     Phase,
     Schedule,
     ToolTarget,
@@ -22,6 +25,7 @@ from sms_handover.trajectory.yaml_lines import Section, read_section
 from sms_handover.types import Array, GraspAction, GraspCommand, Pose
 from sms_handover.units import seconds_to_ns
 
+MOST_RETRIES = 100  # of one phase; more is a mistake rather than patience
 _TARGET_KINDS = ("hold", "joints", "tool_in_world", "grasp_frame")
 
 
@@ -79,7 +83,7 @@ def _joints(section: Section, key: str, arm: str, robot: RobotModel) -> Array:
 
 def _phase(section: Section, robot: RobotModel, deputy: DeputyDescription, previous_end_ns: int) -> Phase:
     """Return one phase; it starts where the one before ends unless it says when."""
-    section.refuse_unknown(("name", "start", "duration", "motion", "arms", "events", "gains"))
+    section.refuse_unknown(("name", "start", "duration", "motion", "arms", "events", "on_miss", "gains"))
     name = section.text("name")
     start_ns = previous_end_ns
     if section.has("start"):
@@ -104,7 +108,29 @@ def _phase(section: Section, robot: RobotModel, deputy: DeputyDescription, previ
     events = section.sections("events") if section.has("events") else []
     commands = tuple(_command(event, robot, deputy) for event in events)
     gains = _gains(section.section("gains")) if section.has("gains") else {}
-    return Phase(name, start_ns, start_ns + duration_ns, motion_ns, targets, commands, gains)
+    on_miss = _on_miss(section, commands, is_first=start_ns == 0) if section.has("on_miss") else OnMiss()
+    return Phase(name, start_ns, start_ns + duration_ns, motion_ns, targets, commands, gains, on_miss)
+
+
+def _on_miss(section: Section, commands: Sequence[GraspCommand], *, is_first: bool) -> OnMiss:
+    """Return what a phase does about a grasp that misses: a word, or ``retry`` with a number."""
+    key, words = "on_miss", tuple(action.value for action in MissAction)
+    line = section.line_of(key)
+    if all(command.action is GraspAction.RELEASE for command in commands):
+        raise section.error(f"{key!r} is given, but no event of the phase is a grasp or transfer", line)
+    if section.is_text(key):
+        word = section.text(key)
+        if word not in words:
+            raise ScheduleError(str(UnknownNameError("value", word, words, f"{section.where(key)}: {key!r}")))
+        if word == MissAction.RETRY.value:
+            raise section.error(f"{key!r} needs to know how often: write {{retry: 2}}", line)
+        return OnMiss(MissAction(word))
+    inner = section.section(key)
+    inner.refuse_unknown((MissAction.RETRY.value,))
+    retries = inner.count(MissAction.RETRY.value, minimum=1, maximum=MOST_RETRIES)
+    if is_first:
+        raise section.error("a retry does the phase before again, but this is the first one", line)
+    return OnMiss(MissAction.RETRY, retries)
 
 
 def _target(arms: Section, arm: str, robot: RobotModel, deputy: DeputyDescription) -> ArmTarget:

@@ -17,3 +17,14 @@ class TrajectoryParameters:
     jacobian_damping: float = parameter(
         "damping of the generalised Jacobian's inverse near singular configurations", minimum=0.0
     )
+    ik_failures: int = parameter(
+        "reference periods in a row without convergence of inverse kinematics after which the phase has "
+        "failed; 0: never",
+        minimum=0,
+    )
+    failure_hold: float = parameter(
+        "simulated time for which the joints are held after a phase has failed, before the run ends",
+        unit="s",
+        minimum=0.0,
+        maximum=3600.0,
+    )

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from types import MappingProxyType
 
 from sms_handover.types import Array, GraspCommand, Pose, read_only
@@ -41,6 +42,22 @@ class GraspFrameTarget:
 ArmTarget = Hold | JointTarget | ToolTarget | GraspFrameTarget
 
 
+class MissAction(Enum):
+    """What happens when a grasp command of a phase does not succeed; the value is the word in the file."""
+
+    CONTINUE = "continue"
+    ABORT = "abort"
+    RETRY = "retry"
+
+
+@dataclass(frozen=True)
+class OnMiss:
+    """What a phase does about a grasp that misses, and for a retry how often at most."""
+
+    action: MissAction = MissAction.CONTINUE
+    retries: int = 0
+
+
 @dataclass(frozen=True, eq=False)
 class Phase:
     """One phase: its time span, the target of every arm, and what happens at its first instant.
@@ -56,6 +73,7 @@ class Phase:
     targets: Mapping[str, ArmTarget]
     commands: tuple[GraspCommand, ...] = ()
     gains: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    on_miss: OnMiss = OnMiss()
 
     def __post_init__(self) -> None:
         """Make the mappings immutable."""

@@ -40,13 +40,15 @@ class Section:
         """Return the line of a key."""
         return self._lines[key]
 
+    def where(self, key: str) -> str:
+        """Return file and line of a key, as errors name them."""
+        return f"{self._path}:{self.line_of(key)}"
+
     def refuse_unknown(self, known: Sequence[str]) -> None:
         """Raise ScheduleError on a key that is not among the known ones."""
         for key in self._nodes:
             if key not in known:
-                raise ScheduleError(
-                    str(UnknownNameError("key", key, known, f"{self._path}:{self.line_of(key)}"))
-                )
+                raise ScheduleError(str(UnknownNameError("key", key, known, self.where(key))))
 
     def has(self, key: str) -> bool:
         """Tell whether a key is given."""
@@ -92,6 +94,16 @@ class Section:
     def number(self, key: str, unit: str, minimum: float = -inf) -> float:
         """Return the finite number under a key."""
         return self._number(self.value(key), key, unit, minimum)
+
+    def count(self, key: str, minimum: int, maximum: int) -> int:
+        """Return the whole number under a key."""
+        value = self.value(key)
+        if not isinstance(value, int) or isinstance(value, bool) or not minimum <= value <= maximum:
+            raise self.error(
+                f"{key!r} is {value!r}, expected a whole number from {minimum} to {maximum}",
+                self.line_of(key),
+            )
+        return value
 
     def vector(self, key: str, size: int, unit: str) -> list[float]:
         """Return the list of ``size`` finite numbers under a key."""

@@ -1,0 +1,168 @@
+"""Where in the schedule a run is, with phases that are done again or given up."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import nan
+
+from sms_handover.events import GRASP_FAILED, GRASP_MISSED, IK_FAILED, PHASE_RETRIED, RunEvent, Severity
+from sms_handover.topics import TRAJECTORY
+from sms_handover.trajectory.parameters import TrajectoryParameters
+from sms_handover.trajectory.schedule import ArmTarget, Hold, MissAction, Phase, Schedule
+from sms_handover.types import GraspCommand, GraspEvent, GraspStatus, PhaseState, TaskPhase
+from sms_handover.units import seconds_to_ns
+
+Figures = tuple[float, float, str]  # value, limit, unit
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """What is in force at one instant: the phase, when it began, its targets, whether it begins now."""
+
+    task: TaskPhase
+    phase: Phase
+    start_ns: int
+    targets: Mapping[str, ArmTarget]
+    begins: bool
+
+
+class TaskProgress:
+    """Walks through a schedule; what came of grasps and of inverse kinematics decides how it goes on.
+
+    A grasp that misses leads to what ``on_miss`` of its phase says. A retry does the phase before again,
+    from where the robot is, then the phase itself with those of its commands that have not
+    succeeded; all that follows is later by that time. A phase that is given up holds the joints, and the
+    task ends ``failure_hold`` later. Decisions fall on reference periods, so a run depends on nothing else.
+    """
+
+    def __init__(self, schedule: Schedule, parameters: TrajectoryParameters) -> None:
+        """Set up at the start of the schedule."""
+        self._schedule = schedule
+        self._most_ik_failures = parameters.ik_failures
+        self._failure_hold_ns = seconds_to_ns(parameters.failure_hold)
+        self.reset()
+
+    def reset(self) -> None:
+        """Go back to the start of the schedule."""
+        phases = self._schedule.phases
+        self._shift_ns = 0
+        self._end_ns = self._schedule.end_ns
+        self._failed = False
+        self._now: tuple[int, bool] | None = None
+        self._due = [phase.commands for phase in phases]
+        self._begun = [0 for _ in phases]
+        self._retries = [0 for _ in phases]
+        self._issued: tuple[GraspCommand, ...] = ()
+        self._answers: dict[GraspCommand, GraspEvent] = {}
+        self._ik_failures = 0
+        self._decisions: list[RunEvent] = []
+
+    @property
+    def awaits_grasps(self) -> bool:
+        """Tell whether a command has been given of which it is not known yet what came of it."""
+        return len(self._answers) < len(self._issued)
+
+    def grasped(self, events: Iterable[GraspEvent]) -> None:
+        """Take what came of the commands that were given last."""
+        self._answers.update((event.command, event) for event in events if event.command in self._issued)
+
+    def solved(self, *, converged: bool) -> None:
+        """Take how inverse kinematics ended for the targets that were given last."""
+        self._ik_failures = 0 if converged else self._ik_failures + 1
+
+    def take_decisions(self) -> tuple[RunEvent, ...]:
+        """Return what has been decided since this was asked last."""
+        taken, self._decisions = tuple(self._decisions), []
+        return taken
+
+    def at(self, stamp_ns: int) -> Stage:
+        """Return what is in force at a time; decides first what follows from what was taken since."""
+        if not self._failed:
+            self._decide(stamp_ns)
+        if self._failed and self._now:
+            index = self._now[0]
+        else:
+            index = self._schedule.phase_index(stamp_ns - self._shift_ns)
+        begins = self._now != (index, self._failed)
+        self._now = index, self._failed
+        phase = self._schedule.phases[index]
+        commands = self._begin(index) if begins and not self._failed else ()
+        state = PhaseState.FAILED if self._failed else PhaseState.ACTIVE
+        task = TaskPhase(stamp_ns, index, phase.name, commands, state, self._begun[index], self._end_ns)
+        targets = {arm: Hold() for arm in phase.targets} if self._failed else phase.targets
+        return Stage(task, phase, phase.start_ns + self._shift_ns, targets, begins)
+
+    def _begin(self, index: int) -> tuple[GraspCommand, ...]:
+        """Begin a phase and return its commands that are still due."""
+        self._begun[index] += 1
+        self._issued, self._due[index] = self._due[index], ()
+        self._answers = {}
+        self._ik_failures = 0
+        return self._issued
+
+    def _decide(self, stamp_ns: int) -> None:
+        """Decide about grasps that did not succeed, and about targets that cannot be reached."""
+        if self._now is None:
+            return
+        index = self._now[0]
+        if self._issued and not self.awaits_grasps:
+            missed = [e for e in self._answers.values() if e.status is not GraspStatus.SUCCEEDED]
+            if missed:
+                self._on_miss(stamp_ns, index, missed)
+            self._issued, self._answers = (), {}
+        elif 0 < self._most_ik_failures <= self._ik_failures:
+            detail = "inverse kinematics has not converged so many times in a row; the joints are held"
+            figures = (self._ik_failures, self._most_ik_failures, "reference periods")
+            self._fail(stamp_ns, index, IK_FAILED, detail, figures)
+
+    def _on_miss(self, stamp_ns: int, index: int, missed: list[GraspEvent]) -> None:
+        """Do what the phase says about commands that did not succeed."""
+        phase, what = self._schedule.phases[index], _in_words(missed[0])
+        policy, done = phase.on_miss, self._retries[index]
+        can_be_mended = any(event.status is GraspStatus.MISSED for event in missed)
+        if policy.action is MissAction.CONTINUE:
+            self._tell(stamp_ns, index, GRASP_MISSED, Severity.WARNING, f"{what}; the task goes on")
+        elif policy.action is MissAction.RETRY and can_be_mended and done < policy.retries:
+            before = self._schedule.phases[index - 1]
+            self._retries[index] += 1
+            self._due[index] = tuple(event.command for event in missed)
+            self._shift_ns = stamp_ns - before.start_ns
+            self._end_ns = self._schedule.end_ns + self._shift_ns
+            detail = f"{what}; phase {before.name!r} is done again"
+            self._tell(
+                stamp_ns,
+                index,
+                PHASE_RETRIED,
+                Severity.WARNING,
+                detail,
+                (done + 1, policy.retries, "retries"),
+            )
+        else:
+            detail = f"{what}; the joints are held"
+            self._fail(stamp_ns, index, GRASP_FAILED, detail, (done + 1, policy.retries + 1, "misses"))
+
+    def _fail(self, stamp_ns: int, index: int, kind: str, detail: str, figures: Figures) -> None:
+        """Give the task up."""
+        self._failed = True
+        self._end_ns = stamp_ns + self._failure_hold_ns
+        self._tell(stamp_ns, index, kind, Severity.ERROR, detail, figures)
+
+    def _tell(
+        self,
+        stamp_ns: int,
+        index: int,
+        kind: str,
+        severity: Severity,
+        detail: str,
+        figures: Figures = (nan, nan, ""),
+    ) -> None:
+        """Note a decision."""
+        phase, (value, limit, unit) = self._schedule.phases[index].name, figures
+        self._decisions.append(
+            RunEvent(stamp_ns, TRAJECTORY, kind, severity, detail, phase, float(value), float(limit), unit)
+        )
+
+
+def _in_words(event: GraspEvent) -> str:
+    """Return what came of a command as a sentence."""
+    command = event.command
+    return f"{command.action.value} by {command.arm} {event.status.value} ({event.detail})"
