@@ -107,7 +107,7 @@ def graph_topics(arms: Iterable[str]) -> tuple[Topic, ...]:
         Topic(JOINT_REFERENCE, joints, (TRAJECTORY,), (CONTROLLER,), Rate.REFERENCE),
         Topic(TASK_PHASE, f"{_OURS}/TaskPhase", (TRAJECTORY,), (PLANT, CONTROLLER), Rate.REFERENCE),
         Topic(DEPUTY_POSE, pose, (PLANT,), (TRAJECTORY,), Rate.REFERENCE),
-        Topic(GRASP_EVENT, f"{_OURS}/GraspEvent", (PLANT,), (), Rate.CHANGE),
+        Topic(GRASP_EVENT, f"{_OURS}/GraspEvent", (PLANT,), (TRAJECTORY,), Rate.CHANGE),
         Topic(LINEAR_MOMENTUM, vector, (PLANT,), (), Rate.REFERENCE),
         Topic(ANGULAR_MOMENTUM, vector, (PLANT,), (), Rate.REFERENCE),
         Topic(ENERGY, f"{_OURS}/EnergyStamped", (PLANT,), (), Rate.REFERENCE),

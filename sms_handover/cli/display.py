@@ -18,6 +18,10 @@ class Display:
         self._begin, self._begin_s = monotonic(), 0.0
         self._line = StatusLine()
 
+    def lasts_until(self, end_ns: int) -> None:
+        """Take another length of the run, as a phase done again makes it longer."""
+        self._end_s = ns_to_seconds(end_ns)
+
     def start(self, stamp_ns: int) -> None:
         """Count wall time from now on, with the run at this simulated time."""
         self._begin, self._begin_s = monotonic(), ns_to_seconds(stamp_ns)

@@ -1,4 +1,22 @@
 """Exit codes of commands that need no ROS."""
 
+from collections.abc import Iterable
+
+from sms_handover.events import GRASP_FAILED, RunEvent
+from sms_handover.types import GraspEvent, GraspStatus
+
 EXIT_OK = 0
+EXIT_FAILED = 1
 EXIT_LOSS = 3  # what was asked for is done, but something of the recording is missing
+EXIT_MISSED = 4
+
+
+def task_code(grasps: Iterable[GraspEvent], decisions: Iterable[RunEvent], *, failed: bool) -> int:
+    """Return the exit code of a run by its task: failed for another reason than a grasp, missed, or well.
+
+    A command that missed and succeeded when it was given again has not missed.
+    """
+    last = {event.command: event.status for event in grasps}
+    if failed and all(event.kind != GRASP_FAILED for event in decisions):
+        return EXIT_FAILED
+    return EXIT_OK if all(status is GraspStatus.SUCCEEDED for status in last.values()) else EXIT_MISSED

@@ -53,6 +53,7 @@ class Outcome:
     """How a run ended: what the plant said, the events, whether the bag has every message."""
 
     detail: str
+    failed: bool
     stamp_ns: int
     events: tuple[GraspEvent, ...]
     run_events: tuple[RunEvent, ...]
@@ -115,6 +116,7 @@ class _Watch:
         common = plan.scenario.parameters.common
         end_ns = common.last_tick(plan.scenario.schedule.end_ns) * common.tick_ns
         self._plan, self._monitor, self._executor, self._processes = plan, monitor, executor, processes
+        self._common = common
         self._display = Display(end_ns)
         self._events_shown = self._run_events_shown = 0
         self._interrupts = 0
@@ -135,6 +137,7 @@ class _Watch:
         self._show(last=True)
         return Outcome(
             detail=progress.detail,
+            failed=progress.state == RunState.FAILED,
             stamp_ns=progress.stamp_ns,
             events=tuple(progress.events),
             run_events=tuple(progress.run_events),
@@ -226,6 +229,9 @@ class _Watch:
         for decision in progress.run_events[self._run_events_shown :]:
             self._display.event(decision)
         self._events_shown, self._run_events_shown = len(progress.events), len(progress.run_events)
+        if progress.task_end_ns:
+            last_tick = self._common.last_tick(progress.task_end_ns, failed=progress.task_failed)
+            self._display.lasts_until(last_tick * self._common.tick_ns)
         if last:
             self._display.finish(progress.wall_time)
         self._display.show(progress.stamp_ns, progress.phase, progress.tool_error, last=last)

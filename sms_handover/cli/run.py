@@ -7,6 +7,7 @@ from datetime import datetime
 from pathlib import Path
 
 from sms_handover.cli.domain import reserved_domain
+from sms_handover.cli.exit_codes import task_code
 from sms_handover.cli.folders import BAG, LOGS
 from sms_handover.cli.launcher import LaunchPlan, launch
 from sms_handover.cli.options import add_scenario_options, scenario_of
@@ -16,9 +17,7 @@ from sms_handover.ros.main import EXIT_LOSS
 from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.parameters import LOCKSTEP, REALTIME
 from sms_handover.simulation.scenario import Scenario
-from sms_handover.types import GraspStatus
 
-EXIT_MISSED = 4
 EXIT_INTERRUPTED = 130
 
 
@@ -29,8 +28,9 @@ def add_parser(parser: ArgumentParser) -> None:
         "every process. The bag goes to OUTPUT/bag, what the nodes print to OUTPUT/log."
     )
     parser.epilog = (
-        "exit codes: 0 the run is whole; 1 a node died or stalled; 2 wrong input, nothing was started; "
-        "3 messages are missing in the bag; 4 a grasp missed; 130 interrupted. "
+        "exit codes: 0 the run is whole; 1 a node died or stalled, or the task failed; 2 wrong input, "
+        "nothing was started; 3 messages are missing in the bag; 4 a grasp missed and no retry "
+        "mended it; 130 interrupted. "
         "To look at the running graph with other tools, give --domain-id and set ROS_DOMAIN_ID to it."
     )
     add_scenario_options(parser)
@@ -82,8 +82,7 @@ def command(options: Namespace) -> int:
     if outcome.recorder_code:
         print("messages are missing in the bag, see the table above", file=sys.stderr)
         return EXIT_LOSS
-    missed = any(event.status is not GraspStatus.SUCCEEDED for event in outcome.events)
-    return EXIT_MISSED if missed else 0
+    return task_code(outcome.events, outcome.run_events, failed=outcome.failed)
 
 
 def _output_folder(options: Namespace, scenario: Scenario) -> Path:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from sms_handover.analysis.table import comparison_table
 from sms_handover.cli.display import Display
+from sms_handover.cli.exit_codes import task_code
 from sms_handover.cli.options import add_scenario_options, scenario_of
 from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.save import save_run
@@ -17,6 +18,9 @@ def add_parser(parser: ArgumentParser) -> None:
     parser.description = (
         "Run the handover in one process by plain calls, without DDS and without a bag. The numbers are the "
         "same, bit for bit, as those of a run over DDS in lock step."
+    )
+    parser.epilog = (
+        "exit codes: 0 the task is done; 1 it failed; 2 wrong input; 4 a grasp missed and no retry mended it"
     )
     add_scenario_options(parser)
     parser.add_argument(
@@ -32,13 +36,16 @@ def command(options: Namespace) -> int:
     display = Display(common.last_tick(scenario.schedule.end_ns) * common.tick_ns)
 
     def show(stamp_ns: int, phase: TaskPhase) -> None:
+        display.lasts_until(common.last_tick(phase.end_ns, failed=phase.failed) * common.tick_ns)
         display.show(stamp_ns, phase.name, {})
 
     run = simulate(scenario, progress=show)
     display.show(int(run.tick_ns[-1]), run.phases[-1].name, {}, last=True)
     name, tolerance = scenario.parameters.controller.law, scenario.parameters.plant.grasp_tolerance
+    for event in run.run_events:
+        print(event)
     print(comparison_table({name: run}, tolerance=tolerance))
     if options.output:
         save_run(run, options.output)
         print(f"arrays written to {options.output}")
-    return 0
+    return task_code(run.grasp_events, run.run_events, failed=run.phases[-1].failed)

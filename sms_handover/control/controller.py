@@ -24,18 +24,24 @@ class JointController:
     """Tracks joint references with a law whose gains change with the phase of the task."""
 
     def __init__(
-        self, robot: RobotModel, gains_by_phase: Sequence[Gains], tick_ns: int, base_configuration: Array
+        self,
+        robot: RobotModel,
+        gains_by_phase: Sequence[Gains],
+        tick_ns: int,
+        base_configuration: Array,
+        longest_ns: int | None = None,
     ) -> None:
         """Set up the law of the gains' kind, and check every gain set at the start configuration.
 
         ``gains_by_phase`` has one entry per phase of the schedule, all of one kind;
-        ``base_configuration`` is q (7 + n,) at the start. Raises UnstableLoopError.
+        ``base_configuration`` is q (7 + n,) at the start. A reference older than ``longest_ns`` is no
+        longer carried on: the desired joints stand still. Raises UnstableLoopError.
         """
         self._robot = robot
         self._gains_by_phase = tuple(gains_by_phase)
         self._dt = ns_to_seconds(tick_ns)
         self._law = make_law(robot, self._gains_by_phase[0])
-        self._track = ReferenceTrack()
+        self._track = ReferenceTrack(longest_ns)
         self._entry = (0, 1, PhaseState.ACTIVE)
         check_stability(robot, self._gains_by_phase, self._dt, base_configuration)
 
@@ -60,6 +66,11 @@ class JointController:
     def track(self, reference: JointReference) -> None:
         """Take the next joint reference."""
         self._track.update(reference)
+
+    @property
+    def reference_ns(self) -> int:
+        """Return the stamp of the last reference, 0 before the first."""
+        return self._track.stamp_ns
 
     def step(self, state: RobotState) -> JointCommand:
         """Return the command that answers a state; zero efforts until a first reference has come."""

@@ -21,6 +21,13 @@ class ControllerParameters:
     proportional: float = parameter("pid: proportional gain K_P", unit="N m/rad", minimum=0.0)
     integral: float = parameter("pid: integral gain K_I", unit="N m/(rad s)", minimum=0.0)
     derivative: float = parameter("pid: derivative gain K_D", unit="N m s/rad", minimum=0.0)
+    reference_hold: float = parameter(
+        "real time: how long the desired motion is carried on when the next reference is overdue, before it "
+        "stands still",
+        unit="s",
+        minimum=0.0,
+        maximum=3600.0,
+    )
 
 
 def gains_of(

@@ -10,17 +10,24 @@ class ReferenceTrack:
     """Carries the last reference forward: q_d + q_d' s + q_d'' s^2 / 2 after s seconds.
 
     The acceleration is the difference quotient of the last two reference velocities, so it is zero
-    for targets that stand still and lags by one reference period for those that move.
+    for targets that stand still and lags by one reference period for those that move. Beyond an age of
+    ``longest_ns`` the desired joints stand still where they have come to by then.
     """
 
-    def __init__(self) -> None:
-        """Start without a reference."""
+    def __init__(self, longest_ns: int | None = None) -> None:
+        """Start without a reference; without ``longest_ns`` the last one is carried on for ever."""
+        self._longest_ns = longest_ns
         self.reset()
 
     @property
     def ready(self) -> bool:
         """Tell whether a reference has come."""
         return self._last is not None
+
+    @property
+    def stamp_ns(self) -> int:
+        """Return the stamp of the last reference, 0 before the first."""
+        return self._last.stamp_ns if self._last else 0
 
     def reset(self) -> None:
         """Forget every reference."""
@@ -48,7 +55,16 @@ class ReferenceTrack:
         """Return q_d, q_d' and q_d'', the rows of (3, n), at a time not before the last reference."""
         if self._last is None:
             raise RuntimeError("no reference has come yet")
-        s = ns_to_seconds(stamp_ns - self._last.stamp_ns)
+        age_ns, longest_ns = stamp_ns - self._last.stamp_ns, self._longest_ns
+        if longest_ns is not None and age_ns > longest_ns:
+            stand = np.zeros_like(self._motion)
+            stand[0] = self._carried(longest_ns)[0]
+            return stand
+        return self._carried(age_ns)
+
+    def _carried(self, age_ns: int) -> Array:
+        """Return the rows of the desired motion at an age of the last reference."""
+        s = ns_to_seconds(age_ns)
         forward = self._forward
         forward[0, 1] = forward[1, 2] = s
         forward[0, 2] = 0.5 * s * s

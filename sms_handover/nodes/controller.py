@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.control.parameters import ControllerParameters
+from sms_handover.control.reference_watch import ReferenceWatch
 from sms_handover.frames import BASE, WORLD
 from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.inputs import Receive
@@ -13,7 +14,7 @@ from sms_handover.ros.stamp_sync import StampSync
 from sms_handover.ros.wire import JointStateWire, StateWire
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import load_task
-from sms_handover.simulation.wiring import make_controller
+from sms_handover.simulation.wiring import longest_reference_ns, make_controller
 from sms_handover.topics import (
     BASE_ODOMETRY,
     CONTROLLER,
@@ -49,6 +50,7 @@ class ControllerNode(GraphNode[ControllerParameters]):
         self._inputs: StampSync[bytes] = StampSync()
         self._answered_ns = 0
         self._answer_bytes = b""
+        self._watch = ReferenceWatch(longest_reference_ns(self.common, self.parameters))
         self._command = self.endpoints.publisher(JOINT_COMMAND)
         for topic in (TASK_PHASE, JOINT_REFERENCE, *_STATE):
             self.endpoints.receive(topic, self.inputs, self._taker(topic))
@@ -82,6 +84,7 @@ class ControllerNode(GraphNode[ControllerParameters]):
         if self._inputs.begins_anew(stamp):
             self._inputs.reset()
             self._controller.reset()
+            self._watch.reset()
         if not self._lockstep and topic in (JOINT_REFERENCE, TASK_PHASE):
             self._use(topic, data)
             return
@@ -104,6 +107,10 @@ class ControllerNode(GraphNode[ControllerParameters]):
         self._answer_bytes = self._command_wire.pack(stamp, effort=command.effort)
         self._command.publish(self._answer_bytes)
         self._answered_ns = stamp
+        if not self._lockstep:
+            event = self._watch.look(self._controller.reference_ns, stamp)
+            if event is not None:
+                self.events.publish(event)
 
     def _use(self, topic: str, data: bytes) -> None:
         """Give a phase or a reference to the controller."""

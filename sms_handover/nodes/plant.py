@@ -2,6 +2,7 @@
 
 import gc
 from collections.abc import Sequence
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from sms_handover.bag.stamp import stamp_ns
+from sms_handover.plant.answer_watch import AnswerWatch
+from sms_handover.plant.command_watch import CommandWatch
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.ros.convert import event_message, header, time_message
 from sms_handover.ros.graph_node import GraphNode
@@ -44,6 +47,7 @@ _COMMAND = (JOINT_COMMAND,)
 _PHASE_AND_COMMAND = (TASK_PHASE, JOINT_COMMAND)
 _MOST_UNRECORDED_NS = 45_000_000  # [ns] of simulation time that may be lost with the recorder
 _TIMING_PERIOD_S = 1.0  # [s] of wall time
+_LOOK_PERIOD_S = 0.5  # [s] of wall time between two looks whether the loop goes on
 
 
 class PlantNode(GraphNode[PlantParameters]):
@@ -59,7 +63,8 @@ class PlantNode(GraphNode[PlantParameters]):
         schedule = load_task(self.common, self.robot)
         self._plant = make_plant(self.robot, schedule, self.common, self.parameters)
         self._deputy_size = schedule.deputy.size
-        self._last_tick = self.common.last_tick(schedule.end_ns)
+        self._end_ns = schedule.end_ns
+        self._last_tick, self._failed_phase = self.common.last_tick(self._end_ns), ""
         self._lockstep = self.common.mode == LOCKSTEP
         self._tick_ns, self._per_reference = self.common.tick_ns, self.common.ticks_per_reference
         self._is_recorded = RECORDER in self.common.peers
@@ -68,6 +73,8 @@ class PlantNode(GraphNode[PlantParameters]):
         self._inputs: StampSync[bytes] = StampSync()
         self._loop_clock = LoopClock(self.common.tick_ns, paced=not self._lockstep)
         self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
+        self._command_watch = CommandWatch(self.parameters)
+        self._answer_watch = AnswerWatch(self.parameters)
         self._run_state = RunState.WAITING
         self._steps_left = 0
         self._reset_asked = False
@@ -78,6 +85,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self.create_timer(_TIMING_PERIOD_S, self._publish_timing)
         if self._lockstep:
             self.create_timer(self.parameters.resend_after, self._send_again)
+            self.create_timer(_LOOK_PERIOD_S, self._look_for_answer)
 
     def on_matched(self) -> None:
         """Say what robot and deputy these are; the run begins when the other nodes are ready too."""
@@ -190,6 +198,15 @@ class PlantNode(GraphNode[PlantParameters]):
             self._outputs.publish_loop(self._plant, with_reference=self._at_reference)
         self._silent_tick = tick
 
+    def _look_for_answer(self) -> None:
+        """End the run as failed if nothing has answered this tick for too long (lock step)."""
+        waiting = self._run_state == RunState.RUNNING or self._steps_left > 0
+        stamp = self._plant.stamp_ns if waiting else None
+        event = self._answer_watch.look(stamp, self.awaited, monotonic())
+        if event is not None:
+            self.events.publish(event)
+            self._finish(event.detail, RunState.FAILED)
+
     def _on_command(self, data: bytes, sent_ns: int) -> None:
         """Take a command; in lock step it may complete the tick."""
         if self._lockstep:
@@ -232,8 +249,8 @@ class PlantNode(GraphNode[PlantParameters]):
             return
         if needed is _PHASE_AND_COMMAND:
             self._execute(inputs[TASK_PHASE])
-        if self._plant.tick == self._last_tick:
-            self._finish("the whole run is done")
+        if self._plant.tick >= self._last_tick:
+            self._end_task()
             return
         self._plant.step(self._read_command(inputs[JOINT_COMMAND]))
         self._loop_clock.ticked()
@@ -246,20 +263,27 @@ class PlantNode(GraphNode[PlantParameters]):
     def _tick_now(self) -> None:
         """Integrate one tick with the last command that came (real time)."""
         self._loop_clock.ticked(held=self._command.stamp_ns != self._plant.stamp_ns)
-        self._plant.step(self._command)
+        command, event = self._command_watch.look(self._command, self._plant.stamp_ns)
+        self._plant.step(command)
         self._publish_state()
+        if event is not None:
+            self.events.publish(event)
         if self._reset_asked:
             self._begin_anew()
-        elif self._plant.tick == self._last_tick:
-            self._finish("the whole run is done")
+        elif self._plant.tick >= self._last_tick:
+            self._end_task()
 
     def _read_command(self, data: bytes) -> JointCommand:
         """Return the command in a message."""
         return JointCommand(stamp_ns(data), self._command_wire.read(data)["effort"])
 
     def _execute(self, phase: bytes) -> None:
-        """Carry out the grasp commands of a phase and tell what came of them."""
-        for event in self._plant.execute(self._phase_wire.read(phase).commands):
+        """Carry out the grasp commands of a phase, tell what came of them, and note when the task ends."""
+        task = self._phase_wire.read(phase)
+        self._failed_phase = task.name if task.failed else ""
+        if task.end_ns:
+            self._last_tick = self.common.last_tick(task.end_ns, failed=task.failed)
+        for event in self._plant.execute(task.commands):
             self._publish[GRASP_EVENT].publish(event_message(event))
             self.get_logger().info(f"{event.command.action.value}: {event.status.value}, {event.detail}")
 
@@ -312,20 +336,29 @@ class PlantNode(GraphNode[PlantParameters]):
         """Go back to time zero; the other nodes do so when they see the state of that time."""
         self._reset_asked = False
         self._steps_left = 0
+        self._last_tick, self._failed_phase = self.common.last_tick(self._end_ns), ""
         self.finished = False
         self._plant.reset()
         self._inputs.reset()
         self._loop_clock.reset()
         self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
+        self._command_watch.reset()
         self._enter(RunState.PAUSED if self._run_state == RunState.PAUSED else RunState.RUNNING, "reset")
         self._publish_state()
 
-    def _finish(self, detail: str) -> None:
+    def _end_task(self) -> None:
+        """End the run where the task has ended."""
+        if self._failed_phase:
+            self._finish(f"phase {self._failed_phase!r} has failed", RunState.FAILED)
+        else:
+            self._finish("the whole run is done")
+
+    def _finish(self, detail: str, state: int = RunState.FINISHED) -> None:
         """Say that the run is over, and what real time has cost; every node then tells its counts."""
         if not self._lockstep and self._loop_clock.misses:
             detail = f"{detail}; {self._loop_clock.misses}"
         self.finished = True
-        self._enter(RunState.FINISHED, detail)
+        self._enter(state, detail)
         self.publish_diagnostics()
         self.publish_counts()
 

@@ -5,8 +5,11 @@ from dataclasses import replace
 from math import inf
 from typing import Any
 
+from rclpy.serialization import deserialize_message
+from sms_handover_interfaces.msg import GraspEvent
 from sms_handover_interfaces.srv import SolveIK
 
+from sms_handover.bag.decode import grasp_event
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.errors import GraphError
 from sms_handover.frames import BASE, WORLD
@@ -23,9 +26,11 @@ from sms_handover.ros.phase_wire import PhaseWire
 from sms_handover.ros.stamp_sync import StampSync
 from sms_handover.ros.wire import JointStateWire, StateWire, pose_wire, read_pose
 from sms_handover.simulation.feasibility import check_feasibility
+from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import ParameterSet, Scenario, load_parameters, load_task
 from sms_handover.topics import (
     DEPUTY_POSE,
+    GRASP_EVENT,
     IK_STATUS,
     JOINT_REFERENCE,
     SAMPLED_BASE_ODOMETRY,
@@ -67,6 +72,8 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._ik_status = self.endpoints.publisher(IK_STATUS)
         self._reference = self.endpoints.publisher(JOINT_REFERENCE)
         self._targets = {arm: self.endpoints.publisher(target_pose(arm)) for arm in self.robot.arms}
+        self._lockstep = self.common.mode == LOCKSTEP
+        self.endpoints.receive(GRASP_EVENT, self.inputs, self._on_grasp)
         for topic in _INPUTS:
             self.endpoints.receive(topic, self.inputs, self._taker(topic))
 
@@ -87,6 +94,8 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         """Return the answer of the service while there is a request, else what comes last of a state."""
         if self._asked is not None:
             return SOLVE_IK
+        if self._waits_for_grasps:
+            return GRASP_EVENT
         stamp = self._inputs.oldest_ns
         return (self._inputs.missing(stamp, _INPUTS) if stamp is not None else "") or DEPUTY_POSE
 
@@ -106,14 +115,29 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         if self._asked is None:
             self._proceed(stamp)
 
+    @property
+    def _waits_for_grasps(self) -> bool:
+        """Tell whether it has to be known what came of a grasp before the task goes on (lock step)."""
+        return self._lockstep and self._generator.awaits_grasps
+
+    def _on_grasp(self, data: bytes, sent_ns: int) -> None:
+        """Take what came of a grasp; the next state may have come before it."""
+        self._generator.grasped((grasp_event(deserialize_message(data, GraspEvent)),))
+        if self._asked is None:
+            self._proceed(self._newest_ns)
+
     def _proceed(self, stamp: int) -> None:
         """Work on the state of a stamp if all of it is there."""
+        if self._waits_for_grasps:
+            return
         inputs = self._inputs.take(stamp, _INPUTS)
         if inputs is None:
             return
         self._stamp_ns = stamp
         state = self._state_wire.read(inputs[SAMPLED_JOINT_STATES], inputs[SAMPLED_BASE_ODOMETRY])
         phase, targets = self._generator.targets(state, read_pose(self._pose_wire, inputs[DEPUTY_POSE]))
+        for event in self._generator.take_decisions():
+            self.events.publish(event)
         if targets.tool_in_world:
             self._ask(state, phase, targets)
         else:
@@ -138,7 +162,9 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         asked, self._asked = self._asked, None
         if not answer.valid:
             raise GraphError(f"the IK service refused a request: {answer.message}")
-        self._failures += answer.status.status != answer.status.CONVERGED
+        converged = answer.status.status == answer.status.CONVERGED
+        self._generator.solved(converged=converged)
+        self._failures += not converged
         solution = answer.solution
         joints = joints_in_order(self.robot.joint_names, solution.name, solution.position)
         self._publish(*asked, joints)

@@ -23,6 +23,21 @@ class PlantParameters:
         unit="m/s",
         minimum=0.0,
     )
+    command_hold: float = parameter(
+        "real time: how long the last command is held while no newer one comes",
+        unit="s",
+        minimum=0.0,
+        maximum=3600.0,
+    )
+    command_ramp: float = parameter(
+        "real time: how long the torques then take to zero", unit="s", minimum=0.0, maximum=3600.0
+    )
+    answer_timeout: float = parameter(
+        "lock step: wall time without an answer after which the run ends as failed; 0: never",
+        unit="s",
+        minimum=0.0,
+        maximum=86400.0,
+    )
     resend_after: float = parameter(
         "lock step: wall time without an answer after which a state is published once more",
         unit="s",

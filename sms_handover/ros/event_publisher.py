@@ -24,12 +24,13 @@ class EventPublisher:
     def publish(self, event: RunEvent) -> None:
         """Publish and log an event."""
         self._publisher.publish(run_event_message(event))
-        tell = {
-            Severity.INFO: self._log.info,
-            Severity.WARNING: self._log.warning,
-            Severity.ERROR: self._log.error,
-        }[event.severity]
-        tell(str(event).strip())
+        text = str(event).strip()
+        if event.severity is Severity.INFO:  # rclpy wants a line of code to log at one severity
+            self._log.info(text)
+        elif event.severity is Severity.WARNING:
+            self._log.warning(text)
+        else:
+            self._log.error(text)
 
     def tell(
         self,

@@ -16,7 +16,7 @@ from sms_handover_interfaces.msg import PublishedCounts, RunState, TaskPhase
 from sms_handover_interfaces.msg import RunEvent as RunEventMessage
 from std_srvs.srv import Trigger
 
-from sms_handover.bag.decode import grasp_event, header_ns, run_event
+from sms_handover.bag.decode import grasp_event, header_ns, run_event, task_phase
 from sms_handover.events import RunEvent
 from sms_handover.ros.inputs import Inputs
 from sms_handover.ros.qos import LATCHED
@@ -41,7 +41,8 @@ class Progress:
     """What is known of the run.
 
     ``tool_error`` is the distance in m of each tool to its target; ``wall_time`` is how long in s the
-    plant says that the run has taken, with the last news of its state.
+    plant says that the run has taken, with the last news of its state; ``task_end_ns`` is when the task
+    ends as things are, 0 before that is known.
     """
 
     state: int = RunState.WAITING
@@ -49,6 +50,8 @@ class Progress:
     stamp_ns: int = 0
     wall_time: float = 0.0
     phase: str = ""
+    task_end_ns: int = 0
+    task_failed: bool = False
     tool_error: dict[str, float] = field(default_factory=dict)
     events: list[GraspEvent] = field(default_factory=list)
     run_events: list[RunEvent] = field(default_factory=list)
@@ -149,7 +152,9 @@ class RunMonitor:
         )
 
     def _on_phase(self, message: Any) -> None:
-        self.progress.phase = message.name
+        task = task_phase(message)
+        self.progress.phase = task.name
+        self.progress.task_end_ns, self.progress.task_failed = task.end_ns, task.failed
         self.progress.stamp_ns = max(self.progress.stamp_ns, header_ns(message))
 
     def _on_target(self, arm: str, message: Any) -> None:

@@ -11,6 +11,7 @@ from sms_handover.plant.parameters import PlantParameters
 from sms_handover.simulation.parameters import CommonParameters
 from sms_handover.trajectory.schedule import Schedule
 from sms_handover.types import Array
+from sms_handover.units import seconds_to_ns
 
 
 def initial_joints(robot: RobotModel, schedule: Schedule) -> Array:
@@ -51,4 +52,10 @@ def make_controller(
 ) -> JointController:
     """Return the controller, its gains checked for stability at the start of the schedule."""
     start = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
-    return JointController(robot, gains_by_phase(schedule, parameters), common.tick_ns, start)
+    longest_ns = longest_reference_ns(common, parameters)
+    return JointController(robot, gains_by_phase(schedule, parameters), common.tick_ns, start, longest_ns)
+
+
+def longest_reference_ns(common: CommonParameters, parameters: ControllerParameters) -> int:
+    """Return the age in ns up to which the controller carries a reference on."""
+    return common.reference_ns + seconds_to_ns(parameters.reference_hold)

@@ -217,10 +217,10 @@ def test_overrides_lie_over_files(tmp_path: Path) -> None:
 
 def test_gains_of_a_phase_lie_over_those_of_the_controller() -> None:
     """A phase changes what it names and nothing else, and only gains of the law in use."""
-    nmpc = ControllerParameters("nmpc", 1.0, 1, 2.0, 3.0, 4.0)
+    nmpc = ControllerParameters("nmpc", 1.0, 1, 2.0, 3.0, 4.0, 0.1)
     assert gains_of(nmpc, {}, "here") == NmpcGains(1.0, 1)
     assert gains_of(nmpc, {"rolling_period": 2}, "here") == NmpcGains(2.0, 1)
-    pid = ControllerParameters("pid", 1.0, 1, 2.0, 3.0, 4.0)
+    pid = ControllerParameters("pid", 1.0, 1, 2.0, 3.0, 4.0, 0.1)
     assert gains_of(pid, {"integral": 0.5}, "here") == PidGains(2.0, 0.5, 4.0)
     with pytest.raises(UnknownNameError, match=r"here: unknown gain of pid 'rolling_period'"):
         gains_of(pid, {"rolling_period": 2.0}, "here")
