@@ -32,7 +32,7 @@ def _plant(
     deputy = pose_of(se3_of(tool) * se3_of(frame).inverse())
     initial = InitialState(base, joints, deputy, {_FRAME: frame})
     return FreeFloatingPlant(
-        robot, PlantParameters(integrator, *_TOLERANCES, resend_after=1.0), initial, tick_ns
+        robot, PlantParameters(integrator, *_TOLERANCES, resend_after=1.0, busy_wait=0.0), initial, tick_ns
     )
 
 

@@ -176,7 +176,7 @@ def test_static_error(robot: RobotModel, draw: Draw, period: float, record: Reco
     nowhere = Pose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
     start = InitialState(base, _BENT, nowhere, {})
     plant = FreeFloatingPlant(
-        robot, PlantParameters("rk4", 0.01, 0.03, 0.02, resend_after=1.0), start, 1_000_000
+        robot, PlantParameters("rk4", 0.01, 0.03, 0.02, resend_after=1.0, busy_wait=0.0), start, 1_000_000
     )
     law, desired = NmpcLaw(robot, NmpcGains(period, 0)), _at_rest(_BENT)
     decays = 30.0
