@@ -70,10 +70,10 @@ class Side:
         while min(self._came.values()) < stamp:
             self._inputs.spin_once(self._executor, _WAIT_S, self._last)
 
-    def _taker(self, topic: str) -> Callable[[bytes, int], None]:
+    def _taker(self, topic: str) -> Callable[[bytes, int, int], None]:
         """Return what notes the stamp of a message."""
 
-        def take(data: bytes, sent_ns: int) -> None:
+        def take(data: bytes, sent_ns: int, number: int) -> None:
             self._came[topic] = stamp_ns(data)
 
         return take

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from enum import Enum
 
 
 class SmsHandoverError(Exception):
@@ -49,6 +50,30 @@ class BagError(SmsHandoverError):
 
 class GraphError(SmsHandoverError):
     """The running graph broke its protocol: a node died, went silent or never appeared."""
+
+
+class Reason(Enum):
+    """Why a message is refused at the door of a node; the value is what a user reads."""
+
+    MALFORMED = "malformed"  # truncated, oversized, not of its type
+    NOT_FINITE = "not finite"
+    NOT_UNIT = "quaternion not of unit length"
+    NAMES = "wrong names"
+    LENGTHS = "wrong lengths"
+    FRAME = "wrong frame"
+    DUPLICATE = "duplicate stamp"
+    OLD = "stamp out of order"
+    FUTURE = "stamp from the future"
+    SENDER = "second publisher"
+
+
+class MessageError(GraphError):
+    """A message cannot be used; whoever takes it counts it by its reason and goes on without it."""
+
+    def __init__(self, reason: Reason, text: str) -> None:
+        """Keep the reason beside the words."""
+        self.reason = reason
+        super().__init__(text)
 
 
 class MissingDependencyError(SmsHandoverError, ImportError):

@@ -28,6 +28,7 @@ FOUNDATION_MODULES = {
     "share",
     "status_line",
     "run_data",
+    "checks",
 }
 MIDDLE = {"plant", "trajectory", "ik", "control"}
 CORE = {"model", *MIDDLE, "simulation", "bag", "analysis", "scene", "playback", "report", "export"}

@@ -18,6 +18,8 @@ from sms_handover.errors import BagError
 
 PUBLISHED_COUNTS = "sms_handover_interfaces/msg/PublishedCounts"
 
+_NO_STAMP = -1
+
 LONGEST_RUN_NS = 10**17  # [ns] three years; a later stamp is the wall clock's
 
 
@@ -105,7 +107,7 @@ class Recording:
     def receive(self, topic: str, data: bytes, wall_ns: int) -> None:
         """Record the CDR bytes of one message that arrived at ``wall_ns``."""
         if self._stamped.get(topic):
-            time_ns = stamp_ns(data)
+            time_ns = _stamp_or_not(data)
             if 0 <= time_ns < LONGEST_RUN_NS:
                 if time_ns > self._now_ns:
                     self._now_ns = time_ns
@@ -133,6 +135,17 @@ class Recording:
 
     def _book_counts(self, data: bytes) -> None:
         """Book what a node says it has published."""
-        report = self._types.deserialize(data, PUBLISHED_COUNTS)
+        try:
+            report = self._types.deserialize(data, PUBLISHED_COUNTS)
+        except BagError:
+            return  # it is in the bag, but counts nothing
         for topic, count in zip(report.topics, report.counts, strict=False):
             self._keeper.report_published(report.node, topic, int(count))
+
+
+def _stamp_or_not(data: bytes) -> int:
+    """Return the stamp of a message in ns, :data:`_NO_STAMP` if it is broken; it is recorded all the same."""
+    try:
+        return stamp_ns(data)
+    except BagError:
+        return _NO_STAMP

@@ -10,8 +10,8 @@ from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.inputs import Receive
 from sms_handover.ros.main import run_node
 from sms_handover.ros.phase_wire import PhaseWire
-from sms_handover.ros.stamp_sync import StampSync
-from sms_handover.ros.wire import JointStateWire, StateWire
+from sms_handover.ros.stamp_sync import StampOrder, StampSync
+from sms_handover.ros.wire import JointStateWire, StateWire, arrival_ns
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import load_task
 from sms_handover.simulation.wiring import longest_reference_ns, make_controller
@@ -24,6 +24,7 @@ from sms_handover.topics import (
     TASK_PHASE,
 )
 from sms_handover.types import JointReference
+from sms_handover.units import NS_PER_S
 
 _STATE = (JOINT_STATES, BASE_ODOMETRY)
 _STATE_AND_REFERENCE = (*_STATE, TASK_PHASE, JOINT_REFERENCE)
@@ -46,14 +47,22 @@ class ControllerNode(GraphNode[ControllerParameters]):
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
         self._reference_wire = JointStateWire(self.robot.joint_names, ("position", "velocity"))
         self._command_wire = JointStateWire(self.robot.joint_names, ("effort",))
-        self._phase_wire = PhaseWire()
-        self._inputs: StampSync[bytes] = StampSync()
+        self._phase_wire = PhaseWire(self.robot.arms, schedule.deputy.grasp_frames)
+        ahead_ns = self._reference_ns if self._lockstep else NS_PER_S
+        self._inputs: StampSync[bytes] = StampSync(ahead_ns=ahead_ns, paced=not self._lockstep)
+        self._orders = {topic: StampOrder(ahead_ns) for topic in (TASK_PHASE, JOINT_REFERENCE)}
         self._answered_ns = 0
         self._answer_bytes = b""
         self._watch = ReferenceWatch(longest_reference_ns(self.common, self.parameters))
         self._command = self.endpoints.publisher(JOINT_COMMAND)
-        for topic in (TASK_PHASE, JOINT_REFERENCE, *_STATE):
-            self.endpoints.receive(topic, self.inputs, self._taker(topic))
+        checks = {
+            TASK_PHASE: self._phase_wire.check,
+            JOINT_REFERENCE: self._reference_wire.check,
+            JOINT_STATES: self._state_wire.joints.check,
+            BASE_ODOMETRY: self._state_wire.odometry.check,
+        }
+        for topic, check in checks.items():
+            self.receive(topic, self._taker(topic), check)
 
     def diagnostic_values(self) -> dict[str, object]:
         """Return what has been answered and what came too late."""
@@ -77,7 +86,7 @@ class ControllerNode(GraphNode[ControllerParameters]):
 
     def _taker(self, topic: str) -> Receive:
         """Return the callback of a topic of raw messages."""
-        return lambda data, sent_ns: self._take(topic, stamp_ns(data), data)
+        return lambda data, sent_ns: self._take(topic, arrival_ns(data), data)
 
     def _take(self, topic: str, stamp: int, data: bytes) -> None:
         """Take one input; a state of time zero behind an answered one begins the run anew."""
@@ -85,7 +94,10 @@ class ControllerNode(GraphNode[ControllerParameters]):
             self._inputs.reset()
             self._controller.reset()
             self._watch.reset()
-        if not self._lockstep and topic in (JOINT_REFERENCE, TASK_PHASE):
+            for order in self._orders.values():
+                order.reset()
+        if not self._lockstep and topic in self._orders:
+            self._orders[topic].take(stamp, self._answered_ns)
             self._use(topic, data)
             return
         if topic == BASE_ODOMETRY and stamp == self._answered_ns and self._lockstep and self._answer_bytes:

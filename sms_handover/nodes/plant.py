@@ -13,6 +13,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from sms_handover.bag.stamp import stamp_ns
+from sms_handover.errors import MessageError, Reason
 from sms_handover.plant.answer_watch import AnswerWatch
 from sms_handover.plant.command_watch import CommandWatch
 from sms_handover.plant.parameters import PlantParameters
@@ -23,8 +24,8 @@ from sms_handover.ros.main import EXIT_OK, Stop, run_node
 from sms_handover.ros.marker import deputy_marker
 from sms_handover.ros.phase_wire import PhaseWire
 from sms_handover.ros.plant_outputs import PlantOutputs
-from sms_handover.ros.stamp_sync import StampSync
-from sms_handover.ros.wire import JointStateWire
+from sms_handover.ros.stamp_sync import StampOrder, StampSync
+from sms_handover.ros.wire import JointStateWire, arrival_ns, check_stamp
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import load_task
 from sms_handover.simulation.wiring import make_plant
@@ -69,8 +70,9 @@ class PlantNode(GraphNode[PlantParameters]):
         self._tick_ns, self._per_reference = self.common.tick_ns, self.common.ticks_per_reference
         self._is_recorded = RECORDER in self.common.peers
         self._command_wire = JointStateWire(self.robot.joint_names, ("effort",))
-        self._phase_wire = PhaseWire()
-        self._inputs: StampSync[bytes] = StampSync()
+        self._phase_wire = PhaseWire(self.robot.arms, tuple(schedule.deputy.grasp_frames))
+        self._inputs: StampSync[bytes] = StampSync(ahead_ns=self._tick_ns)
+        self._orders = {topic: StampOrder(0) for topic in _PHASE_AND_COMMAND}
         self._loop_clock = LoopClock(self.common.tick_ns, paced=not self._lockstep)
         self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
         self._command_watch = CommandWatch(self.parameters)
@@ -153,9 +155,9 @@ class PlantNode(GraphNode[PlantParameters]):
         names = [GRASP_EVENT, ROBOT_DESCRIPTION, DEPUTY_MARKER, RUN_STATE, LOOP_TIMING]
         self._publish = {name: self.endpoints.publisher(name) for name in names}
         self._outputs = PlantOutputs(self.robot, self.endpoints.publisher)
-        self.endpoints.receive(TASK_PHASE, self.inputs, self._on_phase)
-        self.endpoints.receive(JOINT_COMMAND, self.inputs, self._on_command)
-        self.endpoints.receive(RUN_RECORDED, self.inputs, self._on_recorded)
+        self.receive(TASK_PHASE, self._on_phase, self._phase_wire.check)
+        self.receive(JOINT_COMMAND, self._on_command, self._command_wire.check)
+        self.receive(RUN_RECORDED, self._on_recorded, check_stamp)
         self.endpoints.subscribe(RUN_READY, self._on_ready)
         self.create_service(SetBool, "~/pause", self._on_pause)
         self.create_service(StepTicks, "~/step", self._on_step)
@@ -210,12 +212,13 @@ class PlantNode(GraphNode[PlantParameters]):
     def _on_command(self, data: bytes, sent_ns: int) -> None:
         """Take a command; in lock step it may complete the tick."""
         if self._lockstep:
-            stamp = stamp_ns(data)
+            stamp = arrival_ns(data)
+            self._inputs.add(stamp, JOINT_COMMAND, data)
             if stamp == self._plant.stamp_ns:
                 self._loop_clock.answered()
-            self._inputs.add(stamp, JOINT_COMMAND, data)
             self._advance()
         else:
+            self._orders[JOINT_COMMAND].take(arrival_ns(data), self._plant.stamp_ns)
             self._command = self._read_command(data)
             if self._command.stamp_ns == self._plant.stamp_ns:
                 self._loop_clock.answered()
@@ -223,14 +226,20 @@ class PlantNode(GraphNode[PlantParameters]):
     def _on_phase(self, data: bytes, sent_ns: int) -> None:
         """Take the phase of the task; in lock step it may complete the tick."""
         if self._lockstep:
-            self._inputs.add(stamp_ns(data), TASK_PHASE, data)
+            self._inputs.add(arrival_ns(data), TASK_PHASE, data)
             self._advance()
         else:
+            self._orders[TASK_PHASE].take(arrival_ns(data), self._plant.stamp_ns)
             self._execute(data)
 
     def _on_recorded(self, data: bytes, sent_ns: int) -> None:
         """Note up to where the recorder has come; in lock step the plant may have waited for it."""
-        self._recorded_ns = stamp_ns(data)
+        stamp = arrival_ns(data)
+        if not self._recorded_ns <= stamp <= self._plant.stamp_ns:
+            reason = Reason.OLD if stamp < self._recorded_ns else Reason.FUTURE
+            allowed = f"allowed is {self._recorded_ns} to {self._plant.stamp_ns} ns"
+            raise MessageError(reason, f"recorded is said to be up to {stamp} ns, {allowed}")
+        self._recorded_ns = stamp
         if self._lockstep:
             self._advance()
 
@@ -337,9 +346,12 @@ class PlantNode(GraphNode[PlantParameters]):
         self._reset_asked = False
         self._steps_left = 0
         self._last_tick, self._failed_phase = self.common.last_tick(self._end_ns), ""
+        self._recorded_ns = 0
         self.finished = False
         self._plant.reset()
         self._inputs.reset()
+        for order in self._orders.values():
+            order.reset()
         self._loop_clock.reset()
         self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
         self._command_watch.reset()

@@ -6,10 +6,8 @@ from functools import partial
 from pathlib import Path
 from time import monotonic, time_ns
 
-from geometry_msgs.msg import PoseStamped
 from rclpy.executors import Executor
 from rclpy.qos import QoSProfile
-from rclpy.serialization import deserialize_message
 from sms_handover_interfaces.msg import PublishedCounts
 from std_msgs.msg import Header
 
@@ -17,20 +15,20 @@ from sms_handover.bag.ledger import ledger_table
 from sms_handover.bag.parameters import RecorderParameters
 from sms_handover.bag.provenance import provenance
 from sms_handover.bag.recording import Recording
-from sms_handover.bag.stamp import stamp_ns
 from sms_handover.bag.transforms import TF_TYPE, TransformsWire
 from sms_handover.errors import BagError, ConfigurationError, SmsHandoverError
 from sms_handover.frames import BASE, DEPUTY, WORLD
 from sms_handover.model.link_tree import LinkTree
-from sms_handover.ros.convert import pose_of_message, time_message
+from sms_handover.ros.convert import time_message
+from sms_handover.ros.door import Check
 from sms_handover.ros.graph_node import GraphNode
-from sms_handover.ros.inputs import Receive
+from sms_handover.ros.inputs import Deliver, Receive
 from sms_handover.ros.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, Stop, run_node
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.peer_parameters import PeerParameters
 from sms_handover.ros.qos import LOSSLESS, profile_of, stored, weakest
 from sms_handover.ros.stamp_sync import StampSync
-from sms_handover.ros.wire import StateWire
+from sms_handover.ros.wire import PoseWire, StateWire, arrival_ns, check_stamp, decoded
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import load_task
 from sms_handover.topics import (
@@ -47,7 +45,6 @@ from sms_handover.topics import (
     Rate,
     Topic,
 )
-from sms_handover.types import Pose
 
 _POLL_S = 0.005  # [s] of wall time between two batches: long enough to be cheap, short enough to lose little
 _QUIET_S = 0.05  # [s] of wall time without a message after which nothing is on the way any more
@@ -80,6 +77,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
         self._reported: set[str] = set()
         self._last_message = monotonic()
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
+        self._pose_wire = PoseWire(WORLD)
         self._tf: StampSync[bytes] = StampSync(_BEHIND)
         self._links = LinkTree(self.robot)
         frames = [*self._links.frames, (WORLD, DEPUTY)]
@@ -185,16 +183,27 @@ class RecorderNode(GraphNode[RecorderParameters]):
         }
         evenly = self.common.mode == LOCKSTEP or topic.publishers == (PLANT,)
         self._open(name, topic.type, profile, periods.get(topic.rate, 0) if evenly else 0)
-        receive: Receive = partial(self._receive, name)
-        if topic.name in _TF_INPUTS:
-            receive = partial(self._receive_for_tf, topic.name, name)
-        elif topic.name == JOINT_STATES:
-            receive = partial(self._receive_state, name)
-        elif topic.name == RUN_PUBLISHED:
-            receive = partial(self._receive_counts, name)
-        elif topic.rate is Rate.WALL:
-            receive = partial(self._receive_anyway, name)
-        self.endpoints.receive(topic.name, self.inputs, receive)
+        receive = self._receive_anyway if topic.rate is Rate.WALL else self._receive
+        self.endpoints.receive(topic.name, self.inputs, self._then(topic, partial(receive, name)))
+
+    def _then(self, topic: Topic, record: Receive) -> Deliver:
+        """Return what records every message, good or bad, and then uses the good ones for what needs them."""
+        uses: dict[str, tuple[Receive, Check]] = {
+            JOINT_STATES: (self._follow, check_stamp),
+            RUN_PUBLISHED: (self._note_counts, lambda data: None),
+            SAMPLED_JOINT_STATES: (partial(self._add_to_tf, topic.name), self._state_wire.joints.check),
+            SAMPLED_BASE_ODOMETRY: (partial(self._add_to_tf, topic.name), self._state_wire.odometry.check),
+            DEPUTY_POSE: (partial(self._add_to_tf, topic.name), self._pose_wire.check),
+        }
+        if topic.name not in uses:
+            return lambda data, sent_ns, number: record(data, sent_ns)
+        use = self.refusals.guarding(topic.name, *uses[topic.name], self.endpoints.sender(topic.name))
+
+        def deliver(data: bytes, sent_ns: int, number: int) -> None:
+            record(data, sent_ns)
+            use(data, sent_ns, number)
+
+        return deliver
 
     def _open(self, name: str, type_name: str, profile: QoSProfile, period_ns: int) -> None:
         """Open a topic in the bag."""
@@ -206,10 +215,9 @@ class RecorderNode(GraphNode[RecorderParameters]):
         self._last_message = monotonic()
         self._recording.receive(name, data, sent_ns)
 
-    def _receive_state(self, name: str, data: bytes, sent_ns: int) -> None:
-        """Record one state; its stamp is how far the run has come."""
-        self._receive(name, data, sent_ns)
-        self._state_ns = stamp_ns(data)
+    def _follow(self, data: bytes, sent_ns: int) -> None:
+        """Note from a state how far the run has come."""
+        self._state_ns = arrival_ns(data)
 
     def _receive_anyway(self, name: str, data: bytes, sent_ns: int) -> None:
         """Record one message of a topic that goes on after the run, which is no sign that more is to come."""
@@ -219,15 +227,13 @@ class RecorderNode(GraphNode[RecorderParameters]):
         """Record one message of a topic beyond the graph, which comes by the executor."""
         self._receive_anyway(name, data, time_ns())
 
-    def _receive_counts(self, name: str, data: bytes, sent_ns: int) -> None:
-        """Record what a node has published in all, and note that it has told."""
-        self._receive(name, data, sent_ns)
-        self._reported.add(deserialize_message(data, PublishedCounts).node)
+    def _note_counts(self, data: bytes, sent_ns: int) -> None:
+        """Note that a node has told what it has published in all."""
+        self._reported.add(decoded(data, PublishedCounts).node)
 
-    def _receive_for_tf(self, topic: str, name: str, data: bytes, sent_ns: int) -> None:
-        """Record one message and, when its companions are there too, the transforms that follow."""
-        self._receive(name, data, sent_ns)
-        stamp = stamp_ns(data)
+    def _add_to_tf(self, topic: str, data: bytes, sent_ns: int) -> None:
+        """Keep a message, and when its companions are there too record the transforms that follow."""
+        stamp = arrival_ns(data)
         if self._tf.begins_anew(stamp):
             self._tf.reset()
         self._tf.add(stamp, topic, data)
@@ -236,7 +242,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
             return
         state = self._state_wire.read(inputs[SAMPLED_JOINT_STATES], inputs[SAMPLED_BASE_ODOMETRY])
         poses = self._links.poses(state.base_in_world, state.joint_position)
-        poses.append(_pose(inputs[DEPUTY_POSE]))
+        poses.append(self._pose_wire.read_pose(inputs[DEPUTY_POSE]))
         self._recording.receive_at(TF, self._tf_wire.pack(stamp, poses), stamp, sent_ns)
 
     def _look_for_topics(self) -> None:
@@ -255,11 +261,6 @@ class RecorderNode(GraphNode[RecorderParameters]):
                 continue
             receive = partial(self._receive_now, name)
             self.create_subscription(kind, name, receive, weakest(offers), raw=True)
-
-
-def _pose(data: bytes) -> Pose:
-    """Return the pose in the bytes of a PoseStamped."""
-    return pose_of_message(deserialize_message(data, PoseStamped).pose)
 
 
 def main(args: Sequence[str] | None = None) -> int:

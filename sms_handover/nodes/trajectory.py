@@ -5,13 +5,11 @@ from dataclasses import replace
 from math import inf
 from typing import Any
 
-from rclpy.serialization import deserialize_message
 from sms_handover_interfaces.msg import GraspEvent
 from sms_handover_interfaces.srv import SolveIK
 
 from sms_handover.bag.decode import grasp_event
-from sms_handover.bag.stamp import stamp_ns
-from sms_handover.errors import GraphError
+from sms_handover.errors import GraphError, MessageError, Reason
 from sms_handover.frames import BASE, WORLD
 from sms_handover.model.poses import pose_row
 from sms_handover.ros.convert import (
@@ -24,7 +22,7 @@ from sms_handover.ros.inputs import Receive
 from sms_handover.ros.main import run_node
 from sms_handover.ros.phase_wire import PhaseWire
 from sms_handover.ros.stamp_sync import StampSync
-from sms_handover.ros.wire import JointStateWire, StateWire, pose_wire, read_pose
+from sms_handover.ros.wire import JointStateWire, PoseWire, StateWire, arrival_ns, check_stamp, decoded
 from sms_handover.simulation.feasibility import check_feasibility
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import ParameterSet, Scenario, load_parameters, load_task
@@ -43,6 +41,7 @@ from sms_handover.topics import (
 from sms_handover.trajectory.generator import Targets, TrajectoryGenerator
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.types import Array, RobotState, TaskPhase
+from sms_handover.units import NS_PER_S
 
 _INPUTS = (SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
 
@@ -61,8 +60,10 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._generator = TrajectoryGenerator(self.robot, schedule, self.parameters)
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
         self._reference_wire = JointStateWire(self.robot.joint_names, ("position", "velocity"))
-        self._pose_wire, self._phase_wire = pose_wire(WORLD), PhaseWire()
-        self._inputs: StampSync[bytes] = StampSync()
+        self._pose_wire, self._phase_wire = PoseWire(WORLD), PhaseWire()
+        self._lockstep = self.common.mode == LOCKSTEP
+        ahead_ns = self.common.reference_ns if self._lockstep else NS_PER_S
+        self._inputs: StampSync[bytes] = StampSync(ahead_ns=ahead_ns, paced=not self._lockstep)
         self._stamp_ns = self._newest_ns = 0
         self._answer: tuple[bytes, bytes] | None = None
         self._failures = 0
@@ -72,10 +73,10 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._ik_status = self.endpoints.publisher(IK_STATUS)
         self._reference = self.endpoints.publisher(JOINT_REFERENCE)
         self._targets = {arm: self.endpoints.publisher(target_pose(arm)) for arm in self.robot.arms}
-        self._lockstep = self.common.mode == LOCKSTEP
-        self.endpoints.receive(GRASP_EVENT, self.inputs, self._on_grasp)
-        for topic in _INPUTS:
-            self.endpoints.receive(topic, self.inputs, self._taker(topic))
+        checks = (self._state_wire.joints.check, self._state_wire.odometry.check, self._pose_wire.check)
+        self.receive(GRASP_EVENT, self._on_grasp, check_stamp)
+        for topic, check in zip(_INPUTS, checks, strict=True):
+            self.receive(topic, self._taker(topic), check)
 
     def prepared(self) -> bool:
         """Tell whether the IK service is there."""
@@ -101,7 +102,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
 
     def _taker(self, topic: str) -> Receive:
         """Return the callback of a topic."""
-        return lambda data, sent_ns: self._take(topic, stamp_ns(data), data)
+        return lambda data, sent_ns: self._take(topic, arrival_ns(data), data)
 
     def _take(self, topic: str, stamp: int, data: bytes) -> None:
         """Take one input; time zero behind a later time begins the run anew."""
@@ -122,7 +123,12 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
 
     def _on_grasp(self, data: bytes, sent_ns: int) -> None:
         """Take what came of a grasp; the next state may have come before it."""
-        self._generator.grasped((grasp_event(deserialize_message(data, GraspEvent)),))
+        try:
+            event = grasp_event(decoded(data, GraspEvent))
+        except IndexError as error:
+            text = "a grasp event has no known action or status"
+            raise MessageError(Reason.NAMES, text) from error
+        self._generator.grasped((event,))
         if self._asked is None:
             self._proceed(self._newest_ns)
 
@@ -135,7 +141,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
             return
         self._stamp_ns = stamp
         state = self._state_wire.read(inputs[SAMPLED_JOINT_STATES], inputs[SAMPLED_BASE_ODOMETRY])
-        phase, targets = self._generator.targets(state, read_pose(self._pose_wire, inputs[DEPUTY_POSE]))
+        phase, targets = self._generator.targets(state, self._pose_wire.read_pose(inputs[DEPUTY_POSE]))
         for event in self._generator.take_decisions():
             self.events.publish(event)
         if targets.tool_in_world:

@@ -18,7 +18,7 @@ from sms_handover_interfaces.msg import RunEvent as RunEventMessage
 from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
 from std_msgs.msg import Header
 
-from sms_handover.errors import GraphError
+from sms_handover.errors import MessageError, Reason
 from sms_handover.events import RunEvent, Severity
 from sms_handover.frames import WORLD
 from sms_handover.types import (
@@ -112,13 +112,19 @@ def joint_positions_message(names: Sequence[str], position: Array, stamp_ns: int
 
 
 def joints_in_order(names: Sequence[str], message_names: Sequence[str], values: Sequence[float]) -> Array:
-    """Return the values of a joint message in the order of ``names``; raises GraphError if one is missing."""
+    """Return the values of a joint message in the order of ``names``.
+
+    Raises MessageError if one is missing or given twice, or if there are not as many values as names.
+    """
     if len(message_names) != len(values):
-        raise GraphError(f"a joint message has {len(message_names)} names and {len(values)} values")
+        text = f"a joint message has {len(message_names)} names and {len(values)} values"
+        raise MessageError(Reason.LENGTHS, text)
     by_name: Mapping[str, float] = dict(zip(message_names, values, strict=True))
     missing = [name for name in names if name not in by_name]
     if missing:
-        raise GraphError(f"a joint message lacks {missing[0]!r}")
+        raise MessageError(Reason.NAMES, f"a joint message lacks {missing[0]!r}")
+    if len(by_name) < len(message_names):
+        raise MessageError(Reason.NAMES, "a joint message has a joint twice")
     return np.array([by_name[name] for name in names])
 
 

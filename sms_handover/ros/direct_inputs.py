@@ -18,10 +18,11 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
-from sms_handover.ros.inputs import Answer, Asker, Inputs, Receive
+from sms_handover.ros.inputs import Answer, Asker, Deliver, Inputs
 from sms_handover.units import NS_PER_S
 
 _SENT = "source_timestamp"  # [ns] of wall time, when the message was published
+_NUMBER = "publication_sequence_number"  # from 1 on for each publisher
 _BATCH = 4096  # taken of one input at most before another has its turn
 _SERVE_S = 0.02  # [s] of wall time at most between two turns of the executor while the loop runs
 _HOT_S = 0.1  # [s] of wall time without anything for the loop after which the executor does the waiting
@@ -39,11 +40,11 @@ class DirectInputs(Inputs):
         self._serve_at = self._hot_until = 0.0
         self._slept = False
 
-    def subscribe(self, kind: Any, topic: str, profile: QoSProfile, receive: Receive) -> Subscription:
-        """Hand every message of a topic to ``receive``."""
+    def subscribe(self, kind: Any, topic: str, profile: QoSProfile, deliver: Deliver) -> Subscription:
+        """Hand every message of a topic to ``deliver``."""
         subscription = self._node.create_subscription(kind, topic, _never, profile, raw=True)
         self._node._subscriptions.remove(subscription)
-        self._sources[topic] = _Messages(self._node, subscription, receive)
+        self._sources[topic] = _Messages(self._node, subscription, deliver)
         return subscription
 
     def asker(self, kind: Any, service: str, receive: Callable[[Any], None]) -> Asker:
@@ -132,12 +133,12 @@ class _Source(ABC):
 class _Messages(_Source):
     """The messages of a topic."""
 
-    def __init__(self, node: Node, subscription: Subscription, receive: Receive) -> None:
+    def __init__(self, node: Node, subscription: Subscription, deliver: Deliver) -> None:
         """Take over a raw subscription."""
         super().__init__(node, subscription, (1, 0, 0))
         self._take = subscription.handle.take_message
         self._kind = subscription.msg_type
-        self._receive = receive
+        self._deliver = deliver
 
     def _watch(self) -> None:
         self._wait_set.add_subscription(self._entity.handle)
@@ -148,7 +149,8 @@ class _Messages(_Source):
             message = self._take(self._kind, True)
             if message is None:
                 return taken
-            self._receive(message[0], message[1].get(_SENT) or time_ns())
+            info = message[1]
+            self._deliver(message[0], info.get(_SENT) or time_ns(), info.get(_NUMBER) or 0)
         return _BATCH
 
 

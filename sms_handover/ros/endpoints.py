@@ -11,9 +11,10 @@ from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from sms_handover.errors import GraphError
-from sms_handover.ros.inputs import Inputs, Receive
+from sms_handover.ros.inputs import Deliver, Inputs
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.qos import profile_of, serves
+from sms_handover.ros.sender import Sender
 from sms_handover.topics import RECORDER, Topic
 
 _RclError = rclpy_implementation.RCLError
@@ -32,6 +33,7 @@ class Endpoints:
         self._peers = frozenset(peers)
         self._publishers: dict[str, CountedPublisher] = {}
         self._subscriptions: dict[str, Subscription] = {}
+        self._senders: dict[str, Sender] = {}
 
     def publisher(self, name: str) -> "CountedPublisher":
         """Return a publisher on a topic of the table."""
@@ -40,12 +42,32 @@ class Endpoints:
         self._publishers[name] = CountedPublisher(publisher)
         return self._publishers[name]
 
-    def receive(self, name: str, inputs: Inputs, receive: Receive) -> None:
-        """Hand every message of a topic of the table to ``receive`` by the inputs of a node's loop."""
+    def receive(self, name: str, inputs: Inputs, deliver: Deliver) -> None:
+        """Hand every message of a topic of the table to ``deliver`` by the inputs of a node's loop."""
         topic = self._topics[name]
         self._subscriptions[name] = inputs.subscribe(
-            message_class(topic.type), topic.name, profile_of(topic), receive
+            message_class(topic.type), topic.name, profile_of(topic), deliver
         )
+
+    def sender(self, name: str) -> Sender | None:
+        """Return what knows the one publisher of a topic, None if the table gives it several.
+
+        From now on the endpoints count as unmatched as long as somebody else publishes on the topic.
+        """
+        if len(self._topics[name].publishers) > 1:
+            return None
+        full_name = self._node.resolve_topic_name(name)
+        self._senders[name] = Sender(self._node, full_name, self._peers)
+        return self._senders[name]
+
+    @property
+    def intruders(self) -> list[str]:
+        """Return in words which other nodes publish where one alone is to."""
+        return [
+            f"the end of node {other!r}, which publishes {name} too"
+            for name, sender in self._senders.items()
+            for other in sender.others
+        ]
 
     def subscribe(self, name: str, callback: Callable[[Any], None], *, raw: bool = False) -> Subscription:
         """Call ``callback`` with every message of a topic of the table, as CDR bytes if ``raw``."""
@@ -77,7 +99,7 @@ class Endpoints:
             found = _found(subscription.get_publisher_count(), serving, writers)
             if found < len(writers):
                 missing.append(f"{found} of {len(writers)} publishers of {name}")
-        return missing
+        return missing or self.intruders
 
     @property
     def counts(self) -> dict[str, int]:

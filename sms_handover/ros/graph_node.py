@@ -9,13 +9,16 @@ from rclpy.node import Node
 from sms_handover_interfaces.msg import PublishedCounts, RunState
 from std_msgs.msg import String
 
+from sms_handover.errors import MessageError, Reason
+from sms_handover.events import Severity
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.parameters import EVERY_NODE
 from sms_handover.ros.convert import time_message
 from sms_handover.ros.direct_inputs import DirectInputs
+from sms_handover.ros.door import REFUSED, Check, Refusals
 from sms_handover.ros.endpoints import Endpoints
 from sms_handover.ros.event_publisher import EventPublisher
-from sms_handover.ros.inputs import ExecutorInputs, Inputs
+from sms_handover.ros.inputs import ExecutorInputs, Inputs, Receive
 from sms_handover.ros.main import EXIT_OK, WAIT_S, RunnableNode, Stop
 from sms_handover.ros.parameters import declare, refuse_unknown
 from sms_handover.ros.process import settle
@@ -55,6 +58,7 @@ class GraphNode(RunnableNode, Generic[P]):
         self.robot: RobotModel = load_robot_model(self.common)
         self.endpoints = Endpoints(self, graph_topics(self.robot.arms), self.common.peers)
         self.inputs: Inputs = INPUTS[self.common.transport](self)
+        self.refusals = Refusals(self.get_logger().warning, self._on_refusal)
         self.finished = False
         self._counts = self.endpoints.publisher(RUN_PUBLISHED)
         self.events = EventPublisher(self, self.endpoints.publisher(RUN_EVENTS))
@@ -84,6 +88,11 @@ class GraphNode(RunnableNode, Generic[P]):
         """Destroy the node with its inputs."""
         self.inputs.destroy()
         super().destroy_node()
+
+    def receive(self, name: str, receive: Receive, check: Check) -> None:
+        """Hand to ``receive`` the messages of a topic that its own publisher has sent and that are good."""
+        sender = self.endpoints.sender(name)
+        self.endpoints.receive(name, self.inputs, self.refusals.guarding(name, receive, check, sender))
 
     def settle(self) -> None:
         """Set up the process as the parameters ask; raises ConfigurationError where it is not permitted."""
@@ -123,6 +132,11 @@ class GraphNode(RunnableNode, Generic[P]):
             PublishedCounts(node=self.get_name(), topics=list(counts), counts=list(counts.values()))
         )
 
+    def _on_refusal(self, topic: str, error: MessageError) -> None:
+        """Tell everybody of the first message of a topic that is refused for a reason."""
+        detail = f"{topic}: {error.reason.value}: {error}"
+        self.events.tell("refused", Severity.WARNING, detail, self.diagnostic_stamp_ns())
+
     def _look_for_peers(self) -> None:
         """Go on once every endpoint has matched."""
         if self.prepared() and not self.endpoints.unmatched:
@@ -138,10 +152,22 @@ class GraphNode(RunnableNode, Generic[P]):
         self.finished = ended
 
     def publish_diagnostics(self) -> None:
-        """Publish the state of this node; it does so itself once a second and at the end of the run."""
+        """Publish the state of this node; it does so itself once a second and at the end of the run.
+
+        Raises MessageError if another node publishes where one alone is to, and the transport does not tell
+        their messages apart.
+        """
+        self.refusals.tell()
+        if self.common.transport == EXECUTOR and self._matching.is_canceled() and self.endpoints.intruders:
+            text = f"waiting in vain for {self.endpoints.intruders[0]}; only with transport {DIRECT!r}"
+            raise MessageError(Reason.SENDER, f"{text} its messages can be told apart")
         waiting = self.endpoints.unmatched if not self._matching.is_canceled() else []
         level, words = self.diagnosis()
+        refused = self.refusals.counts
+        if refused and not level:
+            level, words = 1, f"refused {', '.join(f'{kind} ({count})' for kind, count in refused.items())}"
         told = {**self.diagnostic_values(), "wakes": self.inputs.wakes}
+        told.update((REFUSED + kind, count) for kind, count in refused.items())
         values = [KeyValue(key=key, value=str(value)) for key, value in told.items()]
         status = DiagnosticStatus(
             level=DiagnosticStatus.WARN if waiting else bytes([level]),

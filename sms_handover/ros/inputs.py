@@ -17,6 +17,7 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 Receive = Callable[[bytes, int], None]  # CDR bytes; wall time in ns of their sending, else of their coming
+Deliver = Callable[[bytes, int, int], None]  # and the number of the message at its publisher, 0 if not known
 Answer = Callable[[Any, Any], Any]  # request and empty response to response
 
 
@@ -42,8 +43,8 @@ class Inputs(ABC):
     wakes: int = 0
 
     @abstractmethod
-    def subscribe(self, kind: Any, topic: str, profile: QoSProfile, receive: Receive) -> Subscription:
-        """Hand every message of a topic to ``receive``."""
+    def subscribe(self, kind: Any, topic: str, profile: QoSProfile, deliver: Deliver) -> Subscription:
+        """Hand every message of a topic to ``deliver``."""
 
     @abstractmethod
     def asker(self, kind: Any, service: str, receive: Callable[[Any], None]) -> Asker:
@@ -79,11 +80,11 @@ class ExecutorInputs(Inputs):
         """Serve a node."""
         self._node = node
 
-    def subscribe(self, kind: Any, topic: str, profile: QoSProfile, receive: Receive) -> Subscription:
-        """Hand every message of a topic to ``receive``."""
+    def subscribe(self, kind: Any, topic: str, profile: QoSProfile, deliver: Deliver) -> Subscription:
+        """Hand every message of a topic to ``deliver``."""
 
         def callback(data: bytes) -> None:
-            receive(data, time_ns())  # EventsExecutor fails on callbacks that ask for the time of sending
+            deliver(data, time_ns(), 0)  # EventsExecutor fails on callbacks that ask for the time of sending
 
         return self._node.create_subscription(kind, topic, callback, profile, raw=True)
 

@@ -1,6 +1,7 @@
 """The launcher's ear on a running graph: how far it is, what was grasped, what it waits for."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -10,16 +11,17 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from rclpy.node import Node
 from rclpy.qos import QoSHistoryPolicy, QoSProfile, QoSReliabilityPolicy
-from rclpy.serialization import deserialize_message
 from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
 from sms_handover_interfaces.msg import PublishedCounts, RunState, TaskPhase
 from sms_handover_interfaces.msg import RunEvent as RunEventMessage
 from std_srvs.srv import Trigger
 
 from sms_handover.bag.decode import grasp_event, header_ns, run_event, task_phase
+from sms_handover.errors import MessageError
 from sms_handover.events import RunEvent
 from sms_handover.ros.inputs import Inputs
 from sms_handover.ros.qos import LATCHED
+from sms_handover.ros.wire import decoded
 from sms_handover.topics import (
     DIAGNOSTICS,
     GRASP_EVENT,
@@ -93,8 +95,9 @@ class RunMonitor:
             history=QoSHistoryPolicy.KEEP_LAST, depth=depth, reliability=QoSReliabilityPolicy.BEST_EFFORT
         )  # a display must never hold the loop back
 
-        def receive(data: bytes, sent_ns: int) -> None:
-            show(deserialize_message(data, kind))
+        def receive(data: bytes, sent_ns: int, number: int) -> None:
+            with suppress(MessageError):  # a broken one is for the nodes to count
+                show(decoded(data, kind))
 
         self._inputs.subscribe(kind, topic, profile, receive)
 

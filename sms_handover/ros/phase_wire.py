@@ -1,16 +1,19 @@
 """The phase of the task as CDR bytes; it changes a few times in a run, so its bytes are kept."""
 
 import struct
+from collections.abc import Collection
 from dataclasses import replace
 
-from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.serialization import serialize_message
 from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
 
 from sms_handover.bag.decode import task_phase
 from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.stamp import stamp_ns
+from sms_handover.errors import MessageError, Reason
 from sms_handover.ros.convert import phase_message
-from sms_handover.types import TaskPhase
+from sms_handover.ros.wire import decoded
+from sms_handover.types import GraspAction, TaskPhase
 from sms_handover.units import NS_PER_S
 
 _STAMP = struct.Struct("<iI")  # seconds, nanoseconds
@@ -22,8 +25,9 @@ _TYPE = "sms_handover_interfaces/msg/TaskPhase"
 class PhaseWire:
     """Packs and reads TaskPhase messages; all but the stamp is worked out once per phase."""
 
-    def __init__(self) -> None:
-        """Know the type of the message."""
+    def __init__(self, arms: Collection[str] = (), grasp_frames: Collection[str] = ()) -> None:
+        """Know the type of the message, and for :meth:`check` of which robot and deputy it may speak."""
+        self._arms, self._grasp_frames = frozenset(arms), frozenset(grasp_frames)
         self._types = MessageTypes()
         self._packed: tuple[TaskPhase, bytes] | None = None
         self._read: tuple[bytes, TaskPhase] | None = None
@@ -36,11 +40,27 @@ class PhaseWire:
         return _HEAD + stamp + self._packed[1]
 
     def read(self, data: bytes) -> TaskPhase:
-        """Return the phase in the bytes of a message, of any sender."""
+        """Return the phase in the bytes of a message, of any sender; raises MessageError if it is none."""
         rest = data[: len(_HEAD)] + data[_BODY_AT:]
         if self._read is None or self._read[0] != rest:
-            self._read = rest, task_phase(deserialize_message(data, TaskPhaseMessage))
+            message = decoded(data, TaskPhaseMessage)
+            try:
+                self._read = rest, task_phase(message)
+            except IndexError as error:
+                text = "a phase has a grasp command of no known action"
+                raise MessageError(Reason.NAMES, text) from error
         return replace(self._read[1], stamp_ns=stamp_ns(data))
+
+    def check(self, data: bytes) -> None:
+        """Raise MessageError unless the grasp commands of a message are for the robot and the deputy."""
+        for command in self.read(data).commands:
+            arms = {command.arm, command.from_arm} - {""}
+            frames = {command.grasp_frame} - {""}
+            unknown = (arms - self._arms) | (frames - self._grasp_frames)
+            if unknown or not command.arm or not (frames or command.action is GraspAction.RELEASE):
+                named = f"arm {command.arm!r} and grasp frame {command.grasp_frame!r}"
+                text = f"a phase asks to {command.action.value} with {named}, which are not all known"
+                raise MessageError(Reason.NAMES, text)
 
     def _serialize(self, phase: TaskPhase) -> bytes:
         """Return what follows the stamp in the bytes of a message.

@@ -12,7 +12,7 @@ from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.ros.convert import time_message
 from sms_handover.ros.endpoints import CountedPublisher
-from sms_handover.ros.wire import StateWire, energy_wire, pose_wire, vector_wire
+from sms_handover.ros.wire import PoseWire, StateWire, energy_wire, vector_wire
 from sms_handover.topics import (
     ANGULAR_MOMENTUM,
     BASE_ODOMETRY,
@@ -39,7 +39,7 @@ class PlantOutputs:
         names = (*_LOOP, *_PERIOD, CLOCK, *(tool_pose(arm) for arm in robot.arms))
         self._publish: dict[str, Callable[[Any], None]] = {name: publisher(name).publish for name in names}
         self._state_wire = StateWire(robot.joint_names, WORLD, BASE)
-        self._pose_wire, self._vector_wire = pose_wire(WORLD), vector_wire(WORLD)
+        self._pose_wire, self._vector_wire = PoseWire(WORLD), vector_wire(WORLD)
         self._energy_wire = energy_wire(WORLD)
 
     def publish_loop(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:

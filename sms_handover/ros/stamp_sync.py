@@ -1,23 +1,58 @@
 """Brings together inputs of equal stamp, whatever order they arrive in."""
 
+from time import monotonic_ns
 from typing import Generic, TypeVar
+
+from sms_handover.errors import MessageError, Reason
+from sms_handover.units import ns_to_seconds
 
 V = TypeVar("V")
 
 _LONGEST = 64  # [stamps] waiting at most by default; more means that an input has stopped
 
 
+class StampOrder:
+    """The stamps of an input that is used as it comes: each newer than the last, none from the future."""
+
+    def __init__(self, ahead_ns: int) -> None:
+        """Begin before time zero; a stamp further than ``ahead_ns`` ahead of the run is from the future."""
+        self._ahead_ns = ahead_ns
+        self._newest_ns = -1
+
+    def reset(self) -> None:
+        """Begin again before time zero."""
+        self._newest_ns = -1
+
+    def take(self, stamp_ns: int, now_ns: int) -> None:
+        """Note a stamp; raises MessageError if it is not newer, or ahead of a run that is at ``now_ns``."""
+        if stamp_ns <= self._newest_ns:
+            reason = Reason.DUPLICATE if stamp_ns == self._newest_ns else Reason.OLD
+            newest = f"the newest one has {ns_to_seconds(self._newest_ns):g} s"
+            raise MessageError(reason, f"stamped {ns_to_seconds(stamp_ns):g} s, but {newest}")
+        if stamp_ns - now_ns > self._ahead_ns:
+            now = f"the run is at {ns_to_seconds(now_ns):g} s"
+            raise MessageError(Reason.FUTURE, f"stamped {ns_to_seconds(stamp_ns):g} s, but {now}")
+        self._newest_ns = stamp_ns
+
+
 class StampSync(Generic[V]):
     """Keeps inputs until all that belong to one stamp are there.
 
-    Inputs have names. Stamps older than the last one taken are dropped and counted.
+    Inputs have names. Stamps that are not newer than the last one taken are refused and counted.
     """
 
-    def __init__(self, longest: int = _LONGEST) -> None:
-        """Start empty; at most ``longest`` stamps wait, then the oldest is given up."""
+    def __init__(self, longest: int = _LONGEST, *, ahead_ns: int | None = None, paced: bool = False) -> None:
+        """Start empty; at most ``longest`` stamps wait, then the oldest is given up.
+
+        A stamp further than ``ahead_ns`` ahead of the last one taken is from the future. If the run is
+        ``paced`` by the wall clock, it may go on by as much as that has.
+        """
         self._longest = longest
+        self._ahead_ns = ahead_ns
+        self._paced = paced
         self._waiting: dict[int, dict[str, V]] = {}
         self._taken_ns = -1
+        self._taken_at_ns = monotonic_ns()
         self.dropped = 0
 
     def begins_anew(self, stamp_ns: int) -> bool:
@@ -33,13 +68,28 @@ class StampSync(Generic[V]):
         self._taken_ns = -1
 
     def add(self, stamp_ns: int, name: str, value: V) -> None:
-        """Keep an input."""
+        """Keep an input; raises MessageError if its stamp is not one of those to come."""
         if stamp_ns <= self._taken_ns:
             self.dropped += 1
-            return
+            taken = f"{ns_to_seconds(self._taken_ns):g} s has been worked on"
+            if stamp_ns == self._taken_ns:
+                raise MessageError(Reason.DUPLICATE, f"the stamp of {taken} already")
+            raise MessageError(Reason.OLD, f"stamped {ns_to_seconds(stamp_ns):g} s, but {taken}")
+        if self._ahead_ns is not None and stamp_ns - max(self._taken_ns, 0) > self._ahead_ns:
+            self._refuse_future(stamp_ns, self._ahead_ns)
         self._waiting.setdefault(stamp_ns, {})[name] = value
         if len(self._waiting) > self._longest:
             self.dropped += len(self._waiting.pop(min(self._waiting)))
+
+    def _refuse_future(self, stamp_ns: int, ahead_ns: int) -> None:
+        """Raise MessageError if a stamp is further ahead than a run can have come."""
+        known_ns = max(self._taken_ns, 0) + (monotonic_ns() - self._taken_at_ns if self._paced else 0)
+        if stamp_ns - known_ns > ahead_ns:
+            raise MessageError(
+                Reason.FUTURE,
+                f"stamped {ns_to_seconds(stamp_ns):g} s, but the run has come to "
+                f"{ns_to_seconds(max(self._taken_ns, 0)):g} s",
+            )
 
     @property
     def oldest_ns(self) -> int | None:
@@ -57,6 +107,8 @@ class StampSync(Generic[V]):
         if inputs is None or not inputs.keys() >= set(names):
             return None
         self._taken_ns = stamp_ns
+        if self._paced:
+            self._taken_at_ns = monotonic_ns()
         if len(self._waiting) == 1:
             self._waiting.clear()
             return inputs

@@ -12,22 +12,27 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.stamp import stamp_ns
-from sms_handover.errors import GraphError
+from sms_handover.checks import check_finite, check_unit
+from sms_handover.errors import BagError, GraphError, MessageError, Reason
 from sms_handover.model.poses import pose_row
 from sms_handover.ros.convert import joints_in_order, pose_of_message
 from sms_handover.types import BASE_NQ, BASE_NV, Array, Pose, RobotState, frozen
-from sms_handover.units import NS_PER_S
+from sms_handover.units import NS_PER_S, ns_to_seconds
+
+_RmwError = rclpy_implementation.RMWError
 
 _STAMP = struct.Struct("<iI")  # seconds, nanoseconds
 _STAMP_AT = 4  # [byte] behind the encapsulation header
 _BODY_AT = _STAMP_AT + _STAMP.size
 _DOUBLE = 8  # [byte]
 _LITTLE_ENDIAN = b"\x00\x01"  # encapsulation of plain CDR
+_LARGEST = 65536  # [byte] of a message of another layout
 
 
 class JointStateWire:
@@ -44,6 +49,8 @@ class JointStateWire:
         self._fixed = _around(self._template, self._at.values(), n * _DOUBLE)
         self._buffer = bytearray(self._template)
         self._numbers = {block: np.frombuffer(self._buffer, "<f8", n, at) for block, at in self._at.items()}
+        self._first_at = min(self._at.values())
+        self._count = (max(self._at.values()) - self._first_at) // _DOUBLE + n  # of numbers, lengths included
 
     def pack(self, stamp_ns: int, **blocks: Array) -> bytes:
         """Return the bytes of a message with a stamp and the arrays (n,) of every block."""
@@ -53,12 +60,24 @@ class JointStateWire:
         return bytes(self._buffer)
 
     def read(self, data: bytes) -> dict[str, Array]:
-        """Return the arrays (n,) of every block in the order of the joints; raises GraphError."""
+        """Return the arrays (n,) of every block in the order of the joints; raises MessageError."""
         if len(data) == len(self._template) and self._same_layout(data):
             n = len(self._names)
             return {block: np.frombuffer(data, "<f8", n, at) for block, at in self._at.items()}
-        message: Any = deserialize_message(data, JointState)
+        message = decoded(data, JointState)
         return {b: joints_in_order(self._names, message.name, getattr(message, b)) for b in self._blocks}
+
+    def check(self, data: bytes) -> None:
+        """Raise MessageError unless the message has every joint with finite numbers.
+
+        What stands between the blocks of the template is their length, which is finite too if it is
+        taken for a number, so one look is enough for all of them.
+        """
+        if len(data) == len(self._template) and self._same_layout(data):
+            check_finite(np.frombuffer(data, "<f8", self._count, self._first_at), "a joint message")
+            return
+        for block, values in self.read(data).items():
+            check_finite(values, f"{block} in a joint message")
 
     def _same_layout(self, data: bytes) -> bool:
         """Tell whether the bytes are little endian and have names and lengths where the template has them."""
@@ -96,17 +115,29 @@ class OdometryWire:
         return bytes(self._buffer)
 
     def read(self, data: bytes) -> tuple[Array, Array]:
-        """Return pose (7,) and twist (6,) as they are packed; raises GraphError if the frames are others."""
-        if data.startswith(_LITTLE_ENDIAN) and data.startswith(self._fixed, _BODY_AT):
+        """Return pose (7,) and twist (6,) as they are packed; raises MessageError on others."""
+        if len(data) >= len(self._template) and self._same_layout(data):
             pose = np.frombuffer(data, "<f8", BASE_NQ, self._pose_at)
             return pose, np.frombuffer(data, "<f8", BASE_NV, self._twist_at)
-        message: Any = deserialize_message(data, Odometry)
+        message = decoded(data, Odometry)
         frames = (message.header.frame_id, message.child_frame_id)
         if frames != self._frames:
-            raise GraphError(f"an odometry message is between frames {frames}, expected {self._frames}")
+            text = f"an odometry message is between frames {frames}, expected {self._frames}"
+            raise MessageError(Reason.FRAME, text)
         linear, angular = message.twist.twist.linear, message.twist.twist.angular
         twist = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
         return pose_row(pose_of_message(message.pose.pose)), np.array(twist)
+
+    def check(self, data: bytes) -> None:
+        """Raise MessageError unless frames, rotation and numbers are good."""
+        pose, twist = self.read(data)
+        check_finite(pose, "the pose of an odometry message")
+        check_finite(twist, "the twist of an odometry message")
+        check_unit(pose[3:], "an odometry message")
+
+    def _same_layout(self, data: bytes) -> bool:
+        """Tell whether the bytes are little endian and have the frames of the template."""
+        return data.startswith(_LITTLE_ENDIAN) and data.startswith(self._fixed, _BODY_AT)
 
 
 class StampedWire:
@@ -140,17 +171,30 @@ class StampedWire:
         return bytes(buffer)
 
 
-def pose_wire(frame: str) -> StampedWire:
-    """Return what packs PoseStamped: position, then quaternion x y z w."""
-    return StampedWire("geometry_msgs/msg/PoseStamped", frame, lambda types, n: {"pose": _pose(types, n)})
+class PoseWire(StampedWire):
+    """Packs and reads PoseStamped in one frame: position, then quaternion x y z w."""
 
+    def __init__(self, frame: str) -> None:
+        """Fix the frame."""
+        super().__init__("geometry_msgs/msg/PoseStamped", frame, lambda types, n: {"pose": _pose(types, n)})
+        self._frame = frame
 
-def read_pose(wire: StampedWire, data: bytes) -> Pose:
-    """Return the pose in the bytes of a PoseStamped of any layout."""
-    numbers = wire.read(data)
-    if numbers is None:
-        return pose_of_message(deserialize_message(data, PoseStamped).pose)
-    return Pose(numbers[:3], numbers[3:])
+    def read_pose(self, data: bytes) -> Pose:
+        """Return the pose in the bytes of a message of any layout; raises MessageError."""
+        numbers = self.read(data)
+        if numbers is not None:
+            return Pose(numbers[:3], numbers[3:])
+        message = decoded(data, PoseStamped)
+        if message.header.frame_id != self._frame:
+            text = f"a pose is in frame {message.header.frame_id!r}, expected {self._frame!r}"
+            raise MessageError(Reason.FRAME, text)
+        return pose_of_message(message.pose)
+
+    def check(self, data: bytes) -> None:
+        """Raise MessageError unless frame, rotation and numbers are good."""
+        pose = pose_row(self.read_pose(data))
+        check_finite(pose, "a pose")
+        check_unit(pose[3:], "a pose")
 
 
 def vector_wire(frame: str) -> StampedWire:
@@ -170,27 +214,54 @@ class StateWire:
 
     def __init__(self, joint_names: Sequence[str], world: str, base: str) -> None:
         """Fix joint and frame names."""
-        self._joints = JointStateWire(joint_names, ("position", "velocity", "effort"))
-        self._odometry = OdometryWire(world, base)
+        self.joints = JointStateWire(joint_names, ("position", "velocity", "effort"))
+        self.odometry = OdometryWire(world, base)
 
     def pack(self, state: RobotState) -> tuple[bytes, bytes]:
         """Return the bytes of the JointState and the Odometry of a state."""
-        joints = self._joints.pack(
+        joints = self.joints.pack(
             state.stamp_ns,
             position=state.joint_position,
             velocity=state.joint_velocity,
             effort=state.joint_effort,
         )
-        odometry = self._odometry.pack(state.stamp_ns, state.q[:BASE_NQ], state.v[:BASE_NV])
+        odometry = self.odometry.pack(state.stamp_ns, state.q[:BASE_NQ], state.v[:BASE_NV])
         return joints, odometry
 
     def read(self, joints: bytes, odometry: bytes) -> RobotState:
         """Return the state that two messages of equal stamp carry."""
-        blocks = self._joints.read(joints)
-        base_in_world, twist_base_in_base = self._odometry.read(odometry)
+        blocks = self.joints.read(joints)
+        base_in_world, twist_base_in_base = self.odometry.read(odometry)
         q = frozen(np.concatenate([base_in_world, blocks["position"]]))
         v = frozen(np.concatenate([twist_base_in_base, blocks["velocity"]]))
         return RobotState(stamp_ns(joints), q, v, blocks["effort"])
+
+
+def decoded(data: bytes, kind: Any) -> Any:
+    """Return a message of any layout, order and sender; raises MessageError if it is not of this class."""
+    if len(data) > _LARGEST:
+        raise MessageError(Reason.MALFORMED, f"a message has {len(data)} bytes, allowed are {_LARGEST}")
+    try:
+        return deserialize_message(data, kind)
+    except (_RmwError, UnicodeDecodeError) as error:
+        text = f"{len(data)} bytes do not decode as {kind.__name__}"
+        raise MessageError(Reason.MALFORMED, text) from error
+
+
+def arrival_ns(data: bytes) -> int:
+    """Return the stamp in the bytes of a message in ns; raises MessageError if it is none."""
+    try:
+        stamp = stamp_ns(data)
+    except BagError as error:
+        raise MessageError(Reason.MALFORMED, str(error)) from error
+    if stamp < 0:
+        raise MessageError(Reason.OLD, f"a message is stamped {ns_to_seconds(stamp):g} s, before any run")
+    return stamp
+
+
+def check_stamp(data: bytes) -> None:
+    """Raise MessageError unless a message begins with a stamp, of which there is nothing else to check."""
+    arrival_ns(data)
 
 
 def _joint_state(names: tuple[str, ...], blocks: dict[str, Array]) -> bytes:

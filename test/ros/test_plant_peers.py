@@ -13,7 +13,6 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from sms_handover.bag.stamp import stamp_ns
-from sms_handover.errors import GraphError
 from sms_handover.ros.convert import header, phase_message
 from sms_handover.ros.endpoints import Endpoints
 from sms_handover.topics import (
@@ -164,11 +163,14 @@ def test_commands_are_matched_by_name(bench: Bench) -> None:
     assert efforts(graph)[1] == [by_name[name] for name in graph.plant.robot.joint_names]
 
 
-def test_a_command_without_a_joint_ends_the_run_in_words(bench: Bench) -> None:
+def test_a_command_without_a_joint_is_as_none(bench: Bench) -> None:
+    """It is refused by its reason, and the plant goes on waiting."""
     names = [f"{arm}_joint_{number}" for arm in ("arm_a", "arm_b") for number in range(1, 8)]
     graph = plant_with(bench, names=[*names[:-1], "arm_b_joint_8"])
-    with pytest.raises(GraphError, match="a joint message lacks 'arm_b_joint_7'"):
-        graph.run()
+    graph.ear.get_ready(bench)
+    bench.until(lambda: graph.plant.refusals.counts, "a refusal")
+    assert graph.plant.refusals.counts == {f"{JOINT_COMMAND}: wrong names": 1}
+    assert graph.plant.diagnostic_stamp_ns() == 0
 
 
 def test_without_an_answer_the_plant_waits(bench: Bench) -> None:

@@ -5,7 +5,8 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from sms_handover.ros.stamp_sync import StampSync
+from sms_handover.errors import MessageError, Reason
+from sms_handover.ros.stamp_sync import StampOrder, StampSync
 
 NAMES = ("a", "b", "c")
 
@@ -54,14 +55,17 @@ def test_what_is_not_asked_for_does_not_hold_back() -> None:
     assert sync.take(1, ("a",)) == {"a": 1, "d": 4}
 
 
-def test_old_stamps_are_dropped_and_counted() -> None:
+def test_old_stamps_are_refused_and_counted() -> None:
     sync: StampSync[int] = StampSync()
     sync.add(3, "a", 3)
     sync.add(4, "a", 4)
     assert sync.take(4, ("a",)) == {"a": 4}
     assert sync.take(3, ("a",)) is None  # older than what was taken
-    sync.add(4, "b", 4)
-    sync.add(2, "a", 2)
+    with pytest.raises(MessageError, match="worked on") as duplicate:
+        sync.add(4, "b", 4)
+    with pytest.raises(MessageError, match="worked on") as old:
+        sync.add(2, "a", 2)
+    assert (duplicate.value.reason, old.value.reason) == (Reason.DUPLICATE, Reason.OLD)
     assert sync.dropped == 2
     assert sync.take(4, ("b",)) is None
     sync.add(5, "a", 5)
@@ -122,3 +126,43 @@ def test_a_run_that_begins_anew_takes_the_same_stamps_again() -> None:
     sync.add(0, "a", "new")
     assert sync.take(0, ("a",)) == {"a": "new"}
     assert sync.dropped == 0
+
+
+def test_a_stamp_from_the_future_is_refused_and_leaves_nothing() -> None:
+    """Sixty-four of them would otherwise push out what really is waited for."""
+    sync: StampSync[int] = StampSync(ahead_ns=10)
+    for stamp in (11, 1000, 10**18):
+        with pytest.raises(MessageError) as caught:
+            sync.add(stamp, "a", 0)
+        assert caught.value.reason is Reason.FUTURE
+    assert sync.oldest_ns is None
+    sync.add(10, "a", 1)
+    assert sync.take(10, ("a",)) == {"a": 1}
+    sync.add(20, "a", 2)
+    with pytest.raises(MessageError):
+        sync.add(21, "a", 2)
+
+
+def test_a_run_in_real_time_may_go_on_as_the_wall_clock_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [5_000]
+    monkeypatch.setattr("sms_handover.ros.stamp_sync.monotonic_ns", lambda: now[0])
+    sync: StampSync[int] = StampSync(ahead_ns=10, paced=True)
+    sync.add(3, "a", 0)
+    sync.take(3, ("a",))
+    now[0] += 100
+    with pytest.raises(MessageError):
+        sync.add(114, "a", 0)
+    sync.add(113, "a", 0)
+
+
+def test_an_input_used_as_it_comes_is_used_in_order_and_once() -> None:
+    order = StampOrder(ahead_ns=0)
+    order.take(0, 0)
+    order.take(5, 7)
+    for stamp, now, reason in ((5, 7, Reason.DUPLICATE), (4, 7, Reason.OLD), (8, 7, Reason.FUTURE)):
+        with pytest.raises(MessageError) as caught:
+            order.take(stamp, now)
+        assert caught.value.reason is reason
+    order.take(7, 7)  # nothing that was refused has moved the newest
+    order.reset()
+    order.take(0, 0)

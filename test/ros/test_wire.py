@@ -25,9 +25,9 @@ from sms_handover.ros.convert import (
 from sms_handover.ros.wire import (
     JointStateWire,
     OdometryWire,
+    PoseWire,
     StateWire,
     energy_wire,
-    pose_wire,
     vector_wire,
 )
 from sms_handover.types import Array, Pose, RobotState, Twist
@@ -340,7 +340,7 @@ def test_stamped_messages_have_the_bytes_of_rosbags(frame: str, stamp: int) -> N
     )
     stamped = rosbags_message("geometry_msgs/msg/PoseStamped", header=header, pose=pose)
     expected = bytes(ROSBAGS.serialize_cdr(stamped, "geometry_msgs/msg/PoseStamped"))
-    assert pose_wire(frame).pack(stamp, values) == expected
+    assert PoseWire(frame).pack(stamp, values) == expected
     vector = geometry("Vector3", "xyz", values[:3])
     stamped = rosbags_message("geometry_msgs/msg/Vector3Stamped", header=header, vector=vector)
     expected = bytes(ROSBAGS.serialize_cdr(stamped, "geometry_msgs/msg/Vector3Stamped"))
@@ -349,7 +349,7 @@ def test_stamped_messages_have_the_bytes_of_rosbags(frame: str, stamp: int) -> N
 
 def test_rclpy_reads_the_stamped_messages() -> None:
     values = np.arange(1.0, 8.0)
-    pose: Any = deserialize_message(pose_wire("world").pack(3_000_000_004, values), PoseStamped)
+    pose: Any = deserialize_message(PoseWire("world").pack(3_000_000_004, values), PoseStamped)
     assert pose == pose_stamped(Pose(values[:3], values[3:]), 3_000_000_004)
     vector: Any = deserialize_message(vector_wire("world").pack(5, values[:3]), Vector3Stamped)
     assert vector == vector_stamped(values[:3], 5)

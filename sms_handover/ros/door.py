@@ -1,0 +1,76 @@
+"""The door of a node: what comes in is checked, and what is refused is counted and told, never used."""
+
+from collections import Counter
+from collections.abc import Callable
+from time import monotonic
+
+from sms_handover.errors import MessageError, Reason
+from sms_handover.ros.inputs import Deliver, Receive
+from sms_handover.ros.sender import Sender
+
+Check = Callable[[bytes], None]  # raises MessageError
+First = Callable[[str, MessageError], None]  # topic and error of the first refusal of its kind
+
+REFUSED = "refused "  # begins the keys in the diagnostics of a node that count its refusals
+
+_TELL_S = 1.0  # [s] of wall time at least between two lines of the log
+
+
+class Refusals:
+    """Counts the messages that a node has refused, by topic and reason, and tells of them.
+
+    The first of each topic and reason is told at once; of a thousand more in a second the log has one
+    line, with the newest of them and how many.
+    """
+
+    def __init__(self, tell: Callable[[str], None], first: First) -> None:
+        """Write lines with ``tell``; ``first`` is called with the first refusal of each topic and reason."""
+        self._tell = tell
+        self._first = first
+        self._counts: Counter[tuple[str, Reason]] = Counter()
+        self._untold = 0
+        self._newest = ""
+        self._told_at = -_TELL_S
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Return how many were refused in all by topic and reason, e.g. ``joint_command: not finite``."""
+        return {f"{topic}: {reason.value}": count for (topic, reason), count in self._counts.items()}
+
+    def add(self, topic: str, error: MessageError) -> None:
+        """Count a message that is refused."""
+        kind = topic, error.reason
+        self._counts[kind] += 1
+        if self._counts[kind] == 1:
+            self._first(topic, error)
+            return
+        self._untold += 1
+        self._newest = f"{topic}: refused, {error.reason.value}: {error}"
+        self.tell()
+
+    def tell(self) -> None:
+        """Write what has not been told yet, unless the last line is too young."""
+        now = monotonic()
+        if self._untold and now - self._told_at >= _TELL_S:
+            more = f" ({self._untold - 1} more since the last line)" if self._untold > 1 else ""
+            self._tell(self._newest + more)
+            self._untold, self._told_at = 0, now
+
+    def guarding(self, topic: str, receive: Receive, check: Check, sender: Sender | None = None) -> Deliver:
+        """Return what hands on the messages that pass the checks, and counts the others.
+
+        ``receive`` may refuse a message too by a MessageError, as long as it has not used it.
+        """
+
+        def take(data: bytes, sent_ns: int, number: int) -> None:
+            try:
+                if number and sender is not None:
+                    if number != sender.due or sender.contested:
+                        sender.require(number)
+                    sender.due = number + 1
+                check(data)
+                receive(data, sent_ns)
+            except MessageError as error:
+                self.add(topic, error)
+
+        return take
