@@ -1,5 +1,6 @@
 """The plant conserves what a free-floating robot conserves, and books every joule its motors give."""
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -11,7 +12,7 @@ from sms_handover.model.poses import pose_distance, pose_of, se3_of
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
 from sms_handover.plant.integrators import TABLEAUS
-from sms_handover.plant.parameters import PlantParameters
+from sms_handover.simulation.scenario import load_parameters
 from sms_handover.types import Array, GraspAction, GraspCommand, GraspStatus, JointCommand, Pose
 from sms_handover.units import ns_to_seconds
 
@@ -19,7 +20,11 @@ from .conftest import Draw, row_distance, slope
 
 _EPS = np.finfo(float).eps
 _MS = 1_000_000  # [ns]
-_TOLERANCES = (0.01, 0.03, 0.02)  # m, rad, m/s
+_TOLERANCES = {
+    "grasp_position_tolerance": 0.01,  # m
+    "grasp_angle_tolerance": 0.03,  # rad
+    "grasp_speed_tolerance": 0.02,  # m/s
+}
 _FRAME = "handle"
 
 
@@ -31,9 +36,8 @@ def _plant(
     frame = Pose(np.array([0.0, 0.1, 0.0]), np.array([0.0, 0.0, 0.0, 1.0]))
     deputy = pose_of(se3_of(tool) * se3_of(frame).inverse())
     initial = InitialState(base, joints, deputy, {_FRAME: frame})
-    return FreeFloatingPlant(
-        robot, PlantParameters(integrator, *_TOLERANCES, resend_after=1.0, busy_wait=0.0), initial, tick_ns
-    )
+    parameters = replace(load_parameters().plant, integrator=integrator, **_TOLERANCES)
+    return FreeFloatingPlant(robot, parameters, initial, tick_ns)
 
 
 class Drift:

@@ -4,6 +4,7 @@ Under NMPC the errors of a nonlinear, free-floating robot obey e'' + A2 e' + A1 
 obey, for small errors, the linear equations of the robot frozen in one configuration.
 """
 
+from dataclasses import replace
 from math import exp, factorial
 
 import numpy as np
@@ -17,7 +18,7 @@ from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
 from sms_handover.plant.integrators import TABLEAUS, LieGroupIntegrator
-from sms_handover.plant.parameters import PlantParameters
+from sms_handover.simulation.scenario import load_parameters
 from sms_handover.types import Array, JointCommand, Pose
 from test.core.conftest import Draw, slope
 from test.core.test_pid import Bench, _linear
@@ -175,9 +176,8 @@ def test_static_error(robot: RobotModel, draw: Draw, period: float, record: Reco
     disturbance = inertia @ draw.vector(14, 0.2)  # 0.2 rad/s^2 on every joint
     nowhere = Pose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
     start = InitialState(base, _BENT, nowhere, {})
-    plant = FreeFloatingPlant(
-        robot, PlantParameters("rk4", 0.01, 0.03, 0.02, resend_after=1.0, busy_wait=0.0), start, 1_000_000
-    )
+    parameters = replace(load_parameters().plant, integrator="rk4")
+    plant = FreeFloatingPlant(robot, parameters, start, 1_000_000)
     law, desired = NmpcLaw(robot, NmpcGains(period, 0)), _at_rest(_BENT)
     decays = 30.0
     # Modes decay as exp(-1.25 t / T_r) but for H*^-1 d changing with q, which costs up to half.
