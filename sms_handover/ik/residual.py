@@ -21,13 +21,13 @@ class Residual:
 
     values: Array
 
-    @property
+    @cached_property
     def position_error(self) -> float:
         """Largest distance in m of a tool to its target."""
         x = self.values.tolist()
         return max(hypot(*x[row : row + 3]) for row in range(0, len(x), _ROWS))
 
-    @property
+    @cached_property
     def orientation_error(self) -> float:
         """Largest angle in rad of a tool to its target."""
         x = self.values.tolist()

@@ -32,6 +32,6 @@ def physics_receipt(robot: RobotModel, q: Array, v: Array) -> PhysicsReceipt:
     momentum = pin.computeCentroidalMomentum(robot.pin, robot.data, q, v)
     linear, angular = np.array(momentum.linear), np.array(momentum.angular)
     centre = np.array(pin.centerOfMass(robot.pin, robot.data, q))
-    inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.WORLD)
+    inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.LOCAL)
     energy = 0.5 * float(v @ inertia @ v)
     return PhysicsReceipt(read_only(linear), read_only(angular), read_only(centre), energy)

@@ -25,7 +25,7 @@ def reduced_dynamics(robot: RobotModel, q: Array, v: Array) -> ReducedDynamics:
 
         H* = H_m - H_bm^T H_b^-1 H_bm,    c* = c_m - H_bm^T H_b^-1 c_b.
     """
-    inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.WORLD)
+    inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.LOCAL)
     bias = pin.nonLinearEffects(robot.pin, robot.data, q, v)
     coupling = inertia[:BASE_NV, BASE_NV:]
     right = np.column_stack([coupling, bias[:BASE_NV]])
@@ -47,7 +47,7 @@ def reduced_inverse_dynamics(robot: RobotModel, q: Array, v: Array, joint_accele
     accelerations = np.zeros(v.size)
     accelerations[BASE_NV:] = joint_acceleration
     forces = pin.rnea(robot.pin, robot.data, q, v, accelerations)
-    inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.WORLD)
+    inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.LOCAL)
     solver = robot.base_solver.compute(inertia[:BASE_NV, :BASE_NV])
     yielding = solver.solve(forces[:BASE_NV])  # -a_b
     efforts: Array = forces[BASE_NV:] - inertia[BASE_NV:, :BASE_NV].dot(yielding)
@@ -56,7 +56,7 @@ def reduced_inverse_dynamics(robot: RobotModel, q: Array, v: Array, joint_accele
 
 def base_twist_per_joint_rate(robot: RobotModel, q: Array) -> Array:
     """Return -H_b^-1 H_bm (6, n): the base twist in ``base_link`` axes per joint rate at zero momentum."""
-    inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.WORLD)
+    inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.LOCAL)
     reaction: Array = -np.linalg.solve(inertia[:BASE_NV, :BASE_NV], inertia[:BASE_NV, BASE_NV:])
     return reaction
 

@@ -25,9 +25,9 @@ from sms_handover.types import (
 )
 from sms_handover.units import ns_to_seconds
 
-# Axes in which Pinocchio works. In those of the world it is a tenth faster, but its rounding grows with the
-# distance to the origin: 1e-8 rad/s^2 at the wrists within a metre, 1e-5 rad/s^2 at 100 m.
-_IN_JOINTS = pin.Convention.LOCAL
+# Axes in which Pinocchio works. Those of the world take a tenth less time than those of the joints, with a
+# rounding that grows with the distance to the origin; the integrator keeps the base at the origin.
+_IN_WORLD = pin.Convention.WORLD
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +160,7 @@ class FreeFloatingPlant:
     def _acceleration(self, q: Array, v: Array) -> Array:
         """Return v' (6 + n,) under the efforts of this tick."""
         robot = self._robot
-        acceleration: Array = pin.aba(robot.pin, robot.data, q, v, self._generalized, _IN_JOINTS)
+        acceleration: Array = pin.aba(robot.pin, robot.data, q, v, self._generalized, _IN_WORLD)
         return acceleration
 
     def _deputy_follow(self) -> None:

@@ -82,11 +82,17 @@ class LieGroupIntegrator:
         self._end_weights = np.array([*ends, np.concatenate([[0.0], h * b.sum(axis=0)])])
 
     def step(self, acceleration: Acceleration, q: Array, v: Array) -> tuple[Array, Array]:
-        """Return configuration (7 + n,) and velocity (6 + n,) after one step, as read-only arrays."""
+        """Return configuration (7 + n,) and velocity (6 + n,) after one step, as read-only arrays.
+
+        ``acceleration`` is asked for with the base set out from the origin: in free space it does not
+        depend on where the base is, and there its rounding is least.
+        """
         model, rows = self._model, self._rows
+        start = q.copy()
+        start[:3] = 0.0  # m
         rows[0] = v
-        rows[1] = acceleration(q, v)
-        configurations = [q]
+        rows[1] = acceleration(start, v)
+        configurations = [start]
         for weights, known, combined, motion, velocity, origin, result in self._stages:
             weights.dot(known, combined)
             q_stage = pin.integrate(model, configurations[origin], motion)
