@@ -56,7 +56,7 @@ def closed_loop(bag: Path, domain_id: int | None) -> int:
                 executor.add_node(node)
                 replay = CommandReplay(node, ticks, scenario.robot, scenario.parameters.common.reference_ns)
                 with NodeProcesses(folder, graph_environment(plan)) as processes:
-                    processes.start(PLANT, _plant_arguments(scenario))
+                    processes.start(PLANT, ["--ros-args", *_plant_arguments(scenario)])
                     _watch(replay, executor, processes, Display(info.end_ns))
                 node.destroy_node()
             finally:

@@ -38,7 +38,11 @@ _DRAIN_PATIENCE_S = 60.0  # [s] of wall time for the recorder to finish
 
 @dataclass(frozen=True)
 class LaunchPlan:
-    """What to start and where its logs, and if wanted its bag, go; ``compose``: few processes."""
+    """What to start and where its logs, and if wanted its bag, go; ``compose``: few processes.
+
+    ``controller`` is the command line of an external controller; empty if the user starts it, or if it
+    is ours.
+    """
 
     scenario: Scenario
     parameter_files: tuple[Path, ...]
@@ -46,6 +50,12 @@ class LaunchPlan:
     log_folder: Path
     bag: Path | None
     compose: bool = False
+    controller: tuple[str, ...] = ()
+
+    @property
+    def external(self) -> frozenset[str]:
+        """Return the nodes that are none of ours."""
+        return frozenset(self.scenario.parameters.common.external)
 
 
 @dataclass(frozen=True)
@@ -74,7 +84,11 @@ def launch(plan: LaunchPlan) -> Outcome:
         executor.add_node(node)
         with NodeProcesses(plan.log_folder, environment) as processes:
             for name, arguments in arguments_of(plan).items():
-                processes.start(name, arguments.line)
+                if name not in plan.external:
+                    processes.start(name, arguments.line)
+                elif plan.controller:
+                    named = ("--remap", f"__node:={name}")
+                    processes.start(name, (*arguments.line, *named), plan.controller)
             outcome = _Watch(plan, monitor, executor, processes).to_the_end()
         inputs.destroy()
         node.destroy_node()
@@ -148,7 +162,8 @@ class _Watch:
 
     def _wait_for_start(self) -> None:
         """Wait until every endpoint has matched and the plant has begun."""
-        deadline = monotonic() + _START_PATIENCE_S
+        by_hand = bool(self._plan.external) and not self._plan.controller
+        deadline = inf if by_hand else monotonic() + _START_PATIENCE_S
         interrupted = inf
         asked = False
         while self._monitor.progress.state == RunState.WAITING:

@@ -1,6 +1,7 @@
 """Options that several commands share, and the scenario that they describe."""
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -69,13 +70,18 @@ def overrides_of(options: Namespace) -> Overrides:
     return overrides
 
 
-def scenario_of(options: Namespace, mode: str = MODES[0], *, recorded: bool = False) -> Scenario:
+def scenario_of(
+    options: Namespace, mode: str = MODES[0], *, recorded: bool = False, external: Sequence[str] = ()
+) -> Scenario:
     """Return the scenario that the options describe, read and checked; raises ConfigurationError.
 
-    If it is to be ``recorded``, the options may hold parameters of the recorder too.
+    If it is to be ``recorded``, the options may hold parameters of the recorder too. Those of
+    ``external`` nodes are passed on as they are.
     """
     overrides = overrides_of(options)
     overrides.setdefault(COMMON, {}).setdefault("mode", mode)
+    if external:
+        overrides[COMMON]["external"] = list(external)
     of_recorder = overrides.pop(RECORDER, {}) if recorded else {}
     files = [path.resolve() for path in options.params_file]
     scenario = load_scenario(overrides, files)

@@ -50,9 +50,13 @@ class NodeProcesses:
         for log in self._logs.values():
             log.close()
 
-    def start(self, node: str, arguments: Sequence[str]) -> None:
-        """Start a node, or the container; raises GraphError if its log cannot be written."""
-        command = [sys.executable, "-m", f"sms_handover.nodes.{node}", *arguments]
+    def start(self, node: str, arguments: Sequence[str], program: Sequence[str] = ()) -> None:
+        """Start a node or the container, of this package unless it is another ``program``.
+
+        Raises GraphError if its log cannot be written.
+        """
+        program = program or (sys.executable, "-m", f"sms_handover.nodes.{node}")
+        command = [*program, *arguments]
         log = self._logs[node] = NodeLog(self._folder / f"{node}.log")
         self._processes[node] = subprocess.Popen(
             command,

@@ -1,5 +1,6 @@
 """``sms-handover run``: the handover as a graph of ROS 2 nodes, recorded."""
 
+import shlex
 import shutil
 import sys
 from argparse import ArgumentParser, Namespace
@@ -17,8 +18,11 @@ from sms_handover.ros.main import EXIT_LOSS
 from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.parameters import LOCKSTEP, REALTIME
 from sms_handover.simulation.scenario import Scenario
+from sms_handover.topics import CONTROLLER
 
 EXIT_INTERRUPTED = 130
+
+OWN = "own"  # in the name of the output folder, for a law of which we know no name
 
 
 def add_parser(parser: ArgumentParser) -> None:
@@ -51,6 +55,18 @@ def add_parser(parser: ArgumentParser) -> None:
         help="run nodes that wait for each other in one process, which is several times as fast: in lock "
         "step plant, trajectory, ik and controller, in real time plant and controller",
     )
+    controller = group.add_mutually_exclusive_group()
+    controller.add_argument(
+        "--own-controller",
+        metavar="COMMAND",
+        help="start this program as the node 'controller' in place of ours; parameters of it are given as "
+        "-p controller.NAME:=VALUE (docs/own_controller.md)",
+    )
+    controller.add_argument(
+        "--without-controller",
+        action="store_true",
+        help="start no controller: the run begins when a node 'controller' of yours has come",
+    )
     group.add_argument(
         "--domain-id", type=int, metavar="N", help="ROS domain (default: a free one of this machine's)"
     )
@@ -59,7 +75,9 @@ def add_parser(parser: ArgumentParser) -> None:
 def command(options: Namespace) -> int:
     """Carry out the command; return the exit code."""
     mode = REALTIME if options.real_time else LOCKSTEP
-    scenario = scenario_of(options, mode, recorded=not options.no_record)
+    own = _own_controller(options)
+    external = (CONTROLLER,) if own or options.without_controller else ()
+    scenario = scenario_of(options, mode, recorded=not options.no_record, external=external)
     check_scenario(scenario)
     with reserved_domain(options.domain_id) as domain:
         output = _output_folder(options, scenario)
@@ -70,8 +88,11 @@ def command(options: Namespace) -> int:
             log_folder=output / LOGS,
             bag=None if options.no_record else output / BAG,
             compose=options.compose,
+            controller=own,
         )
         print(f"running on ROS domain {domain}, this machine only; output in {options.output or output}")
+        if options.without_controller:
+            print(_how_to_join(domain))
         outcome = launch(plan)
     print(outcome.recorder_said, end="")
     if told := graver_in_words(outcome.run_events):
@@ -85,9 +106,35 @@ def command(options: Namespace) -> int:
     return task_code(outcome.events, outcome.run_events, failed=outcome.failed)
 
 
+def _own_controller(options: Namespace) -> tuple[str, ...]:
+    """Return the command line of the user's own controller, () if none is given."""
+    if options.own_controller is None:
+        return ()
+    if options.controller is not None:
+        raise ConfigurationError("--controller chooses a law of ours, --own-controller replaces it: give one")
+    try:
+        words = tuple(shlex.split(options.own_controller))
+    except ValueError as error:
+        raise ConfigurationError(f"--own-controller {options.own_controller!r}: {error}") from error
+    if not words:
+        raise ConfigurationError("--own-controller is empty, expected a command, e.g. 'python3 mine.py'")
+    if shutil.which(words[0]) is None:
+        raise ConfigurationError(f"--own-controller: there is no program {words[0]!r}")
+    return words
+
+
+def _how_to_join(domain: int) -> str:
+    """Return how a controller that the user starts finds the graph."""
+    return (
+        f"waiting for your node {CONTROLLER!r}; it joins with ROS_DOMAIN_ID={domain} "
+        "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST and --ros-args --remap __node:=controller"
+    )
+
+
 def _output_folder(options: Namespace, scenario: Scenario) -> Path:
     """Make the output folder and return its full path; raises ConfigurationError if it cannot be."""
-    law = scenario.parameters.controller.law
+    common = scenario.parameters.common
+    law = OWN if CONTROLLER in common.external else scenario.parameters.controller.law
     folder: Path = options.output or Path("runs") / f"{law}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
     try:
         if options.overwrite and (folder / LOGS).is_dir():

@@ -1,12 +1,15 @@
 """The controller node."""
 
+from abc import abstractmethod
 from collections.abc import Sequence
+from typing import Protocol
 
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.control.parameters import ControllerParameters
 from sms_handover.control.reference_watch import ReferenceWatch
 from sms_handover.frames import BASE, WORLD
-from sms_handover.ros.graph_node import GraphNode
+from sms_handover.ros.door import Check
+from sms_handover.ros.graph_node import GraphNode, P
 from sms_handover.ros.inputs import Receive
 from sms_handover.ros.main import run_node
 from sms_handover.ros.phase_wire import PhaseWire
@@ -23,50 +26,85 @@ from sms_handover.topics import (
     JOINT_STATES,
     TASK_PHASE,
 )
-from sms_handover.types import JointReference
+from sms_handover.trajectory.schedule import Schedule
+from sms_handover.types import JointCommand, JointReference, RobotState, TaskPhase
 from sms_handover.units import NS_PER_S
 
 _STATE = (JOINT_STATES, BASE_ODOMETRY)
-_STATE_AND_REFERENCE = (*_STATE, TASK_PHASE, JOINT_REFERENCE)
 
 
-class ControllerNode(GraphNode[ControllerParameters]):
-    """Answers every state with a joint command of the same stamp.
+class Answering(Protocol):
+    """What answers the states: :class:`JointController` is one."""
+
+    def reset(self) -> None:
+        """Go back to the start of a run."""
+
+    def enter(self, phase: TaskPhase) -> None:
+        """Take the phase in force."""
+
+    def track(self, reference: JointReference) -> None:
+        """Take the next joint reference."""
+
+    def step(self, state: RobotState) -> JointCommand:
+        """Return the command that answers a state."""
+
+
+class AnsweringNode(GraphNode[P]):
+    """Answers every state with a joint command of the same stamp, by whatever controller.
 
     In lock step a state that falls on a reference period waits for its reference; in real time the
     last reference holds.
     """
 
-    def __init__(self) -> None:
-        """Set up the law; raises UnstableLoopError if its gains cannot work at this tick."""
-        super().__init__(CONTROLLER, ControllerParameters)
+    def __init__(self, group: type[P], *, shipped: bool = True) -> None:
+        """Set up the controller; raises what :meth:`make_controller` does."""
+        super().__init__(CONTROLLER, group, shipped=shipped)
         schedule = load_task(self.common, self.robot)
-        self._controller = make_controller(self.robot, schedule, self.common, self.parameters)
+        self._controller = self.make_controller(schedule)
         self._lockstep = self.common.mode == LOCKSTEP
         self._tick_ns, self._reference_ns = self.common.tick_ns, self.common.reference_ns
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
         self._reference_wire = JointStateWire(self.robot.joint_names, ("position", "velocity"))
         self._command_wire = JointStateWire(self.robot.joint_names, ("effort",))
         self._phase_wire = PhaseWire(self.robot.arms, schedule.deputy.grasp_frames)
-        ahead_ns = self._reference_ns if self._lockstep else NS_PER_S
-        self._inputs: StampSync[bytes] = StampSync(ahead_ns=ahead_ns, paced=not self._lockstep)
-        self._orders = {topic: StampOrder(ahead_ns) for topic in (TASK_PHASE, JOINT_REFERENCE)}
-        self._answered_ns = 0
-        self._answer_bytes = b""
-        self._watch = ReferenceWatch(longest_reference_ns(self.common, self.parameters))
-        self._command = self.endpoints.publisher(JOINT_COMMAND)
+        guidance = self.guidance()
         checks = {
-            TASK_PHASE: self._phase_wire.check,
-            JOINT_REFERENCE: self._reference_wire.check,
             JOINT_STATES: self._state_wire.joints.check,
             BASE_ODOMETRY: self._state_wire.odometry.check,
         }
-        for topic, check in checks.items():
+        self._everything = (*_STATE, *guidance)
+        ahead_ns = self._reference_ns if self._lockstep else NS_PER_S
+        self._inputs: StampSync[bytes] = StampSync(ahead_ns=ahead_ns, paced=not self._lockstep)
+        self._orders = {topic: StampOrder(ahead_ns) for topic in guidance}
+        self._answered_ns = 0
+        self._answer_bytes = b""
+        for topic, check in {**guidance, **checks}.items():
             self.receive(topic, self._taker(topic), check)
+        self._command = self.endpoints.publisher(JOINT_COMMAND)  # last: then all of an external node is there
+
+    def guidance(self) -> dict[str, Check]:
+        """Return the topics that come each reference period, with what checks their messages."""
+        return {TASK_PHASE: self._phase_wire.check, JOINT_REFERENCE: self._reference_wire.check}
+
+    @property
+    @abstractmethod
+    def law(self) -> str:
+        """Return what reports call the law."""
+
+    @abstractmethod
+    def make_controller(self, schedule: Schedule) -> Answering:
+        """Return what answers the states of the robot."""
+
+    def begin(self) -> None:
+        """Go back to the start of a run."""
+        self._controller.reset()
+
+    def on_answered(self, stamp: int) -> None:
+        """Do what is due after an answer; a node may override this."""
 
     def diagnostic_values(self) -> dict[str, object]:
         """Return what has been answered and what came too late."""
-        return {"law": self.parameters.law, "answered": self._command.count, "late": self._inputs.dropped}
+        return {"law": self.law, "answered": self._command.count, "late": self._inputs.dropped}
 
     def diagnostic_stamp_ns(self) -> int:
         """Return the stamp of the last state answered."""
@@ -82,7 +120,7 @@ class ControllerNode(GraphNode[ControllerParameters]):
 
     def _needed(self, stamp: int) -> tuple[str, ...]:
         """Return the inputs that belong to a stamp, the last one to come last."""
-        return _STATE_AND_REFERENCE if self._lockstep and stamp % self._reference_ns == 0 else _STATE
+        return self._everything if self._lockstep and stamp % self._reference_ns == 0 else _STATE
 
     def _taker(self, topic: str) -> Receive:
         """Return the callback of a topic of raw messages."""
@@ -92,13 +130,12 @@ class ControllerNode(GraphNode[ControllerParameters]):
         """Take one input; a state of time zero behind an answered one begins the run anew."""
         if self._inputs.begins_anew(stamp):
             self._inputs.reset()
-            self._controller.reset()
-            self._watch.reset()
+            self.begin()
             for order in self._orders.values():
                 order.reset()
         if not self._lockstep and topic in self._orders:
             self._orders[topic].take(stamp, self._answered_ns)
-            self._use(topic, data)
+            self.use(topic, data)
             return
         if topic == BASE_ODOMETRY and stamp == self._answered_ns and self._lockstep and self._answer_bytes:
             self._command.publish(self._answer_bytes)  # the plant asks again: it has missed the answer
@@ -111,20 +148,17 @@ class ControllerNode(GraphNode[ControllerParameters]):
         inputs = self._inputs.take(stamp, needed)
         if inputs is None:
             return
-        if needed is _STATE_AND_REFERENCE:
-            self._use(TASK_PHASE, inputs[TASK_PHASE])
-            self._use(JOINT_REFERENCE, inputs[JOINT_REFERENCE])
+        if needed is self._everything:
+            for topic in self._orders:
+                self.use(topic, inputs[topic])
         state = self._state_wire.read(inputs[JOINT_STATES], inputs[BASE_ODOMETRY])
         command = self._controller.step(state)
         self._answer_bytes = self._command_wire.pack(stamp, effort=command.effort)
         self._command.publish(self._answer_bytes)
         self._answered_ns = stamp
-        if not self._lockstep:
-            event = self._watch.look(self._controller.reference_ns, stamp)
-            if event is not None:
-                self.events.publish(event)
+        self.on_answered(stamp)
 
-    def _use(self, topic: str, data: bytes) -> None:
+    def use(self, topic: str, data: bytes) -> None:
         """Give a phase or a reference to the controller."""
         if topic == TASK_PHASE:
             self._controller.enter(self._phase_wire.read(data))
@@ -132,6 +166,41 @@ class ControllerNode(GraphNode[ControllerParameters]):
             blocks = self._reference_wire.read(data)
             reference = JointReference(stamp_ns(data), blocks["position"], blocks["velocity"])
             self._controller.track(reference)
+
+
+class ControllerNode(AnsweringNode[ControllerParameters]):
+    """Answers every state with a joint command of the same stamp, under NMPC or PID.
+
+    In lock step a state that falls on a reference period waits for its reference; in real time the
+    last reference holds.
+    """
+
+    def __init__(self) -> None:
+        """Set up the law; raises UnstableLoopError if its gains cannot work at this tick."""
+        super().__init__(ControllerParameters)
+        self._watch = ReferenceWatch(longest_reference_ns(self.common, self.parameters))
+
+    @property
+    def law(self) -> str:
+        """Return the name of the law."""
+        return self.parameters.law
+
+    def make_controller(self, schedule: Schedule) -> Answering:
+        """Return the controller that the parameters ask for; raises UnstableLoopError."""
+        self._tracking = make_controller(self.robot, schedule, self.common, self.parameters)
+        return self._tracking
+
+    def begin(self) -> None:
+        """Go back to the start of a run."""
+        super().begin()
+        self._watch.reset()
+
+    def on_answered(self, stamp: int) -> None:
+        """In real time, tell when references stop coming and when they come again."""
+        if not self._lockstep:
+            event = self._watch.look(self._tracking.reference_ns, stamp)
+            if event is not None:
+                self.events.publish(event)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -173,7 +173,8 @@ class PlantNode(GraphNode[PlantParameters]):
 
     def _begin_if_ready(self) -> None:
         """Begin the run once every node is ready."""
-        if self._run_state == RunState.WAITING and not self._waiting_for and not self.endpoints.unmatched:
+        waits = not self._waiting_for <= self.endpoints.silent(RUN_READY)
+        if self._run_state == RunState.WAITING and not waits and not self.endpoints.unmatched:
             self._enter(RunState.RUNNING, "")
             self._publish_state()
 

@@ -160,7 +160,8 @@ class RecorderNode(GraphNode[RecorderParameters]):
         """Tell whether the run is over and nothing is to be expected any more."""
         if not self.finished:
             return False
-        if self._reported.issuperset(self._others) and self._recording.ledger.complete:
+        silent = self.endpoints.silent(RUN_PUBLISHED)
+        if (self._reported | silent).issuperset(self._others) and self._recording.ledger.complete:
             return True
         return monotonic() - self._last_message > self.parameters.drain_timeout
 

@@ -43,14 +43,17 @@ def process_arguments(
     """Return the processes of a graph by executable, with their arguments.
 
     A process is a node, or the container that runs the nodes of ``together``. ``common`` are the
-    parameters of every node, ``own`` those of single ones; both lie over the parameter files.
+    parameters of every node, ``own`` those of single ones; both lie over the parameter files. An external
+    node has its arguments too, and may take or leave them.
     """
     nodes = (*LOOP_NODES, RECORDER) if record else LOOP_NODES
     begin = [part for file in files for part in ("--params-file", file)]
     begin += as_arguments({**common, "peers": nodes})
-    inside = tuple(node for node in nodes if node in together)
+    external = common.get("external", ())
+    assert isinstance(external, Sequence)
+    inside = tuple(node for node in nodes if node in together and node not in external)
     groups = {CONTAINER: inside} if inside else {}
-    groups.update({node: (node,) for node in nodes if node not in together})
+    groups.update({node: (node,) for node in nodes if node not in inside})
     processes = {}
     for name, group in groups.items():
         values = [part for node in group for part in as_arguments(own.get(node, {}), node)]

@@ -15,7 +15,7 @@ from sms_handover.ros.inputs import Deliver, Inputs
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.qos import profile_of, serves
 from sms_handover.ros.sender import Sender
-from sms_handover.topics import RECORDER, Topic
+from sms_handover.topics import RECORDER, Rate, Topic
 
 _RclError = rclpy_implementation.RCLError
 
@@ -26,11 +26,18 @@ _PATIENCE_S = 30.0  # [s] after which a reader that takes nothing is given up
 class Endpoints:
     """Makes a node's publishers and subscriptions, tells when all have matched, counts what it publishes."""
 
-    def __init__(self, node: Node, topics: Collection[Topic], peers: Collection[str]) -> None:
-        """Prepare for a node among ``peers``, which are the nodes that take part in this run."""
+    def __init__(
+        self, node: Node, topics: Collection[Topic], peers: Collection[str], external: Collection[str] = ()
+    ) -> None:
+        """Prepare for a node among ``peers``, which are the nodes that take part in this run.
+
+        Those that are ``external`` need only the endpoints of topics with a message every tick; what
+        else they have must have matched too, and they have made it before they publish on such a topic.
+        """
         self._node = node
         self._topics = {topic.name: topic for topic in topics}
         self._peers = frozenset(peers)
+        self._external = frozenset(external) - {node.get_name()}
         self._publishers: dict[str, CountedPublisher] = {}
         self._subscriptions: dict[str, Subscription] = {}
         self._senders: dict[str, Sender] = {}
@@ -84,22 +91,53 @@ class Endpoints:
         me, node = self._node.get_name(), self._node
         missing = []
         for name, publisher in self._publishers.items():
-            readers = self._peers & ({*self._topics[name].subscribers} - {me} | {RECORDER})
             there = node.get_subscriptions_info_by_topic(publisher.topic_name)
             profile = profile_of(self._topics[name])
             served = [reader for reader in there if serves(profile, reader.qos_profile)]
+            readers = self._wanted(name, {*self._topics[name].subscribers} - {me} | {RECORDER}, served)
             found = _found(publisher.subscription_count, served, readers)
             if found < len(readers):
                 missing.append(f"{found} of {len(readers)} subscriptions of {name}")
         for name, subscription in self._subscriptions.items():
-            writers = (self._peers & set(self._topics[name].publishers)) - {me}
             there = node.get_publishers_info_by_topic(subscription.topic_name)
             profile = profile_of(self._topics[name])
             serving = [writer for writer in there if serves(writer.qos_profile, profile)]
+            writers = self._wanted(name, {*self._topics[name].publishers} - {me}, serving)
             found = _found(subscription.get_publisher_count(), serving, writers)
             if found < len(writers):
                 missing.append(f"{found} of {len(writers)} publishers of {name}")
-        return missing or self.intruders
+        return missing + self._absent or self.intruders
+
+    def silent(self, name: str) -> frozenset[str]:
+        """Return the external nodes that do not publish on a topic."""
+        there = self._node.get_publishers_info_by_topic(self._node.resolve_topic_name(name))
+        return self._external - {writer.node_name for writer in there}
+
+    @property
+    def _absent(self) -> list[str]:
+        """Return in words which external nodes have not appeared, on topics that this node does not read."""
+        return [
+            f"the external node {name!r}, which publishes {topic.name}"
+            for topic in self._topics.values()
+            if topic.rate is Rate.TICK and topic.name not in self._subscriptions
+            for name in sorted(self.silent(topic.name).intersection(topic.publishers))
+        ]
+
+    def _wanted(
+        self, name: str, nodes: Collection[str], there: Collection[TopicEndpointInfo]
+    ) -> frozenset[str]:
+        """Return the nodes whose endpoint on a topic has to match.
+
+        They are the peers among ``nodes``; of the external ones those that are ``there``, whatever the
+        table says, and in any case where the topic has a message every tick.
+        """
+        wanted = self._peers.intersection(nodes)
+        if not self._external:
+            return wanted
+        here = {endpoint.node_name for endpoint in there}
+        if self._topics[name].rate is Rate.TICK:
+            here |= wanted
+        return (wanted - self._external) | (self._external & here)
 
     @property
     def counts(self) -> dict[str, int]:

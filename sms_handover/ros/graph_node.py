@@ -49,14 +49,19 @@ class GraphNode(RunnableNode, Generic[P]):
     when the plant says that it has ended, every node tells how much it has published.
     """
 
-    def __init__(self, name: str, group: type[P]) -> None:
-        """Declare the parameters and load the robot; raises ConfigurationError."""
+    def __init__(self, name: str, group: type[P], *, shipped: bool = True) -> None:
+        """Declare the parameters and load the robot; raises ConfigurationError.
+
+        Unless the group is ``shipped`` with a file in ``config/`` its fields have the defaults.
+        """
         super().__init__(name, automatically_declare_parameters_from_overrides=True)
         self.common: CommonParameters = declare(self, CommonParameters, "common.yaml", EVERY_NODE)
-        self.parameters: P = declare(self, group, f"{name}.yaml", name)
+        self.parameters: P = declare(self, group, f"{name}.yaml" if shipped else None, name)
         refuse_unknown(self, CommonParameters, group)
         self.robot: RobotModel = load_robot_model(self.common)
-        self.endpoints = Endpoints(self, graph_topics(self.robot.arms), self.common.peers)
+        self.endpoints = Endpoints(
+            self, graph_topics(self.robot.arms), self.common.peers, self.common.external
+        )
         self.inputs: Inputs = INPUTS[self.common.transport](self)
         self.refusals = Refusals(self.get_logger().warning, self._on_refusal)
         self.finished = False

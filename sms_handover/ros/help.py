@@ -5,7 +5,9 @@ import os
 import sys
 from collections.abc import Iterable, Iterator
 from textwrap import wrap
+from typing import Any
 
+from sms_handover.parameters import defaults_of
 from sms_handover.ros.contents import contents_of
 from sms_handover.ros.reference import (
     COMMON_GROUP,
@@ -13,6 +15,7 @@ from sms_handover.ros.reference import (
     ParameterRow,
     groups_of,
     parameter_rows,
+    rows_of,
     services_of,
     topics_of,
 )
@@ -111,6 +114,13 @@ def _parameters(group: ParameterGroup) -> str:
     """Return the parameters of a group; they are read at the start and cannot be changed later."""
     whose = "Parameters of every node of the graph" if group is COMMON_GROUP else "Parameters"
     return _section(f"{whose}, defaults in config/{group.file}:", map(_parameter, parameter_rows(group)))
+
+
+def own_parameters_help(cls: type[Any]) -> str:
+    """Return the parameters of a node that is none of ours; the fields of its group have the defaults."""
+    return _section(
+        "Parameters, as --ros-args -p NAME:=VALUE:", map(_parameter, rows_of(cls, defaults_of(cls)))
+    )
 
 
 def _topic(topic: Topic) -> str:

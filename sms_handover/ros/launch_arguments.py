@@ -54,6 +54,7 @@ ARGUMENTS = {
     "duration": LaunchArgument(_EVERY_NODE, "duration"),
     "mode": LaunchArgument(_EVERY_NODE, "mode"),
     "bag": LaunchArgument(RECORDER, "folder"),
+    "external": LaunchArgument(_EVERY_NODE, "external"),
 }
 
 
@@ -71,11 +72,14 @@ def launch_processes(given: Mapping[str, str], *, record: bool, compose: bool) -
     files = [given["params_file"]] if given.get("params_file") else []
     together = nodes_together(given.get("mode") or LOCKSTEP) if compose else ()
     common = values.get(_EVERY_NODE, {})
-    return process_arguments(common, values, files, record=record, together=together)
+    processes = process_arguments(common, values, files, record=record, together=together)
+    return {name: arguments for name, arguments in processes.items() if name != given.get("external")}
 
 
 def _typed(argument: LaunchArgument, name: str, text: str) -> object:
     """Return the text of an argument as its parameter is typed."""
+    if get_type_hints(argument.group.cls)[argument.parameter] == tuple[str, ...]:
+        return (text,)
     if get_type_hints(argument.group.cls)[argument.parameter] is not float:
         return text
     try:

@@ -9,7 +9,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 
 from sms_handover.errors import UnknownNameError
-from sms_handover.parameters import ParameterSpec, build, read_parameter_files, spec_of
+from sms_handover.parameters import ParameterSpec, build, defaults_of, read_parameter_files, spec_of
 from sms_handover.share import config_file
 
 T = TypeVar("T")
@@ -19,13 +19,13 @@ _LARGEST_INT = 2**63 - 1  # [-]
 _ROS_OWN = ("use_sim_time", "start_type_description_service")
 
 
-def declare(node: Node, cls: type[T], file: str, section: str) -> T:
+def declare(node: Node, cls: type[T], file: str | None, section: str) -> T:
     """Declare the fields of ``cls`` as read-only parameters of ``node`` and return them checked.
 
-    The defaults are those of a section of a file in the package's ``config/``; what was given on
-    the command line comes on top. Raises ConfigurationError.
+    The defaults are those of a section of a file in the package's ``config/``, without one those of
+    the fields; what was given on the command line comes on top. Raises ConfigurationError.
     """
-    values = read_parameter_files([config_file(file)], section)
+    values = defaults_of(cls) if file is None else read_parameter_files([config_file(file)], section)
     given = [item.name for item in fields(cls) if node.has_parameter(item.name)]  # type: ignore[arg-type]
     values.update({name: node.get_parameter(name).value for name in given})
     checked = build(cls, values, node.get_name())  # before ROS checks the range in words of its own

@@ -3,6 +3,7 @@
 ``--help`` of a node and the pages docs/parameters.md and docs/topics.md are written from this.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, get_type_hints
 
@@ -91,8 +92,12 @@ def groups_of(node: str) -> tuple[ParameterGroup, ...]:
 
 def parameter_rows(group: ParameterGroup) -> tuple[ParameterRow, ...]:
     """Return the parameters of a group, with the defaults of its file."""
-    defaults = read_parameter_files([config_file(group.file)], group.section)
-    hints = get_type_hints(group.cls)
+    return rows_of(group.cls, read_parameter_files([config_file(group.file)], group.section))
+
+
+def rows_of(cls: type[Any], defaults: Mapping[str, object]) -> tuple[ParameterRow, ...]:
+    """Return the parameters of a dataclass, with their defaults by name."""
+    hints = get_type_hints(cls)
     return tuple(
         ParameterRow(
             name=item.name,
@@ -102,7 +107,7 @@ def parameter_rows(group: ParameterGroup) -> tuple[ParameterRow, ...]:
             allowed=_allowed(spec_of(item)),
             description=spec_of(item).description,
         )
-        for item in fields(group.cls)
+        for item in fields(cls)
     )
 
 

@@ -4,6 +4,7 @@ from sms_handover.control.controller import check_stability
 from sms_handover.simulation.feasibility import PhasePrediction, check_feasibility
 from sms_handover.simulation.scenario import Scenario
 from sms_handover.simulation.wiring import gains_by_phase, make_controller, make_plant
+from sms_handover.topics import CONTROLLER
 from sms_handover.units import ns_to_seconds
 
 
@@ -12,10 +13,12 @@ def check_scenario(scenario: Scenario) -> tuple[PhasePrediction, ...]:
 
     Beyond what making the parts of the loop checks, every target must be in reach, every grasp must
     meet its frame, and the sampled loop must be stable where each phase ends, not only at the start: the
-    reduced inertia falls where wrist axes come into line.
+    reduced inertia falls where wrist axes come into line. Of an external controller nothing is known.
     """
     parameters, robot, schedule = scenario.parameters, scenario.robot, scenario.schedule
     make_plant(robot, schedule, parameters.common, parameters.plant)
+    if CONTROLLER in parameters.common.external:
+        return check_feasibility(scenario)
     make_controller(robot, schedule, parameters.common, parameters.controller)
     predictions = check_feasibility(scenario)
     gains = gains_by_phase(schedule, parameters.controller)

@@ -4,13 +4,14 @@ from dataclasses import dataclass
 
 from sms_handover.errors import ConfigurationError, UnknownNameError
 from sms_handover.parameters import parameter
-from sms_handover.topics import NODES
+from sms_handover.topics import CONTROLLER, NODES
 from sms_handover.units import seconds_to_ns
 
 LOCKSTEP, REALTIME = "lockstep", "realtime"
 MODES = (LOCKSTEP, REALTIME)
 DIRECT, EXECUTOR = "direct", "executor"
 TRANSPORTS = (DIRECT, EXECUTOR)
+EXTERNAL = (CONTROLLER,)
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,10 @@ class CommonParameters:
     )
     lock_memory: bool = parameter("keep the memory of the nodes of the loop from being swapped out")
     peers: tuple[str, ...] = parameter("nodes of the graph; the run starts when all have matched")
+    external: tuple[str, ...] = parameter(
+        "those of the peers that are not of this package; of them only states and commands are waited for",
+        choices=EXTERNAL,
+    )
 
     def __post_init__(self) -> None:
         """Refuse a reference period that is no whole number of ticks, and peers that do not exist."""

@@ -57,16 +57,19 @@ def load_parameters(overrides: Overrides | None = None, files: Sequence[Path] = 
         if node not in known:
             raise UnknownNameError("node", node, known, "parameter overrides")
 
-    def group(cls: type[T], node: str, section: str) -> T:
+    def group(cls: type[T], node: str, section: str, external: Sequence[str] = ()) -> T:
+        if node in external:  # what is given is for a node that we know nothing of
+            return build(cls, read_parameter_files([config_file(f"{node}.yaml")], section), node)
         paths = [config_file(f"{node}.yaml"), *files]
         return build(cls, {**read_parameter_files(paths, section), **overrides.get(node, {})}, node)
 
+    common = group(CommonParameters, COMMON, EVERY_NODE)
     return ParameterSet(
-        common=group(CommonParameters, COMMON, EVERY_NODE),
+        common=common,
         plant=group(PlantParameters, PLANT, PLANT),
         trajectory=group(TrajectoryParameters, TRAJECTORY, TRAJECTORY),
         ik=group(IkParameters, IK, IK),
-        controller=group(ControllerParameters, CONTROLLER, CONTROLLER),
+        controller=group(ControllerParameters, CONTROLLER, CONTROLLER, common.external),
     )
 
 

@@ -3,11 +3,14 @@
 from collections.abc import Callable
 
 from sms_handover.control.protocol import CheckedController, Controller, Guidance
+from sms_handover.errors import ConfigurationError
 from sms_handover.ik.levenberg_marquardt import solve_ik
 from sms_handover.run_data import RunData
+from sms_handover.simulation.parameters import CommonParameters
 from sms_handover.simulation.recorder import RunRecorder
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.wiring import make_controller, make_plant
+from sms_handover.topics import CONTROLLER
 from sms_handover.trajectory.generator import TrajectoryGenerator
 from sms_handover.types import IkStatus, TaskPhase
 
@@ -26,9 +29,9 @@ def simulate(
     targets and, through inverse kinematics, the joint reference; the controller answers; the plant
     carries out grasp commands and integrates. The last state is answered too, but not integrated. What
     came of a grasp or of inverse kinematics the generator takes into account in the next period.
-    ``controller`` takes the place of the one that the scenario names; it is reset first. Raises
-    ControllerError if its efforts are no numbers. ``progress`` is called with the time in ns and the
-    phase each reference period.
+    ``controller`` takes the place of the one that the scenario names; it is reset first. ``progress`` is
+    called with the time in ns and the phase each reference period. Raises ControllerError if efforts of a
+    controller are no numbers, and ConfigurationError if the scenario's is external and none is given.
     """
     scenario = scenario or load_scenario()
     parameters, robot, schedule = scenario.parameters, scenario.robot, scenario.schedule
@@ -36,6 +39,7 @@ def simulate(
     plant = make_plant(robot, schedule, common, parameters.plant)
     law: Controller
     if controller is None:
+        _require_ours(common)
         law = make_controller(robot, schedule, common, parameters.controller)
     else:
         law = CheckedController(controller, robot.joint_names)
@@ -74,3 +78,12 @@ def simulate(
             plant.apply(effort)
         tick += 1
     return recorder.data()
+
+
+def _require_ours(common: CommonParameters) -> None:
+    """Raise ConfigurationError if the controller of a scenario is none of this package."""
+    if CONTROLLER in common.external:
+        raise ConfigurationError(
+            "the controller is external, and one process has no other: give simulate() a controller, "
+            "or check a recording with 'sms-handover play --closed-loop'"
+        )

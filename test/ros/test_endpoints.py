@@ -18,6 +18,7 @@ from .bench import Bench
 TEXT = "std_msgs/msg/String"
 FROM_PLANT = Topic("from_plant", TEXT, (PLANT,), (TRAJECTORY, CONTROLLER), Rate.TICK)
 TO_PLANT = Topic("to_plant", TEXT, (TRAJECTORY, IK, CONTROLLER), (PLANT,), Rate.CHANGE)
+COMMAND = Topic("command", TEXT, (CONTROLLER,), (PLANT,), Rate.TICK)
 TOPICS = (FROM_PLANT, TO_PLANT)
 
 
@@ -247,3 +248,50 @@ def test_a_stranger_that_cannot_match_does_not_hold_the_run_back(bench: Bench) -
     listen(bench.plain(CONTROLLER), FROM_PLANT)
     bench.until(lambda: plant.unmatched == [], "the peer")
     assert publisher.subscription_count == 1
+
+
+# A node of somebody else's among the peers
+
+_WITH_EXTERNAL = ((FROM_PLANT, TO_PLANT, COMMAND), (PLANT, TRAJECTORY, CONTROLLER), (CONTROLLER,))
+
+
+@pytest.mark.ros
+def test_of_an_external_node_only_the_endpoints_of_the_tick_are_needed(bench: Bench) -> None:
+    bench.start()
+    plant = Endpoints(bench.plain(PLANT), *_WITH_EXTERNAL)
+    plant.publisher(FROM_PLANT.name)
+    for topic in (TO_PLANT, COMMAND):
+        plant.subscribe(topic.name, lambda message: None)
+    missing = ["subscriptions of from_plant", "publishers of to_plant", "publishers of command"]
+    assert plant.unmatched == [f"0 of {n} {what}" for n, what in zip((2, 1, 1), missing, strict=True)]
+    trajectory = bench.plain(TRAJECTORY)
+    listen(trajectory, FROM_PLANT)
+    Endpoints(trajectory, TOPICS, NODES).publisher(TO_PLANT.name)
+    still = [f"1 of 2 {missing[0]}", f"0 of 1 {missing[2]}"]
+    bench.until(lambda: plant.unmatched == still, "the node of ours; the external one has no to_plant")
+    external = bench.plain(CONTROLLER)
+    listen(external, FROM_PLANT)
+    external.create_publisher(String, COMMAND.name, 10)
+    bench.until(lambda: plant.unmatched == [], "the external node")
+
+
+@pytest.mark.ros
+def test_what_else_an_external_node_has_is_waited_for_too(bench: Bench) -> None:
+    """That it offers ``to_plant`` makes it one whose word there counts."""
+    bench.start()
+    plant = Endpoints(bench.plain(PLANT), *_WITH_EXTERNAL)
+    assert plant.silent(TO_PLANT.name) == {CONTROLLER}
+    bench.plain(CONTROLLER).create_publisher(String, TO_PLANT.name, 10)
+    bench.until(lambda: plant.silent(TO_PLANT.name) == frozenset(), "its publisher")
+
+
+@pytest.mark.ros
+def test_nodes_that_do_not_hear_the_external_one_wait_for_it_too(bench: Bench) -> None:
+    """Its subscriptions are there once it is, so none of them misses the first message."""
+    bench.start()
+    trajectory = Endpoints(bench.plain(TRAJECTORY), *_WITH_EXTERNAL)
+    assert trajectory.unmatched == ["the external node 'controller', which publishes command"]
+    bench.plain(CONTROLLER).create_publisher(String, COMMAND.name, 10)
+    bench.until(lambda: trajectory.unmatched == [], "the external node")
+    itself = Endpoints(bench.plain(CONTROLLER), *_WITH_EXTERNAL)
+    assert itself.unmatched == []

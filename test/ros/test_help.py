@@ -31,7 +31,18 @@ from sms_handover.ros.reference import (
     topics_of,
 )
 from sms_handover.share import config_file
-from sms_handover.topics import CLOCK, CONTAINER, LOOP_NODES, NODES, PLAYER, RUN_STATE, TF, Rate, graph_topics
+from sms_handover.topics import (
+    CLOCK,
+    CONTAINER,
+    CONTROLLER,
+    LOOP_NODES,
+    NODES,
+    PLAYER,
+    RUN_STATE,
+    TF,
+    Rate,
+    graph_topics,
+)
 
 from ..workspace import ROOT, executables
 from .bench import Bench
@@ -68,8 +79,12 @@ def test_the_reference_is_what_the_node_has(
     bench.start()
     node = bench.add(GRAPH[name])
     published, subscribed = topics_of(name)
-    theirs = node.get_publisher_names_and_types_by_node(name, "/")
     told = {topic.name: topic.type for topic in published}
+    command = "/joint_command"  # made last; what a node has made may take a moment to be told
+    bench.until(
+        lambda: name != CONTROLLER or node.count_publishers(command), "the last endpoint of the controller"
+    )
+    theirs = node.get_publisher_names_and_types_by_node(name, "/")
     assert {topic for topic, _ in theirs} - ROS_OWN == absolute(expanded(set(told)))
     for topic, (type_name,) in theirs:
         assert topic in ROS_OWN or type_name in told.values()

@@ -33,6 +33,7 @@ SAMPLES = {
     "duration": "5",
     "mode": "realtime",
     "bag": "runs/mine",
+    "external": "controller",
 }
 
 
@@ -67,6 +68,17 @@ def test_an_argument_reaches_its_nodes_and_no_other(name: str) -> None:
     assert reached == ({argument.node} if argument.node else set(nodes))
 
 
+def test_an_external_node_is_waited_for_but_not_started() -> None:
+    nodes = launch_processes({"external": "controller"}, record=True, compose=False)
+    assert list(nodes) == ["plant", "trajectory", "ik", "recorder"]
+    for arguments in nodes.values():
+        external, peers = assigned(arguments)
+        assert external == "external:=['controller']" and "'controller'" in peers
+    together = launch_processes({"external": "controller"}, record=True, compose=True)
+    assert list(together) == [CONTAINER, RECORDER]
+    assert together[CONTAINER].nodes == ("plant", "trajectory", "ik")
+
+
 def test_a_container_gets_what_its_nodes_would_get() -> None:
     given = {"controller": "pid", "time_law": "quintic", "duration": "5", "bag": "mine"}
     apart = launch_processes(given, record=True, compose=False)
@@ -91,7 +103,8 @@ def test_every_sample_is_a_value_of_its_parameter(name: str) -> None:
     group, parameter = ARGUMENTS[name].group, ARGUMENTS[name].parameter
     defaults = read_parameter_files([config_file(group.file)], group.section)
     assert parameter in defaults
-    value: object = float(SAMPLES[name]) if name == "duration" else SAMPLES[name]
+    typed: dict[str, object] = {"duration": 5.0, "external": ["controller"]}
+    value = typed.get(name, SAMPLES[name])
     build(group.cls, {**defaults, parameter: value}, name)
     choices = ARGUMENTS[name].choices
     assert choices is None or SAMPLES[name] in choices

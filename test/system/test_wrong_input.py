@@ -37,6 +37,11 @@ def files() -> dict[str, str]:
 
 WRONG = {
     "controller": (["--controller", "pdi"], "invalid choice: 'pdi'"),
+    "own controller beside ours": (["--controller", "pid", "--own-controller", "true"], "give one"),
+    "own controller that is not there": (["--own-controller", "no_such x"], "no program 'no_such'"),
+    "own controller that is empty": (["--own-controller", " "], "is empty"),
+    "own controller half quoted": (["--own-controller", "'true"], "No closing quotation"),
+    "two own controllers": (["--own-controller", "true", "--without-controller"], "not allowed with"),
     "time law": (["--time-law", "cubic"], "invalid choice: 'cubic'"),
     "option": (["--no-such-option"], "unrecognized arguments"),
     "missing schedule": (["--schedule", "nowhere.yaml"], "cannot read the schedule"),

@@ -1,0 +1,127 @@
+"""Runs a controller from outside the package as a node in the place of ours."""
+
+import inspect
+import sys
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from rcl_interfaces.msg import ParameterDescriptor
+
+from sms_handover.bag.stamp import stamp_ns
+from sms_handover.control.protocol import CheckedController, Controller, Guidance
+from sms_handover.frames import WORLD
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.nodes.controller import Answering, AnsweringNode
+from sms_handover.ros.door import Check
+from sms_handover.ros.graph_node import P
+from sms_handover.ros.help import own_parameters_help
+from sms_handover.ros.main import EXIT_OK, run_node
+from sms_handover.ros.wire import PoseWire
+from sms_handover.topics import CONTROLLER, target_pose
+from sms_handover.trajectory.schedule import Schedule
+from sms_handover.types import JointCommand, JointReference, Pose, RobotState, TaskPhase
+
+Make = Callable[[RobotModel, P], Controller]  # a controller for a robot, from its parameters
+
+
+def run_controller(law: str, make: Make[P], group: type[P], args: Sequence[str] | None = None) -> int:
+    """Run a controller as the node of the graph that answers states; return the exit code.
+
+    ``law`` is what reports call it. ``make`` gets the robot and the parameters: a frozen dataclass
+    ``group``, each field made by :func:`sms_handover.parameters.parameter` with a default. They become
+    ROS parameters of the node, checked as those of this package are. Everything else is done here:
+    matching, the start and end of a run, what to answer when, counts, diagnostics, signals.
+    """
+    arguments = list(sys.argv if args is None else args)
+    if {"-h", "--help"} & set(arguments[1:]):
+        print(f"{law}: {inspect.getdoc(make) or ''}\n\n{own_parameters_help(group)}")
+        return EXIT_OK
+    return run_node(lambda: OwnControllerNode(law, make, group), arguments, name=CONTROLLER)
+
+
+class OwnControllerNode(AnsweringNode[P]):
+    """Gives a controller the states of the graph, with all that guides it, and publishes what it answers."""
+
+    def __init__(self, law: str, make: Make[P], group: type[P]) -> None:
+        """Make the controller for the robot of the graph; raises ConfigurationError on a bad parameter."""
+        self._law, self._make = law, make
+        super().__init__(group, shipped=False)
+        about = ParameterDescriptor(description="control law, as reports call it", read_only=True)
+        self.declare_parameter("law", law, about)
+
+    @property
+    def law(self) -> str:
+        """Return the name of the law."""
+        return self._law
+
+    def guidance(self) -> dict[str, Check]:
+        """Return also the targets of the tools."""
+        return {**super().guidance(), **dict.fromkeys(self._arms, self._pose_wire.check)}
+
+    def make_controller(self, schedule: Schedule) -> Answering:
+        """Return the controller, guided as in one process."""
+        robot = self.robot
+        self._pose_wire = PoseWire(WORLD)
+        self._arms = {target_pose(arm): arm for arm in robot.arms}
+        controller = CheckedController(self._make(robot, self.parameters), robot.joint_names)
+        self._guided = GuidedController(controller, robot)
+        return self._guided
+
+    def use(self, topic: str, data: bytes) -> None:
+        """Give phase, reference or target to the controller."""
+        if topic in self._arms:
+            self._guided.aim(stamp_ns(data), self._arms[topic], self._pose_wire.read_pose(data))
+        else:
+            super().use(topic, data)
+
+
+class GuidedController:
+    """A controller whose guidance comes in parts: it gets them when all of one instant are there.
+
+    Before that, as at the start in real time, no effort acts.
+    """
+
+    def __init__(self, controller: Controller, robot: RobotModel) -> None:
+        """Begin a run."""
+        self._controller, self._robot = controller, robot
+        self.reset()
+
+    def reset(self) -> None:
+        """Go back to the start of a run."""
+        self._controller.reset()
+        self._phase: TaskPhase | None = None
+        self._reference: JointReference | None = None
+        self._targets: dict[str, tuple[int, Pose]] = {}
+        self._guided_ns = -1
+
+    def enter(self, phase: TaskPhase) -> None:
+        """Take the phase in force."""
+        self._phase = phase
+        self._guide()
+
+    def track(self, reference: JointReference) -> None:
+        """Take the joint reference."""
+        self._reference = reference
+        self._guide()
+
+    def aim(self, stamp_ns: int, arm: str, tool_in_world: Pose) -> None:
+        """Take the target of a tool."""
+        self._targets[arm] = stamp_ns, tool_in_world
+        self._guide()
+
+    def step(self, state: RobotState) -> JointCommand:
+        """Return the command that answers a state."""
+        if self._guided_ns < 0:
+            return JointCommand(state.stamp_ns, np.zeros(self._robot.n_joints))
+        return JointCommand(state.stamp_ns, self._controller.effort(state.stamp_ns, state.q, state.v))
+
+    def _guide(self) -> None:
+        """Guide the controller once every part is of the same instant."""
+        phase, reference = self._phase, self._reference
+        if phase is None or reference is None or set(self._targets) != set(self._robot.arms):
+            return
+        stamps = {phase.stamp_ns, reference.stamp_ns, *(stamp for stamp, _ in self._targets.values())}
+        if len(stamps) == 1:
+            self._guided_ns = reference.stamp_ns
+            poses = {arm: self._targets[arm][1] for arm in self._robot.arms}
+            self._controller.guide(Guidance(phase, reference, poses))

@@ -1,0 +1,144 @@
+"""A controller of somebody else's on the graph: with our helper, bare, started by hand; scored as ours."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from my_controller import task_space_pd
+
+from sms_handover.analysis.equality import compare_runs
+from sms_handover.bag.info import read_info
+from sms_handover.bag.reader import read_run
+from sms_handover.run_data import RunData
+from sms_handover.simulation.scenario import load_scenario
+from sms_handover.simulation.simulate import simulate
+from sms_handover.types import GraspStatus
+
+from .conftest import TICKS
+from .runs import Ended, running, sms_handover
+
+pytestmark = pytest.mark.system
+
+NODES = {"helped": "my_controller.node", "bare": "my_controller.bare_node"}
+LAWS = {"helped": "task_space_pd", "bare": "task_space_pd_bare"}
+_ROUNDING = 1e-9  # [rad, N m] of the same law in other operations, within two seconds
+
+
+@pytest.fixture(scope="module", autouse=True)
+def example_on_path() -> None:
+    """Let processes import the example, as if it were installed."""
+    example = Path(task_space_pd.__file__).parent.parent
+    os.environ["PYTHONPATH"] = os.pathsep.join([str(example), os.environ.get("PYTHONPATH", "")])
+
+
+@pytest.fixture(scope="module")
+def own(schedule: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, Ended]]:
+    """The output folder of a run over DDS under each node, and what was printed."""
+    folder = tmp_path_factory.mktemp("own")
+    runs = {}
+    for name, module in NODES.items():
+        program = f"{sys.executable} -m {module}"
+        ended = sms_handover(
+            "run", "--schedule", schedule, "--own-controller", program, "-o", name, cwd=folder
+        )
+        assert ended.code == 0, ended
+        runs[name] = (folder / name, ended)
+    return runs
+
+
+@pytest.fixture(scope="module")
+def in_one_process(schedule: Path) -> RunData:
+    """The same law in one process."""
+    scenario = load_scenario({"common": {"schedule": str(schedule)}})
+    return simulate(scenario, controller=task_space_pd.TaskSpacePd(scenario.robot))
+
+
+def test_the_same_object_gives_the_same_bits_over_dds(
+    own: dict[str, tuple[Path, Ended]], in_one_process: RunData
+) -> None:
+    recorded = read_run(own["helped"][0] / "bag")
+    assert recorded.tick_ns.size == TICKS
+    assert compare_runs(recorded, in_one_process) == ()
+
+
+def test_a_bare_node_does_the_same(own: dict[str, tuple[Path, Ended]], in_one_process: RunData) -> None:
+    recorded = read_run(own["bare"][0] / "bag")
+    assert recorded.tick_ns.tobytes() == in_one_process.tick_ns.tobytes()
+    for name in ("joint_position", "joint_command"):
+        np.testing.assert_allclose(
+            getattr(recorded, name), getattr(in_one_process, name), rtol=0.0, atol=_ROUNDING
+        )
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_nothing_is_missing_in_the_bag(own: dict[str, tuple[Path, Ended]], name: str) -> None:
+    """Each state has its command; the bare node says how much it published to nobody, so stamps tell."""
+    folder, _ = own[name]
+    info = read_info(folder / "bag")
+    assert info.ledger is not None and info.ledger.complete
+    commands = next(topic for topic in info.ledger.topics if topic.name == "/joint_command")
+    assert (commands.received, commands.missing, commands.duplicates) == (TICKS, 0, 0)
+    assert commands.published == (TICKS if name == "helped" else None)
+    assert info.parameters["controller"]["law"] == LAWS[name]
+    events = read_run(folder / "bag").grasp_events
+    assert [event.status for event in events] == [GraspStatus.SUCCEEDED] * 2
+
+
+def test_it_is_scored_beside_ours(
+    own: dict[str, tuple[Path, Ended]], recorded: dict[str, tuple[Path, Ended]], tmp_path: Path
+) -> None:
+    """The figures have a column of its own; the paper claims nothing of it, but still of our two."""
+    mine, nmpc, pid = own["helped"][0], recorded["nmpc"][0], recorded["pid"][0]
+    alone = sms_handover("compare", mine, nmpc, cwd=tmp_path)
+    assert alone.out.splitlines()[0].split()[-2:] == ["helped", "nmpc"]
+    assert "Claims of the paper" not in alone.out
+    together = sms_handover("compare", mine, nmpc, pid, "--json", "all.json", cwd=tmp_path)
+    claims = next(line for line in together.out.splitlines() if line.startswith("Claims of the paper"))
+    assert claims.split()[-2:] == ["NMPC", "PID"]
+    assert list(json.loads((tmp_path / "all.json").read_text())["runs"]) == ["helped", "nmpc", "pid"]
+    done = sms_handover("report", mine, nmpc, "-o", "page", cwd=tmp_path)
+    assert done.code == 0, done
+    assert "law task_space_pd" in (tmp_path / "page" / "index.html").read_text(encoding="utf-8")
+
+
+def test_its_commands_can_be_played_into_a_plant_but_not_made_again(
+    own: dict[str, tuple[Path, Ended]], tmp_path: Path
+) -> None:
+    folder, _ = own["helped"]
+    again = sms_handover("reproduce", folder, cwd=tmp_path)
+    assert again.code == 2
+    assert again.errors[0].endswith("check a recording with 'sms-handover play --closed-loop'")
+    played = sms_handover("play", folder, "--closed-loop", cwd=tmp_path)
+    assert played.code == 0, played
+    assert f"the same bit for bit as recorded: {TICKS} states" in played.out
+
+
+def test_it_can_be_started_by_hand(schedule: Path, tmp_path: Path) -> None:
+    """The run waits for it, however late it comes."""
+    arguments = ("run", "--schedule", schedule, "--duration", "0.1", "--without-controller", "-o", "mine")
+    with running(*arguments, cwd=tmp_path) as run:
+        run.until(lambda: "ROS_DOMAIN_ID=" in run.text, "how to join")
+        domain = run.text.split("ROS_DOMAIN_ID=", 1)[1].split()[0]
+        run.until_all_nodes(["plant", "trajectory", "ik", "recorder"])
+        environment = {**os.environ, "ROS_DOMAIN_ID": domain, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        by_hand = subprocess.Popen([sys.executable, "-m", NODES["bare"]], env=environment)
+        try:
+            assert run.end() == 0, run.text
+        finally:
+            by_hand.terminate()
+            by_hand.wait()
+    assert read_run(tmp_path / "mine" / "bag").tick_ns.size == 101
+
+
+def test_one_that_dies_ends_the_run(schedule: Path, tmp_path: Path) -> None:
+    """With its last words, in one line."""
+    program = f"{sys.executable} -m {NODES['helped']}"
+    arguments = ("run", "--schedule", schedule, "--own-controller", program, "-o", "mine")
+    ended = sms_handover(*arguments, "-p", "controller.stiffness:=-3.0", cwd=tmp_path)
+    assert ended.code == 1
+    assert "node 'controller' ended with exit code 2" in ended.err
+    assert "controller: error: parameter 'stiffness' is -3.0 N/m, allowed is at least 0" in ended.err
