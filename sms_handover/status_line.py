@@ -1,6 +1,7 @@
 """A line of text that tells how far something is: on a terminal written over, else now and then."""
 
 import sys
+from contextlib import suppress
 from time import monotonic
 
 _TERMINAL_PERIOD_S = 0.2  # [s] of wall time between two updates
@@ -26,13 +27,19 @@ class StatusLine:
         """Show the line."""
         self._next = monotonic() + self._period_s
         if not self._terminal:
-            print(text, file=sys.stderr, flush=True)
+            _print(f"{text}\n")
             return
-        print("\r" + text.ljust(self._width), end="", file=sys.stderr, flush=True)
+        _print("\r" + text.ljust(self._width))
         self._width = len(text)
 
     def stay(self) -> None:
         """Leave the line as it stands and go to the next."""
         if self._width:
-            print(file=sys.stderr, flush=True)
+            _print("\n")
         self._width = 0
+
+
+def _print(text: str) -> None:
+    """Print a text, unless the terminal was closed: work does not end for want of a spectator."""
+    with suppress(OSError):
+        print(text, end="", file=sys.stderr, flush=True)

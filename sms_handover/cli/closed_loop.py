@@ -106,7 +106,7 @@ def _watch(replay: CommandReplay, executor: Executor, processes: NodeProcesses, 
     while not replay.done:
         executor.spin_once(timeout_sec=_POLL_S)
         for death in processes.dead():
-            raise GraphError(f"the plant ended with exit code {death.code}:\n{death.last_lines}")
+            raise GraphError(f"the plant {death.how}:\n{death.last_lines}")
         if replay.stamp_ns != seen:
             if seen < 0:
                 display.start(replay.stamp_ns)

@@ -1,37 +1,78 @@
 """An own ROS domain for every run, so that runs side by side never hear each other."""
 
-import fcntl
-import os
-import tempfile
+import socket
 from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 
 from sms_handover.errors import ConfigurationError
 
 FIRST_DOMAIN, LAST_DOMAIN = 1, 101  # above 101 the ports of DDS meet the ephemeral ports of Linux
 
+_LOCALHOST = "127.0.0.1"
+# The mapping of RTPS 2.2, 9.6.1: every domain has 250 ports from 7400 on; participant n of it receives at
+# 10 + 2 n and 11 + 2 n. Ports 2 to 9 of a domain are nobody's, so that one of them can stand for it.
+_FIRST_PORT, _PORTS = 7400, 250
+_RESERVATION, _PARTICIPANT, _PER_PARTICIPANT = 2, 10, 2
+_PARTICIPANTS_LOOKED_FOR = 8
+
+
+@dataclass(frozen=True)
+class Reservation:
+    """A domain, and the file descriptors that hold it: it is free when no process has them open."""
+
+    domain: int
+    descriptors: tuple[int, ...]
+
+
+@contextmanager
+def reservation(asked: int | None) -> Iterator[Reservation]:
+    """Hold a domain for as long as the context lasts; raises ConfigurationError if there is none.
+
+    It is held by a port of this machine, one for each domain, so that it holds between all users and
+    containers that share the network, and ends with the last process that has it open however that dies.
+    Without an ``asked`` domain the first is taken that no run holds and nobody takes part in.
+    """
+    if asked is not None and not 0 <= asked <= LAST_DOMAIN:
+        raise ConfigurationError(f"domain id is {asked}, allowed is 0 to {LAST_DOMAIN}")
+    with ExitStack() as stack:
+        for domain in (asked,) if asked is not None else range(FIRST_DOMAIN, LAST_DOMAIN + 1):
+            held = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_STREAM))
+            if _is_free(held, domain, _RESERVATION) and (asked is not None or not _is_used(domain)):
+                yield Reservation(domain, (held.fileno(),))
+                return
+            held.close()
+    if asked is not None:
+        raise ConfigurationError(
+            f"domain id is {asked}, which another run on this machine holds; "
+            "choose another, or leave --domain-id away for a free one"
+        )
+    raise ConfigurationError(
+        f"all domains from {FIRST_DOMAIN} to {LAST_DOMAIN} are in use on this machine; "
+        "wait for a run to end, or give a --domain-id that you know to be free"
+    )
+
 
 @contextmanager
 def reserved_domain(asked: int | None) -> Iterator[int]:
-    """Hold a domain for as long as the context lasts; raises ConfigurationError if there is none.
+    """Hold a domain as ``reservation`` does, for one that needs only its number."""
+    with reservation(asked) as reserved:
+        yield reserved.domain
 
-    A domain that was asked for is taken as it is, so that other tools can join it. Otherwise the
-    first one whose lock file no other run holds is taken; the lock goes with the process.
-    """
-    if asked is not None:
-        if not 0 <= asked <= LAST_DOMAIN:
-            raise ConfigurationError(f"domain id is {asked}, allowed is 0 to {LAST_DOMAIN}")
-        yield asked
-        return
-    folder = Path(tempfile.gettempdir()) / f"sms_handover_domains_{os.getuid()}"
-    folder.mkdir(mode=0o700, exist_ok=True)
-    for domain in range(FIRST_DOMAIN, LAST_DOMAIN + 1):
-        with (folder / str(domain)).open("w", encoding="ascii") as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                continue
-            yield domain
-            return
-    raise ConfigurationError(f"all domains from {FIRST_DOMAIN} to {LAST_DOMAIN} are in use; give --domain-id")
+
+def _is_used(domain: int) -> bool:
+    """Tell whether somebody takes part in a domain, who has not reserved it: any other ROS program."""
+    for number in range(_PARTICIPANTS_LOOKED_FOR):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            if not _is_free(probe, domain, _PARTICIPANT + _PER_PARTICIPANT * number, address=""):
+                return True
+    return False
+
+
+def _is_free(taker: socket.socket, domain: int, offset: int, *, address: str = _LOCALHOST) -> bool:
+    """Bind a socket to a port of a domain; tell whether it was free."""
+    try:
+        taker.bind((address, _FIRST_PORT + _PORTS * domain + offset))
+    except OSError:
+        return False
+    return True

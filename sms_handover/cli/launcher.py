@@ -1,12 +1,10 @@
 """Starts the graph, watches it to the end of the run, and ends it whatever happens."""
 
-import signal
-import sys
-from collections.abc import Mapping
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from time import monotonic
 
 import rclpy
 from rclpy.executors import Executor
@@ -16,7 +14,10 @@ from rclpy.signals import SignalHandlerOptions
 from sms_handover_interfaces.msg import RunState
 
 from sms_handover.cli.display import Display
+from sms_handover.cli.interrupts import Interrupts, let_go_of_closed_output
+from sms_handover.cli.patience import Suspended, WatchedTime
 from sms_handover.cli.processes import Death, NodeProcesses
+from sms_handover.cli.shared_memory import SharedMemory
 from sms_handover.errors import GraphError
 from sms_handover.events import RunEvent
 from sms_handover.ros.composition import ProcessArguments, nodes_together, process_arguments
@@ -41,7 +42,8 @@ class LaunchPlan:
     """What to start and where its logs, and if wanted its bag, go; ``compose``: few processes.
 
     ``controller`` is the command line of an external controller; empty if the user starts it, or if it
-    is ours.
+    is ours. Every process keeps the ``inherited`` file descriptors open: what they lock is free after the
+    last one.
     """
 
     scenario: Scenario
@@ -51,6 +53,7 @@ class LaunchPlan:
     bag: Path | None
     compose: bool = False
     controller: tuple[str, ...] = ()
+    inherited: tuple[int, ...] = ()
 
     @property
     def external(self) -> frozenset[str]:
@@ -74,26 +77,34 @@ class Outcome:
 
 def launch(plan: LaunchPlan) -> Outcome:
     """Run the graph of a plan to its end; raises GraphError if it could not go on."""
-    environment = graph_environment(plan)
-    rclpy.init(domain_id=plan.domain, signal_handler_options=SignalHandlerOptions.NO)
+    interrupts = Interrupts()
     try:
-        node = Node("launcher", start_parameter_services=False, enable_rosout=False)
-        inputs = INPUTS[plan.scenario.parameters.common.transport](node)
+        with SharedMemory() as memory:
+            return _run(plan, interrupts, memory)
+    finally:
+        let_go_of_closed_output()
+
+
+def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outcome:
+    """Take part in the graph, and let go of the middleware at the end."""
+    rclpy.init(domain_id=plan.domain, signal_handler_options=SignalHandlerOptions.NO)
+    node = Node("launcher", start_parameter_services=False, enable_rosout=False)
+    inputs = INPUTS[plan.scenario.parameters.common.transport](node)
+    try:
         monitor = RunMonitor(node, plan.scenario.robot.arms, inputs)
         executor = EventsExecutor()
         executor.add_node(node)
-        with NodeProcesses(plan.log_folder, environment) as processes:
+        with NodeProcesses(plan.log_folder, graph_environment(plan), plan.inherited) as processes:
             for name, arguments in arguments_of(plan).items():
                 if name not in plan.external:
                     processes.start(name, arguments.line)
                 elif plan.controller:
                     named = ("--remap", f"__node:={name}")
                     processes.start(name, (*arguments.line, *named), plan.controller)
-            outcome = _Watch(plan, monitor, executor, processes).to_the_end()
+            return _Watch(plan, monitor, executor, processes, interrupts, memory).to_the_end()
+    finally:
         inputs.destroy()
         node.destroy_node()
-        return outcome
-    finally:
         rclpy.try_shutdown()
 
 
@@ -124,7 +135,13 @@ class _Watch:
     """Looks after one run from start to end."""
 
     def __init__(
-        self, plan: LaunchPlan, monitor: RunMonitor, executor: Executor, processes: NodeProcesses
+        self,
+        plan: LaunchPlan,
+        monitor: RunMonitor,
+        executor: Executor,
+        processes: NodeProcesses,
+        interrupts: Interrupts,
+        memory: SharedMemory,
     ) -> None:
         """Begin to watch."""
         common = plan.scenario.parameters.common
@@ -133,10 +150,9 @@ class _Watch:
         self._common = common
         self._display = Display(end_ns)
         self._events_shown = self._run_events_shown = 0
-        self._interrupts = 0
-        self._recorder_seen_gone = 0.0
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, self._on_signal)
+        self._interrupts, self._memory = interrupts, memory
+        self._time, self._suspended = WatchedTime(), Suspended()
+        self._recorder_seen_gone = inf
 
     def to_the_end(self) -> Outcome:
         """Return how the run ended; raises GraphError if a node died or nothing went on.
@@ -157,23 +173,24 @@ class _Watch:
             run_events=tuple(progress.run_events),
             recorder_code=code,
             recorder_said=self._processes.text_of(RECORDER) if self._plan.bag else "",
-            interrupted=self._interrupts > 0,
+            interrupted=self._interrupts.asked,
         )
 
     def _wait_for_start(self) -> None:
         """Wait until every endpoint has matched and the plant has begun."""
         by_hand = bool(self._plan.external) and not self._plan.controller
-        deadline = inf if by_hand else monotonic() + _START_PATIENCE_S
+        deadline = inf if by_hand else self._time.seconds + _START_PATIENCE_S
         interrupted = inf
         asked = False
         while self._monitor.progress.state == RunState.WAITING:
             self._look()
-            if self._interrupts:
-                interrupted = min(interrupted, monotonic())
+            self._memory.note((os.getpid(), *self._processes.ids.values()))
+            if self._interrupts.asked:
+                interrupted = min(interrupted, self._time.seconds)
                 asked = asked or self._monitor.ask_to_finish()  # it may run, and only the news be late
-                if self._interrupts > 1 or monotonic() - interrupted > _BEGUN_PATIENCE_S:
+                if self._interrupts.at_once or self._time.seconds - interrupted > _BEGUN_PATIENCE_S:
                     raise KeyboardInterrupt
-            if monotonic() > deadline:
+            if self._time.seconds > deadline:
                 raise GraphError(
                     f"the run has not begun after {_START_PATIENCE_S:g} s: {self._monitor.waiting_for()}"
                 )
@@ -181,19 +198,19 @@ class _Watch:
 
     def _wait_for_end(self) -> None:
         """Wait until the plant says that the run is over."""
-        seen_ns, since = -1, monotonic()
+        seen_ns, since = -1, self._time.seconds
         asked = False
         while not self._monitor.finished:
             self._look()
             self._show()
-            if self._interrupts > 1:
+            if self._interrupts.at_once:
                 raise KeyboardInterrupt
-            if self._interrupts and not asked:
+            if self._interrupts.asked and not asked:
                 asked = self._monitor.ask_to_finish()
             now_ns = self._monitor.progress.stamp_ns
             if now_ns != seen_ns:
-                seen_ns, since = now_ns, monotonic()
-            elif monotonic() - since > _STALL_PATIENCE_S:
+                seen_ns, since = now_ns, self._time.seconds
+            elif self._time.seconds - since > _STALL_PATIENCE_S:
                 raise GraphError(
                     f"no progress for {_STALL_PATIENCE_S:g} s at {ns_to_seconds(now_ns):g} s of simulated "
                     f"time: {self._monitor.waiting_for()}"
@@ -201,30 +218,37 @@ class _Watch:
 
     def _wait_for_events(self) -> None:
         """Wait for the events, which may come behind the news of the end."""
-        deadline = monotonic() + _NEWS_PATIENCE_S
-        while not self._monitor.heard_every_event and self._interrupts < 2 and monotonic() < deadline:
+        deadline = self._time.seconds + _NEWS_PATIENCE_S
+        while (
+            not self._monitor.heard_every_event
+            and not self._interrupts.at_once
+            and self._time.seconds < deadline
+        ):
             self._look()
 
     def _wait_for_recorder(self) -> int:
         """Wait until the recorder has everything and has closed the bag; return its exit code."""
-        deadline = monotonic() + _DRAIN_PATIENCE_S
+        deadline = self._time.seconds + _DRAIN_PATIENCE_S
         while True:
             code = self._processes.exit_code(RECORDER)
             if code is not None:
                 return code
             self._look()
-            if self._interrupts > 1:
+            if self._interrupts.at_once:
                 raise KeyboardInterrupt
-            if monotonic() > deadline:
-                raise GraphError("the recorder has not closed the bag; what was written can be recovered")
+            if self._time.seconds > deadline:
+                raise GraphError(f"the recorder has not closed the bag; {self._remedy}")
 
     def _look(self) -> None:
         """Handle what has come, and raise GraphError if a node has died."""
         self._executor.spin_once(timeout_sec=_POLL_S)
         self._monitor.look()
-        for death in self._processes.dead():
-            if not self._recorder_is_done(death):
-                raise GraphError(_obituary(death))
+        self._time.look()
+        let_go_of_closed_output()
+        self._interrupts.tell()
+        self._suspended.look(self._processes.suspended(), self._time.seconds)
+        if dead := [death for death in self._processes.dead() if not self._recorder_is_done(death)]:
+            raise GraphError(self._obituary(dead))
 
     def _recorder_is_done(self, death: Death) -> bool:
         """Tell whether a process that ended is the recorder at the end of the run.
@@ -233,8 +257,8 @@ class _Watch:
         """
         if death.name != RECORDER or death.code not in (EXIT_OK, EXIT_LOSS):
             return False
-        self._recorder_seen_gone = self._recorder_seen_gone or monotonic()
-        return self._monitor.finished or monotonic() - self._recorder_seen_gone < _NEWS_PATIENCE_S
+        self._recorder_seen_gone = min(self._recorder_seen_gone, self._time.seconds)
+        return self._monitor.finished or self._time.seconds - self._recorder_seen_gone < _NEWS_PATIENCE_S
 
     def _show(self, *, last: bool = False) -> None:
         """Show progress, and every event once."""
@@ -251,14 +275,14 @@ class _Watch:
             self._display.finish(progress.wall_time)
         self._display.show(progress.stamp_ns, progress.phase, progress.tool_error, last=last)
 
-    def _on_signal(self, number: int, frame: object) -> None:
-        """Count interrupts; the first one asks for an orderly end."""
-        self._interrupts += 1
-        print("\nending the run; once more to end it at once", file=sys.stderr)
+    def _obituary(self, dead: Sequence[Death]) -> str:
+        """Return who died, how, what to do, and the last they said."""
+        who = "; ".join(f"node {death.name!r} {death.how}" for death in dead)
+        cut = any(death.name == RECORDER and death.code < 0 for death in dead)
+        last = [death.last_lines for death in dead if death.last_lines]
+        return who + (f"; {self._remedy}" if cut else "") + "".join(f":\n{lines}" for lines in last)
 
-
-def _obituary(death: Death) -> str:
-    """Return who died, how, and the last it said."""
-    how = f"was killed by signal {-death.code}" if death.code < 0 else f"ended with exit code {death.code}"
-    last = f":\n{death.last_lines}" if death.last_lines else ""
-    return f"node {death.name!r} {how}{last}"
+    @property
+    def _remedy(self) -> str:
+        """What to do about a bag that was not closed."""
+        return f"'sms-handover bag recover {self._plan.bag}' makes a whole bag of what was written"

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
@@ -13,7 +14,7 @@ from types import TracebackType
 from sms_handover.cli.node_log import NodeLog
 from sms_handover.ros.parent import LAUNCHER_PID
 
-_GRACE_S = 10.0  # [s] of wall time a process gets to end after a signal
+_GRACE_S = 20.0  # [s] of wall time a process gets to end when asked to, before it is killed
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,17 @@ class Death:
     code: int
     last_lines: str
 
+    @property
+    def how(self) -> str:
+        """How it ended, in words."""
+        if self.code >= 0:
+            return f"ended with exit code {self.code}"
+        try:
+            name = signal.Signals(-self.code).name
+        except ValueError:
+            name = "a real-time signal"
+        return f"was killed by signal {-self.code} ({name})"
+
 
 class NodeProcesses:
     """One process per node, each in a session of its own, its output in ``<folder>/<node>.log``.
@@ -31,9 +43,11 @@ class NodeProcesses:
     Use it as a context manager: leaving it ends every process that is still there.
     """
 
-    def __init__(self, log_folder: Path, environment: Mapping[str, str]) -> None:
-        """Prepare; nothing is started yet."""
-        self._folder = log_folder
+    def __init__(
+        self, log_folder: Path, environment: Mapping[str, str], inherited: Sequence[int] = ()
+    ) -> None:
+        """Prepare; nothing is started yet. Every process keeps the ``inherited`` file descriptors open."""
+        self._folder, self._inherited = log_folder, inherited
         self._environment = {**os.environ, **environment, LAUNCHER_PID: str(os.getpid())}
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
         self._logs: dict[str, NodeLog] = {}
@@ -65,11 +79,23 @@ class NodeProcesses:
             stderr=subprocess.STDOUT,
             env=self._environment,
             start_new_session=True,
+            pass_fds=self._inherited,
         )
 
     def text_of(self, node: str) -> str:
         """Return what a node has printed so far."""
         return self._logs[node].text
+
+    @property
+    def ids(self) -> dict[str, int]:
+        """Return the process id of every node that was started."""
+        return {name: process.pid for name, process in self._processes.items()}
+
+    def suspended(self) -> dict[str, int]:
+        """Return the process ids of the nodes that are stopped and were not continued, by name."""
+        if not hasattr(os, "waitid"):  # macOS has it from Python 3.13 on
+            return {}
+        return {name: pid for name, pid in self.ids.items() if _is_stopped(pid)}
 
     def exit_code(self, node: str) -> int | None:
         """Return the exit code of a node that has ended, else None."""
@@ -83,14 +109,28 @@ class NodeProcesses:
         ]
 
     def end(self) -> None:
-        """End every process: ask by SIGINT, then SIGTERM, then kill, and wait for each."""
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
-            alive = [process for process in self._processes.values() if process.poll() is None]
-            for process in alive:
+        """End every process: ask it to, wake it if it is suspended, wait, and kill who does not end."""
+        alive = self._alive()
+        for number in (signal.SIGTERM, signal.SIGCONT):
+            for process in alive.values():
                 process.send_signal(number)
-            deadline = monotonic() + _GRACE_S
-            for process in alive:
-                try:
-                    process.wait(max(deadline - monotonic(), 0.01))
-                except subprocess.TimeoutExpired:
-                    break
+        deadline = monotonic() + _GRACE_S
+        for process in alive.values():
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(max(deadline - monotonic(), 0.01))
+        for name, process in self._alive().items():
+            print(f"node {name!r} did not end within {_GRACE_S:g} s and was killed", file=sys.stderr)
+            process.kill()
+            process.wait()
+
+    def _alive(self) -> dict[str, "subprocess.Popen[bytes]"]:
+        """Return the processes that have not ended."""
+        return {name: process for name, process in self._processes.items() if process.poll() is None}
+
+
+def _is_stopped(pid: int) -> bool:
+    """Tell whether a child is stopped now; what is told of it is left for others to ask."""
+    try:
+        return os.waitid(os.P_PID, pid, os.WSTOPPED | os.WNOHANG | os.WNOWAIT) is not None
+    except ChildProcessError:  # it has ended and was reaped
+        return False

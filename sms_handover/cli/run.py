@@ -4,12 +4,14 @@ import shlex
 import shutil
 import sys
 from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 
-from sms_handover.cli.domain import reserved_domain
+from sms_handover.cli.domain import reservation
 from sms_handover.cli.exit_codes import task_code
-from sms_handover.cli.folders import BAG, LOGS
+from sms_handover.cli.folders import BAG, LOGS, locked_logs
 from sms_handover.cli.launcher import LaunchPlan, launch
 from sms_handover.cli.options import add_scenario_options, scenario_of
 from sms_handover.errors import ConfigurationError
@@ -23,6 +25,7 @@ from sms_handover.topics import CONTROLLER
 EXIT_INTERRUPTED = 130
 
 OWN = "own"  # in the name of the output folder, for a law of which we know no name
+_AT_ONCE = 100  # runs at most that begin within one second without an output folder of their own
 
 
 def add_parser(parser: ArgumentParser) -> None:
@@ -79,20 +82,21 @@ def command(options: Namespace) -> int:
     external = (CONTROLLER,) if own or options.without_controller else ()
     scenario = scenario_of(options, mode, recorded=not options.no_record, external=external)
     check_scenario(scenario)
-    with reserved_domain(options.domain_id) as domain:
-        output = _output_folder(options, scenario)
+    with reservation(options.domain_id) as held, _output_folder(options, scenario) as (output, lock):
         plan = LaunchPlan(
             scenario=scenario,
             parameter_files=tuple(path.resolve() for path in options.params_file),
-            domain=domain,
+            domain=held.domain,
             log_folder=output / LOGS,
             bag=None if options.no_record else output / BAG,
             compose=options.compose,
             controller=own,
+            inherited=(*held.descriptors, lock),
         )
-        print(f"running on ROS domain {domain}, this machine only; output in {options.output or output}")
+        where = options.output or output
+        print(f"running on ROS domain {held.domain}, this machine only; output in {where}", flush=True)
         if options.without_controller:
-            print(_how_to_join(domain))
+            print(_how_to_join(held.domain), flush=True)
         outcome = launch(plan)
     print(outcome.recorder_said, end="")
     if told := graver_in_words(outcome.run_events):
@@ -131,20 +135,37 @@ def _how_to_join(domain: int) -> str:
     )
 
 
-def _output_folder(options: Namespace, scenario: Scenario) -> Path:
-    """Make the output folder and return its full path; raises ConfigurationError if it cannot be."""
-    common = scenario.parameters.common
-    law = OWN if CONTROLLER in common.external else scenario.parameters.controller.law
-    folder: Path = options.output or Path("runs") / f"{law}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
+@contextmanager
+def _output_folder(options: Namespace, scenario: Scenario) -> Iterator[tuple[Path, int]]:
+    """Make the output folder, and yield its full path and the file descriptor that locks it.
+
+    Raises ConfigurationError if it cannot be made, and if a run that is to be replaced still goes on.
+    """
+    external = scenario.parameters.common.external
+    law = OWN if CONTROLLER in external else scenario.parameters.controller.law
+    wanted: Path = options.output or Path("runs") / f"{law}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
+    names = (wanted,) if options.output else (wanted, *(Path(f"{wanted}_{n}") for n in range(2, _AT_ONCE)))
     try:
-        if options.overwrite and (folder / LOGS).is_dir():
-            shutil.rmtree(folder)
-        folder.mkdir(parents=True)
+        if options.overwrite and (wanted / LOGS).is_dir():
+            with locked_logs(wanted):
+                shutil.rmtree(wanted)
+        wanted.parent.mkdir(parents=True, exist_ok=True)
+        folder = next(name for name in names if _makes(name))
         (folder / LOGS).mkdir()
-    except FileExistsError:
+    except StopIteration:
         raise ConfigurationError(
-            f"output folder {folder} exists; choose another, or --overwrite one that a run has made"
+            f"output folder {wanted} exists; choose another, or --overwrite one that a run has made"
         ) from None
     except OSError as error:
-        raise ConfigurationError(f"output folder {folder} cannot be made: {error.strerror}") from error
-    return folder.resolve()
+        raise ConfigurationError(f"output folder {wanted} cannot be made: {error.strerror}") from error
+    with locked_logs(folder) as lock:
+        yield folder.resolve(), lock
+
+
+def _makes(folder: Path) -> bool:
+    """Make a folder; tell whether it is new."""
+    try:
+        folder.mkdir()
+    except FileExistsError:
+        return False
+    return True

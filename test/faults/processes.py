@@ -1,6 +1,7 @@
 """Processes that die: killed, ended or stopped at a random moment of a run."""
 
 import os
+import re
 import signal
 from collections.abc import Callable
 from functools import partial
@@ -8,7 +9,7 @@ from functools import partial
 from benchmarks.recorder_kill import Witness
 from sms_handover.topics import NODES, RECORDER
 
-from ..system.runs import Ended
+from ..system.runs import Ended, Running
 from .fault import Fault
 from .outcome import Kept, require
 from .promises import closed, exit_code, lost_since, one_line, readable
@@ -18,7 +19,16 @@ TITLE = "Processes that die"
 
 _KILLED = (name for name in NODES if name != RECORDER)
 _EARLIEST, _LATEST = 200_000, 900_000  # [byte] of the bag at which a process is killed: within some seconds
+_DOMAIN = re.compile(r"running on ROS domain (\d+),")
 _BOUND_MS = 50.0  # [ms] that a killed recorder may lose in lock step
+
+
+def domain_of(run: Running) -> int:
+    """Return the domain that a run says it is on."""
+    run.until(lambda: _DOMAIN.search(run.text), "the domain of the run")
+    said = _DOMAIN.search(run.text)
+    assert said
+    return int(said[1])
 
 
 def under_way(trial: Trial) -> int:
@@ -74,8 +84,8 @@ def ends_in_order(trial: Trial, ended: Ended) -> Kept:
 
 def kill_recorder(trial: Trial) -> tuple[Ended, int]:
     """Kill the recorder; return how the run ended and the newest state [ns] that had been published."""
-    with trial.start("run", "-o", "run", "--domain-id", trial.domain) as run:
-        witness = Witness(trial.domain)
+    with trial.start("run", "-o", "run") as run:
+        witness = Witness(domain_of(run))
         try:
             size, bag = under_way(trial), trial.folder / "run" / "bag" / "bag_0.mcap"
             run.until(lambda: witness.newest_ns() > 0 and bag.stat().st_size > size, "the moment of the kill")

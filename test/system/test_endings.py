@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -13,7 +15,7 @@ from sms_handover.run_data import RunData
 from sms_handover.topics import NODES
 
 from ..ros.short_handover import short_handover
-from .runs import running, sms_handover
+from .runs import DEADLINE_S, command_of, has_ended, nodes_of, running, sms_handover
 
 pytestmark = [pytest.mark.system, pytest.mark.slow]
 
@@ -32,7 +34,7 @@ def beginning(bag: Path) -> RunData:
     return run
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_an_interrupt_leaves_a_complete_bag(number: signal.Signals, tmp_path: Path) -> None:
     """The plant ends at the tick it is at, the others tell their counts, the recorder takes all of it."""
     bag = tmp_path / "run" / "bag"
@@ -73,6 +75,71 @@ def test_a_second_interrupt_ends_everything_at_once(tmp_path: Path) -> None:
         assert "Traceback" not in run.text
         run.wait_for_nodes()
     assert len(read_run(bag).tick_ns) > 0
+
+
+def test_a_quit_ends_everything_at_once(tmp_path: Path) -> None:
+    """Ctrl and backslash in a terminal: nothing is waited for, and still nothing is lost that had come."""
+    bag = tmp_path / "run" / "bag"
+    with running("run", "-o", "run", cwd=tmp_path) as run:
+        run.until_recorded(bag, UNDER_WAY)
+        run.send(signal.SIGQUIT)
+        assert run.end() == 130
+        run.wait_for_nodes()
+    beginning(bag)
+
+
+def test_a_closed_terminal_ends_the_run_in_order(tmp_path: Path) -> None:
+    """The launcher can print no more; that must not keep it from waiting for the recorder."""
+    bag = tmp_path / "run" / "bag"
+    terminal, inside = os.openpty()
+    os.set_blocking(terminal, False)
+    command = ["setsid", "--ctty", *command_of(("run", "-o", "run"))]  # of util-linux; it becomes the command
+    with subprocess.Popen(command, cwd=tmp_path, stdin=inside, stdout=inside, stderr=inside) as process:
+        os.close(inside)
+        try:
+            nodes = read_until_recorded(terminal, process.pid, bag)
+        finally:
+            os.close(terminal)
+        assert process.wait(DEADLINE_S) == 130
+    assert set(nodes) == set(NODES)
+    assert all(has_ended(pid, DEADLINE_S) for pid in nodes.values())
+    ledger = read_info(bag).ledger
+    assert ledger is not None
+    states = {account.name: account for account in ledger.topics}["/joint_states"]
+    assert states.received == states.published == len(beginning(bag).tick_ns)
+
+
+def read_until_recorded(terminal: int, pid: int, bag: Path) -> dict[str, int]:
+    """Read what a command prints on a terminal until its run is under way; return its nodes."""
+    file = bag / "bag_0.mcap"
+    while not (file.is_file() and file.stat().st_size > UNDER_WAY):
+        assert not has_ended(pid, 0.02)
+        with suppress(BlockingIOError):
+            os.read(terminal, 4096)
+    return nodes_of(pid)
+
+
+def test_a_suspended_node_is_named_and_the_run_goes_on_with_it(tmp_path: Path) -> None:
+    with running("run", "--duration", "2", "-o", "run", cwd=tmp_path) as run:
+        run.until_recorded(tmp_path / "run" / "bag", UNDER_WAY)
+        pid = run.nodes["ik"]
+        os.kill(pid, signal.SIGSTOP)
+        run.until(lambda: "node 'ik' is suspended; " in run.text, "the news")
+        assert f"'kill -CONT {pid}' lets it go on" in run.text
+        os.kill(pid, signal.SIGCONT)
+        assert run.end() == 0, run.text
+
+
+def test_a_run_is_not_overwritten_while_it_goes_on(tmp_path: Path) -> None:
+    bag = tmp_path / "run" / "bag"
+    with running("run", "-o", "run", cwd=tmp_path) as run:
+        run.until_recorded(bag, UNDER_WAY)
+        refused = sms_handover("run", "-o", "run", "--overwrite", cwd=tmp_path)
+        assert (refused.code, len(refused.errors)) == (2, 1)
+        assert "a run still writes to output folder run" in refused.errors[0]
+        run.send(signal.SIGINT)
+        assert run.end() == 130
+    beginning(bag)
 
 
 def test_a_dead_node_ends_the_run_and_is_named(tmp_path: Path) -> None:

@@ -246,4 +246,4 @@ def test_a_dead_plant_is_told(recorded: Recorded, tmp_path: Path) -> None:
         run.until_all_nodes(("plant",))
         os.kill(run.nodes["plant"], signal.SIGKILL)
         assert run.end() == 1
-        assert "error: the plant ended with exit code -9" in run.text
+        assert "error: the plant was killed by signal 9 (SIGKILL)" in run.text

@@ -1,0 +1,50 @@
+"""Signals that ask for the end of a run, and output that nobody takes any more."""
+
+import os
+import select
+import signal
+import sys
+
+_ALL = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+_OUTPUTS = (1, 2)  # file descriptors of standard output and standard error
+
+
+class Interrupts:
+    """Counts the signals: the first asks for an orderly end, a second one, or SIGQUIT, for one at once."""
+
+    def __init__(self) -> None:
+        """Install the handlers; a hang-up that is ignored, as under nohup(1), stays ignored."""
+        self._count = self._told = 0
+        for number in _ALL:
+            if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, self._on_signal)
+
+    @property
+    def asked(self) -> bool:
+        """Tell whether the run is to end."""
+        return self._count > 0
+
+    @property
+    def at_once(self) -> bool:
+        """Tell whether nothing is to be waited for."""
+        return self._count > 1
+
+    def tell(self) -> None:
+        """Say what an interrupt does, once for each; the handler itself may not print into other output."""
+        if self._told < self._count:
+            self._told = self._count
+            print("\nending the run; once more to end it at once", file=sys.stderr)
+
+    def _on_signal(self, number: int, frame: object) -> None:
+        self._count += 2 if number == signal.SIGQUIT else 1
+
+
+def let_go_of_closed_output() -> None:
+    """Send output to nowhere whose terminal was closed or whose reader has ended: the run is worth more."""
+    for output in _OUTPUTS:
+        poll = select.poll()
+        poll.register(output, select.POLLOUT)
+        if any(event & (select.POLLHUP | select.POLLERR) for _, event in poll.poll(0)):
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, output)
+            os.close(nowhere)

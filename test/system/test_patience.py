@@ -1,0 +1,75 @@
+"""A launcher waits for its nodes, says for whom, and not for ever; its own absence does not count."""
+
+import os
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+
+from sms_handover.cli.patience import Suspended, WatchedTime
+from sms_handover.cli.processes import Death, NodeProcesses
+from sms_handover.errors import GraphError
+
+
+def test_time_in_which_nobody_looked_does_not_count() -> None:
+    now = [100.0]
+    time = WatchedTime(lambda: now[0])
+    for _ in range(10):
+        now[0] += 0.25
+        time.look()
+    assert time.seconds == 2.5
+    now[0] += 3600.0  # suspended by Ctrl-Z for an hour
+    time.look()
+    assert 2.5 < time.seconds <= 3.5
+
+
+def test_a_suspended_node_is_told_once_and_then_given_up(capsys: pytest.CaptureFixture[str]) -> None:
+    suspended = Suspended()
+    for second in range(20):
+        suspended.look({"ik": 4711}, 7.0 + second)
+        assert ("kill -CONT 4711" in capsys.readouterr().err) == (second == 6)
+    with pytest.raises(GraphError, match="'ik' has been suspended for 20 s"):
+        suspended.look({"ik": 4711}, 27.5)
+
+
+def test_a_node_that_goes_on_is_forgiven() -> None:
+    suspended = Suspended()
+    for second in range(100):
+        suspended.look({"ik": 4711} if second % 10 else {}, float(second))
+
+
+def test_a_process_is_seen_suspended_as_long_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wrapper = tmp_path / "sleep"
+    wrapper.write_text("#!/bin/sh\nexec sleep 60\n", encoding="ascii")
+    wrapper.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(wrapper))
+    with NodeProcesses(tmp_path, {}) as processes:
+        processes.start("plant", ())
+        pid = processes.ids["plant"]
+        assert processes.suspended() == {}
+        os.kill(pid, signal.SIGSTOP)
+        os.waitid(os.P_PID, pid, os.WSTOPPED | os.WNOWAIT)
+        assert processes.suspended() == processes.suspended() == {"plant": pid}
+        os.kill(pid, signal.SIGCONT)
+        os.waitid(os.P_PID, pid, os.WCONTINUED | os.WNOWAIT)
+        assert processes.suspended() == {}
+        os.kill(pid, signal.SIGSTOP)
+        processes.end()  # it is woken, or it would be killed 20 s later
+        assert processes.exit_code("plant") == -signal.SIGTERM
+        assert processes.suspended() == {}
+
+
+@pytest.mark.parametrize(
+    ("code", "how"),
+    [
+        (2, "ended with exit code 2"),
+        (-9, "was killed by signal 9 (SIGKILL)"),
+        (-64, "was killed by signal 64 (SIGRTMAX)"),
+        (-40, "was killed by signal 40 (a real-time signal)"),
+    ],
+)
+def test_how_a_process_died_is_told_in_words(code: int, how: str) -> None:
+    assert Death("ik", code, "").how == how
