@@ -135,7 +135,7 @@ class ContentCheck:
     def _close_run(self, findings: Findings) -> None:
         """Tell whether the run came to its end, and whether everybody told what was published."""
         state = self._state
-        if state is None or state.state != state.FINISHED:
+        if state is None or state.state not in (state.FINISHED, state.WAITING):  # the latter by a reset
             newest_s = max(self._newest.values(), default=0) / NS_PER_S
             findings.missing(f"the run was not finished when the recording ended, at {newest_s:g} s")
             return

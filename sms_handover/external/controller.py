@@ -43,7 +43,7 @@ class OwnControllerNode(AnsweringNode[P]):
     """Gives a controller the states of the graph, with all that guides it, and publishes what it answers."""
 
     def __init__(self, law: str, make: Make[P], group: type[P]) -> None:
-        """Make the controller for the robot of the graph; raises ConfigurationError on a bad parameter."""
+        """Declare the parameters; the controller is made when the node is configured."""
         self._law, self._make = law, make
         super().__init__(group, shipped=False)
         about = ParameterDescriptor(description="control law, as reports call it", read_only=True)

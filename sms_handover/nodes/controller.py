@@ -57,8 +57,11 @@ class AnsweringNode(GraphNode[P]):
     """
 
     def __init__(self, group: type[P], *, shipped: bool = True) -> None:
-        """Set up the controller; raises what :meth:`make_controller` does."""
+        """Declare the parameters."""
         super().__init__(CONTROLLER, group, shipped=shipped)
+
+    def prepare(self) -> None:
+        """Set up the controller; raises what :meth:`make_controller` does."""
         schedule = load_task(self.common, self.robot)
         self._controller = self.make_controller(schedule)
         self._lockstep = self.common.mode == LOCKSTEP
@@ -102,6 +105,15 @@ class AnsweringNode(GraphNode[P]):
     def on_answered(self, stamp: int) -> None:
         """Do what is due after an answer; a node may override this."""
 
+    def begin_anew(self) -> None:
+        """Forget the run: integrals, references and what waits of it."""
+        self.begin()
+        self._inputs.begin_anew()
+        for order in self._orders.values():
+            order.reset()
+        self._answered_ns = 0
+        self._answer_bytes = b""
+
     def diagnostic_values(self) -> dict[str, object]:
         """Return what has been answered and what came too late."""
         return {"law": self.law, "answered": self._command.count, "late": self._inputs.dropped}
@@ -134,8 +146,9 @@ class AnsweringNode(GraphNode[P]):
             for order in self._orders.values():
                 order.reset()
         if not self._lockstep and topic in self._orders:
-            self._orders[topic].take(stamp, self._answered_ns)
-            self.use(topic, data)
+            if self._inputs.admits(stamp, topic):
+                self._orders[topic].take(stamp, self._answered_ns)
+                self.use(topic, data)
             return
         if topic == BASE_ODOMETRY and stamp == self._answered_ns and self._lockstep and self._answer_bytes:
             self._command.publish(self._answer_bytes)  # the plant asks again: it has missed the answer
@@ -176,8 +189,12 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
     """
 
     def __init__(self) -> None:
-        """Set up the law; raises UnstableLoopError if its gains cannot work at this tick."""
+        """Declare the parameters."""
         super().__init__(ControllerParameters)
+
+    def prepare(self) -> None:
+        """Set up the law; raises UnstableLoopError if its gains cannot work at this tick."""
+        super().prepare()
         self._watch = ReferenceWatch(longest_reference_ns(self.common, self.parameters))
 
     @property

@@ -26,12 +26,19 @@ class IkNode(GraphNode[IkParameters]):
     """Answers ``solve_ik``: the joints that bring the tools to their targets with the base locked."""
 
     def __init__(self) -> None:
-        """Offer the service."""
+        """Declare the parameters."""
         super().__init__(IK, IkParameters)
+
+    def prepare(self) -> None:
+        """Offer the service."""
+        self.begin_anew()
+        self.inputs.serve(SolveIK, SOLVE_IK, self._on_request)
+
+    def begin_anew(self) -> None:
+        """Forget the run: only counts are kept of it, as a solution rests on its request alone."""
         self._solved = dict.fromkeys(IkStatus, 0)
         self._refused = 0
         self._stamp_ns = 0
-        self.inputs.serve(SolveIK, SOLVE_IK, self._on_request)
 
     @property
     def awaited(self) -> str:

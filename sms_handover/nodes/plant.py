@@ -3,27 +3,25 @@
 import gc
 from collections.abc import Sequence
 from time import monotonic
-from typing import Any
 
 import numpy as np
 from rclpy.executors import Executor
 from sms_handover_interfaces.msg import RunState
-from sms_handover_interfaces.srv import StepTicks
 from std_msgs.msg import String
-from std_srvs.srv import SetBool, Trigger
 
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.errors import MessageError, Reason
 from sms_handover.plant.answer_watch import AnswerWatch
 from sms_handover.plant.command_watch import CommandWatch
 from sms_handover.plant.parameters import PlantParameters
-from sms_handover.ros.convert import event_message, header, time_message
+from sms_handover.ros.convert import event_message, header
 from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.loop_clock import LoopClock
-from sms_handover.ros.main import EXIT_OK, Stop, run_node
+from sms_handover.ros.main import run_node
 from sms_handover.ros.marker import deputy_marker
 from sms_handover.ros.phase_wire import PhaseWire
 from sms_handover.ros.plant_outputs import PlantOutputs
+from sms_handover.ros.run_control import RunControl
 from sms_handover.ros.stamp_sync import StampOrder, StampSync
 from sms_handover.ros.wire import JointStateWire, arrival_ns, check_stamp
 from sms_handover.simulation.parameters import LOCKSTEP
@@ -47,6 +45,7 @@ from sms_handover.types import JointCommand
 _COMMAND = (JOINT_COMMAND,)
 _PHASE_AND_COMMAND = (TASK_PHASE, JOINT_COMMAND)
 _MOST_UNRECORDED_NS = 45_000_000  # [ns] of simulation time that may be lost with the recorder
+_RUNNING = int(RunState.RUNNING)  # asking the message class for it takes a call each time
 _TIMING_PERIOD_S = 1.0  # [s] of wall time
 _LOOK_PERIOD_S = 0.5  # [s] of wall time between two looks whether the loop goes on
 
@@ -59,40 +58,42 @@ class PlantNode(GraphNode[PlantParameters]):
     """
 
     def __init__(self) -> None:
-        """Place robot and deputy at the start of the schedule."""
+        """Declare the parameters."""
         super().__init__(PLANT, PlantParameters)
+        self.runs = 0
+
+    def prepare(self) -> None:
+        """Place robot and deputy at the start of the schedule."""
         schedule = load_task(self.common, self.robot)
         self._plant = make_plant(self.robot, schedule, self.common, self.parameters)
         self._deputy_size = schedule.deputy.size
         self._end_ns = schedule.end_ns
-        self._last_tick, self._failed_phase = self.common.last_tick(self._end_ns), ""
-        self._lockstep = self.common.mode == LOCKSTEP
+        self.lockstep = self.common.mode == LOCKSTEP
         self._tick_ns, self._per_reference = self.common.tick_ns, self.common.ticks_per_reference
         self._is_recorded = RECORDER in self.common.peers
         self._command_wire = JointStateWire(self.robot.joint_names, ("effort",))
         self._phase_wire = PhaseWire(self.robot.arms, tuple(schedule.deputy.grasp_frames))
         self._inputs: StampSync[bytes] = StampSync(ahead_ns=self._tick_ns)
         self._orders = {topic: StampOrder(0) for topic in _PHASE_AND_COMMAND}
-        self._loop_clock = LoopClock(self.common.tick_ns, paced=not self._lockstep)
-        self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
+        self._loop_clock = LoopClock(self.common.tick_ns, paced=not self.lockstep)
         self._command_watch = CommandWatch(self.parameters)
         self._answer_watch = AnswerWatch(self.parameters)
-        self._run_state = RunState.WAITING
-        self._steps_left = 0
-        self._reset_asked = False
-        self._recorded_ns = 0
-        self._waiting_for = set(self.common.peers) - {PLANT}
+        self.run_state = int(RunState.WAITING)
+        self._configured_anew = self.runs > 0
+        self._wait_for_others()
         self._make_endpoints()
-        self._silent_tick = -1
         self.create_timer(_TIMING_PERIOD_S, self._publish_timing)
-        if self._lockstep:
+        if self.lockstep:
             self.create_timer(self.parameters.resend_after, self._send_again)
             self.create_timer(_LOOK_PERIOD_S, self._look_for_answer)
 
     def on_matched(self) -> None:
         """Say what robot and deputy these are; the run begins when the other nodes are ready too."""
-        self._publish[ROBOT_DESCRIPTION].publish(String(data=self.robot.urdf))
-        self._publish[DEPUTY_MARKER].publish(deputy_marker(self._deputy_size))
+        if self._configured_anew:
+            self._configured_anew, self.finished = False, True
+            self.restart()  # the others may still know of a run before
+        elif not self.runs:
+            self._describe()
         self._begin_if_ready()
 
     def diagnostic_values(self) -> dict[str, object]:
@@ -108,24 +109,41 @@ class PlantNode(GraphNode[PlantParameters]):
         """Return simulation time."""
         return self._plant.stamp_ns
 
-    def run(self, executor: Executor, stop: Stop) -> int:
-        """Handle events until asked to stop, and in real time begin every tick at its deadline."""
-        if self._lockstep:
-            return super().run(executor, stop)
+    def activate(self) -> None:
+        """Begin, or go on at the tick where the plant was deactivated."""
+        if not self.lockstep:
+            gc.disable()  # a collection takes as long as ticks do; the young have one after each report
+        if self.run_state == RunState.PAUSED and not self._control.paused:
+            self.enter(RunState.RUNNING, "activated")
+        super().activate()
+        self.advance()
+
+    def deactivate(self) -> None:
+        """Hold the run at this tick."""
+        self.inputs.close(drop=False)
+        if self.run_state == RunState.RUNNING:
+            self.enter(RunState.PAUSED, "deactivated")
+        gc.enable()
+
+    def clean_up(self) -> None:
+        """End the run, so that the other nodes do not wait for the next state."""
+        if self.runs and not self.finished:
+            self.finish("the plant was cleaned up")
+        super().clean_up()
+
+    def turn(self, executor: Executor) -> None:
+        """Handle what has come, and in real time begin the tick that is due."""
+        if not self.active or self.lockstep:
+            super().turn(executor)
+            return
         clock = self._loop_clock
-        gc.disable()  # a collection takes as long as ticks do; there is one of the young after each report
-        try:
-            while not stop.asked:
-                left_s = clock.wait_s() - self.parameters.busy_wait
-                if left_s > 0.0:
-                    self.inputs.spin_once(executor, left_s, self.awaited)
-                    continue
-                self.inputs.poll()
-                if clock.due():
-                    self._tick_now()
-        finally:
-            gc.enable()
-        return EXIT_OK
+        left_s = clock.wait_s() - self.parameters.busy_wait
+        if left_s > 0.0:
+            self.inputs.spin_once(executor, left_s, self.awaited)
+            return
+        self.inputs.poll()
+        if clock.due():
+            self._tick_now()
 
     @property
     def awaited(self) -> str:
@@ -159,12 +177,9 @@ class PlantNode(GraphNode[PlantParameters]):
         self.receive(JOINT_COMMAND, self._on_command, self._command_wire.check)
         self.receive(RUN_RECORDED, self._on_recorded, check_stamp)
         self.endpoints.subscribe(RUN_READY, self._on_ready)
-        self.create_service(SetBool, "~/pause", self._on_pause)
-        self.create_service(StepTicks, "~/step", self._on_step)
-        self.create_service(Trigger, "~/reset", self._on_reset)
-        self.create_service(Trigger, "~/finish", self._on_finish)
+        self._control = RunControl(self, self)
 
-    # The start of the run
+    # The start of a run
 
     def _on_ready(self, message: String) -> None:
         """Note that another node is ready."""
@@ -172,11 +187,31 @@ class PlantNode(GraphNode[PlantParameters]):
         self._begin_if_ready()
 
     def _begin_if_ready(self) -> None:
-        """Begin the run once every node is ready."""
+        """Begin the run once the plant is active and every node is ready."""
         waits = not self._waiting_for <= self.endpoints.silent(RUN_READY)
-        if self._run_state == RunState.WAITING and not waits and not self.endpoints.unmatched:
-            self._enter(RunState.RUNNING, "")
-            self._publish_state()
+        if self.run_state != RunState.WAITING or not self.active or waits or self.endpoints.unmatched:
+            return
+        if self.runs:
+            self._describe()
+        self.runs += 1
+        self.enter(self._control.first_state, "reset" if self.runs > 1 else "")
+        self._publish_state()
+        if self._control.finish_asked:
+            self.finish("stopped on request")
+
+    def _describe(self) -> None:
+        """Say what robot and deputy these are."""
+        self._publish[ROBOT_DESCRIPTION].publish(String(data=self.robot.urdf))
+        self._publish[DEPUTY_MARKER].publish(deputy_marker(self._deputy_size))
+
+    def _wait_for_others(self) -> None:
+        """Be at the start of a run, and wait until every other node is ready for it."""
+        self._waiting_for = set(self.common.peers) - {PLANT}
+        self._last_tick, self._failed_phase = self.common.last_tick(self._end_ns), ""
+        self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
+        self._command_watch.reset()
+        self._recorded_ns = 0
+        self._silent_tick = -1
 
     # One tick
 
@@ -196,66 +231,63 @@ class PlantNode(GraphNode[PlantParameters]):
         Whoever has answered it sends the same bytes again; whoever has missed it answers now.
         """
         tick = self._plant.tick
-        waiting = tick == self._silent_tick and not self._ahead_of_recorder
-        if waiting and (self._run_state == RunState.RUNNING or self._steps_left):
+        waiting = self.active and tick == self._silent_tick and not self._ahead_of_recorder
+        if waiting and not self._control.holds:
             self._outputs.publish_loop(self._plant, with_reference=self._at_reference)
         self._silent_tick = tick
 
     def _look_for_answer(self) -> None:
         """End the run as failed if nothing has answered this tick for too long (lock step)."""
-        waiting = self._run_state == RunState.RUNNING or self._steps_left > 0
-        stamp = self._plant.stamp_ns if waiting else None
+        waits = self.active and not self._control.holds
+        stamp = self._plant.stamp_ns if waits else None
         event = self._answer_watch.look(stamp, self.awaited, monotonic())
         if event is not None:
             self.events.publish(event)
-            self._finish(event.detail, RunState.FAILED)
+            self.finish(event.detail, RunState.FAILED)
 
     def _on_command(self, data: bytes, sent_ns: int) -> None:
         """Take a command; in lock step it may complete the tick."""
-        if self._lockstep:
-            stamp = arrival_ns(data)
+        stamp = arrival_ns(data)
+        if self.lockstep:
             self._inputs.add(stamp, JOINT_COMMAND, data)
             if stamp == self._plant.stamp_ns:
                 self._loop_clock.answered()
-            self._advance()
-        else:
-            self._orders[JOINT_COMMAND].take(arrival_ns(data), self._plant.stamp_ns)
+            self.advance()
+        elif self._inputs.admits(stamp, JOINT_COMMAND):
+            self._orders[JOINT_COMMAND].take(stamp, self._plant.stamp_ns)
             self._command = self._read_command(data)
             if self._command.stamp_ns == self._plant.stamp_ns:
                 self._loop_clock.answered()
 
     def _on_phase(self, data: bytes, sent_ns: int) -> None:
         """Take the phase of the task; in lock step it may complete the tick."""
-        if self._lockstep:
-            self._inputs.add(arrival_ns(data), TASK_PHASE, data)
-            self._advance()
-        else:
-            self._orders[TASK_PHASE].take(arrival_ns(data), self._plant.stamp_ns)
+        stamp = arrival_ns(data)
+        if self.lockstep:
+            self._inputs.add(stamp, TASK_PHASE, data)
+            self.advance()
+        elif self._inputs.admits(stamp, TASK_PHASE):
+            self._orders[TASK_PHASE].take(stamp, self._plant.stamp_ns)
             self._execute(data)
 
     def _on_recorded(self, data: bytes, sent_ns: int) -> None:
         """Note up to where the recorder has come; in lock step the plant may have waited for it."""
+        if self.run_state == RunState.WAITING:
+            return  # it is of the run before
         stamp = arrival_ns(data)
         if not self._recorded_ns <= stamp <= self._plant.stamp_ns:
             reason = Reason.OLD if stamp < self._recorded_ns else Reason.FUTURE
             allowed = f"allowed is {self._recorded_ns} to {self._plant.stamp_ns} ns"
             raise MessageError(reason, f"recorded is said to be up to {stamp} ns, {allowed}")
         self._recorded_ns = stamp
-        if self._lockstep:
-            self._advance()
+        self.advance()
 
-    def _advance(self) -> None:
+    def advance(self) -> None:
         """Integrate one tick if its command has come and nothing holds the plant back (lock step)."""
-        if self._ahead_of_recorder:
-            return
-        if self._run_state == RunState.PAUSED and self._steps_left == 0 and not self._reset_asked:
+        if (self.run_state != _RUNNING and self._control.holds) or self._ahead_of_recorder:
             return
         needed = self._needed
         inputs = self._inputs.take(self._plant.stamp_ns, needed)
-        if inputs is None or self.finished:
-            return
-        if self._reset_asked:
-            self._begin_anew()
+        if inputs is None:
             return
         if needed is _PHASE_AND_COMMAND:
             self._execute(inputs[TASK_PHASE])
@@ -264,10 +296,8 @@ class PlantNode(GraphNode[PlantParameters]):
             return
         self._plant.step(self._read_command(inputs[JOINT_COMMAND]))
         self._loop_clock.ticked()
-        if self._steps_left:
-            self._steps_left -= 1
-            if self._steps_left == 0:
-                self._enter(RunState.PAUSED, "stepped")
+        if self._control.steps_left:
+            self._control.stepped()
         self._publish_state()
 
     def _tick_now(self) -> None:
@@ -278,9 +308,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self._publish_state()
         if event is not None:
             self.events.publish(event)
-        if self._reset_asked:
-            self._begin_anew()
-        elif self._plant.tick >= self._last_tick:
+        if self._plant.tick >= self._last_tick:
             self._end_task()
 
     def _read_command(self, data: bytes) -> JointCommand:
@@ -297,87 +325,53 @@ class PlantNode(GraphNode[PlantParameters]):
             self._publish[GRASP_EVENT].publish(event_message(event))
             self.get_logger().info(f"{event.command.action.value}: {event.status.value}, {event.detail}")
 
-    # Pause, step, reset, end
+    # What the services of the run's control ask for
 
-    def _on_pause(self, request: Any, response: Any) -> Any:
-        """Pause or resume."""
-        response.success = self._run_state in (RunState.RUNNING, RunState.PAUSED)
-        response.message = "" if response.success else "the run has not begun or is over"
-        if response.success and request.data and self._run_state == RunState.RUNNING:
-            self._enter(RunState.PAUSED, "on request")
-        elif response.success and not request.data and self._run_state == RunState.PAUSED:
-            self._steps_left = 0
-            self._enter(RunState.RUNNING, "")
-            self._advance()
-        return response
+    @property
+    def recorder_is_gone(self) -> bool:
+        """Tell whether there should be a recorder, but is none any more."""
+        return self._is_recorded and not self.count_publishers(RUN_RECORDED)
 
-    def _on_step(self, request: Any, response: Any) -> Any:
-        """Let a paused plant go on for some ticks."""
-        response.success = self._lockstep and self._run_state == RunState.PAUSED and request.ticks > 0
-        if response.success:
-            self._steps_left = min(request.ticks, self._last_tick - self._plant.tick)
-            target_ns = self._plant.stamp_ns + self._steps_left * self.common.tick_ns
-            response.stamp = time_message(target_ns)
-            self._advance()
-        else:
-            response.message = "only a plant that is paused in lock step can step, by at least one tick"
-        return response
+    def ticks_to(self, most: int) -> tuple[int, int]:
+        """Return how many ticks of so many there are to the end, and the time of the last of them in ns."""
+        ticks = min(most, self._last_tick - self._plant.tick)
+        return ticks, self._plant.stamp_ns + ticks * self._tick_ns
 
-    def _on_reset(self, request: Any, response: Any) -> Any:
-        """Begin the run anew as soon as this tick has been answered, so that no answer is left over."""
-        response.success = self._run_state != RunState.WAITING
-        response.message = "" if response.success else "the run has not begun"
-        if response.success and self.finished:
-            self._begin_anew()
-        elif response.success:
-            self._reset_asked = True
-            if self._lockstep:
-                self._advance()
-        return response
-
-    def _on_finish(self, request: Any, response: Any) -> Any:
-        """End the run at this tick."""
-        response.success = not self.finished
-        if response.success:
-            self._finish("stopped on request")
-        return response
-
-    def _begin_anew(self) -> None:
-        """Go back to time zero; the other nodes do so when they see the state of that time."""
-        self._reset_asked = False
-        self._steps_left = 0
-        self._last_tick, self._failed_phase = self.common.last_tick(self._end_ns), ""
-        self._recorded_ns = 0
+    def restart(self) -> None:
+        """Say that this run is over and the next is to begin, and go back to time zero."""
+        self.enter(RunState.WAITING, "reset")
+        if not self.finished:
+            self.publish_diagnostics()
+            self.publish_counts()
         self.finished = False
+        self._control.begin_anew()
         self._plant.reset()
-        self._inputs.reset()
+        self._inputs.begin_anew()
         for order in self._orders.values():
             order.reset()
         self._loop_clock.reset()
-        self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
-        self._command_watch.reset()
-        self._enter(RunState.PAUSED if self._run_state == RunState.PAUSED else RunState.RUNNING, "reset")
-        self._publish_state()
+        self._wait_for_others()
+        self.look_again()
 
     def _end_task(self) -> None:
         """End the run where the task has ended."""
         if self._failed_phase:
-            self._finish(f"phase {self._failed_phase!r} has failed", RunState.FAILED)
+            self.finish(f"phase {self._failed_phase!r} has failed", RunState.FAILED)
         else:
-            self._finish("the whole run is done")
+            self.finish("the whole run is done")
 
-    def _finish(self, detail: str, state: int = RunState.FINISHED) -> None:
+    def finish(self, detail: str, state: int = RunState.FINISHED) -> None:
         """Say that the run is over, and what real time has cost; every node then tells its counts."""
-        if not self._lockstep and self._loop_clock.misses:
+        if not self.lockstep and self._loop_clock.misses:
             detail = f"{detail}; {self._loop_clock.misses}"
         self.finished = True
-        self._enter(state, detail)
+        self.enter(state, detail)
         self.publish_diagnostics()
         self.publish_counts()
 
-    def _enter(self, state: int, detail: str) -> None:
+    def enter(self, state: int, detail: str) -> None:
         """Change the state of the run, with the clock of the loop, and tell everybody."""
-        self._run_state = state
+        self.run_state = state
         if state == RunState.RUNNING:
             self._loop_clock.start()
         else:
@@ -388,11 +382,11 @@ class PlantNode(GraphNode[PlantParameters]):
 
     def _publish_timing(self) -> None:
         """Publish how the loop has kept time over the last second."""
-        if self._run_state == RunState.RUNNING and not self.finished:
+        if self.run_state == RunState.RUNNING and not self.finished:
             message = self._loop_clock.report()
             message.header = header(self._plant.stamp_ns)
             self._publish[LOOP_TIMING].publish(message)
-            if not self._lockstep:
+            if not self.lockstep:
                 gc.collect(0)
 
 

@@ -15,6 +15,7 @@ from sms_handover.bag.ledger import ledger_table
 from sms_handover.bag.parameters import RecorderParameters
 from sms_handover.bag.provenance import provenance
 from sms_handover.bag.recording import Recording
+from sms_handover.bag.run_recordings import RunRecordings
 from sms_handover.bag.transforms import TF_TYPE, TransformsWire
 from sms_handover.errors import BagError, ConfigurationError, SmsHandoverError
 from sms_handover.frames import BASE, DEPUTY, WORLD
@@ -62,36 +63,43 @@ class RecorderNode(GraphNode[RecorderParameters]):
     """
 
     def __init__(self) -> None:
-        """Create the bag; raises BagError if it cannot, ConfigurationError on a bad parameter."""
+        """Declare the parameters."""
         super().__init__(RECORDER, RecorderParameters)
-        schedule = load_task(self.common, self.robot)
+        self._told = True
+        self._described = self._run_is_over = False
+
+    def prepare(self) -> None:
+        """Create the bag; raises ConfigurationError if it cannot."""
+        self._schedule_text = load_task(self.common, self.robot).text
         folder = self.parameters.folder or datetime.now().strftime("handover_%Y_%m_%d-%H_%M_%S")
         try:
-            self._recording = Recording(Path(folder), split=self.parameters.split)
+            self._recordings = RunRecordings(Path(folder), self._describe, self.parameters.split)
         except BagError as error:
             raise ConfigurationError(str(error)) from error
-        self._recording.describe(urdf=self.robot.urdf, schedule=schedule.text, provenance=provenance())
+        self._told = False
         self._others = [peer for peer in self.common.peers if peer != RECORDER]
         self._peer_parameters = PeerParameters(self, self.common.peers)
-        self._described = False
-        self._reported: set[str] = set()
-        self._last_message = monotonic()
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
         self._pose_wire = PoseWire(WORLD)
         self._tf: StampSync[bytes] = StampSync(_BEHIND)
         self._links = LinkTree(self.robot)
         frames = [*self._links.frames, (WORLD, DEPUTY)]
-        self._tf_wire = TransformsWire(self._recording.writer.types, frames)
+        self._tf_wire = TransformsWire(self._recordings.types, frames)
         self._topics: set[str] = set()
         self._recorded = self.endpoints.publisher(RUN_RECORDED)
-        self._state_ns = self._flushed_ns = 0
+        self._take_over(self._recordings.current)
         for topic in self.endpoints.topics:
             self._record(topic)
-        self._recording.add_topic(TF, TF_TYPE, (stored(LOSSLESS),), self.common.reference_ns)
+        self._recordings.add_topic(TF, TF_TYPE, (stored(LOSSLESS),), self.common.reference_ns)
         self._topics.add(TF)
         self._recording.begin()
         if self.parameters.record_all:
             self.create_timer(_DISCOVERY_PERIOD_S, self._look_for_topics)
+
+    def clean_up(self) -> None:
+        """Close the bag."""
+        super().clean_up()
+        self._close()
 
     @property
     def niceness(self) -> int:
@@ -102,11 +110,15 @@ class RecorderNode(GraphNode[RecorderParameters]):
         """Do nothing: processor and priority are for the nodes of the loop, before this one."""
 
     def prepared(self) -> bool:
-        """Tell whether the parameters of every node have been written into the bag."""
-        if not self._described and self._peer_parameters.poll():
+        """Tell whether a bag is open, and the parameters of every node have been written into it."""
+        if not self._run_is_over and not self._described and self._peer_parameters.poll():
             self._recording.describe(parameters=self._peer_parameters.values)
             self._described = True
         return self._described
+
+    def begin_anew(self) -> None:
+        """Keep in mind that the bag is to be closed when all of the run has come."""
+        self._run_is_over, self._described = True, False
 
     def on_end(self) -> None:
         """Do nothing: the recorder ends when everything has come."""
@@ -128,20 +140,50 @@ class RecorderNode(GraphNode[RecorderParameters]):
     def run(self, executor: Executor, stop: Stop) -> int:
         """Record until the run is over and everything has come, or until asked to stop; close the bag."""
         try:
-            while not stop.asked and not self._drained():
-                executor.spin_once(timeout_sec=_POLL_S)
-                nothing = not self.inputs.poll() and monotonic() - self._last_message > _POLL_S
-                self._flush(idle=nothing)
-            if stop.asked:
+            while self.goes_on(stop) and not (self.finished and self._drained()):
+                self.turn(executor)
+            if stop.asked and self.active:
                 self._take_the_rest(executor)
         finally:
-            self._recording.close()
+            if not self._told:
+                self._recording.close()
             self.inputs.destroy()
-        ledger = self._recording.ledger
-        print(ledger_table(ledger))
+        self._close()
         if not self.finished:
             return EXIT_STOPPED
-        return EXIT_OK if ledger.complete else EXIT_LOSS
+        return EXIT_OK if self._recordings.complete else EXIT_LOSS
+
+    def turn(self, executor: Executor) -> None:
+        """Record what has come; between two runs, go on with the next bag."""
+        executor.spin_once(timeout_sec=_POLL_S)
+        nothing = not self.inputs.poll()
+        if not self.active:
+            return
+        self._flush(idle=nothing and monotonic() - self._last_message > _POLL_S)
+        if self._run_is_over and not self.finished and self._drained():
+            print(f"{self._recording.writer.folder}\n{ledger_table(self._recordings.begin_next())}\n")
+            self._take_over(self._recordings.current)
+
+    def _describe(self, recording: Recording) -> None:
+        """Tell in a bag what it is made with."""
+        urdf, schedule = self.robot.urdf, self._schedule_text
+        recording.describe(urdf=urdf, schedule=schedule, provenance=provenance())
+
+    def _take_over(self, recording: Recording) -> None:
+        """Record into a bag that is open from now on."""
+        self._recording = recording
+        self._peer_parameters.ask_again()
+        self._run_is_over = self._described = False
+        self._reported: set[str] = set()
+        self._last_message = monotonic()
+        self._tf.reset()
+        self._state_ns = self._flushed_ns = 0
+
+    def _close(self) -> None:
+        """Complete the bag and tell what is in it, once."""
+        if not self._told:
+            self._told = True
+            print(ledger_table(self._recordings.close()))
 
     def _flush(self, *, idle: bool) -> None:
         """Write to the file what has come, and tell the plant: it does not go on far without.
@@ -157,9 +199,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
             self._recorded.publish(Header(stamp=time_message(self._flushed_ns)))
 
     def _drained(self) -> bool:
-        """Tell whether the run is over and nothing is to be expected any more."""
-        if not self.finished:
-            return False
+        """Tell whether nothing is to be expected any more of a run that is over."""
         silent = self.endpoints.silent(RUN_PUBLISHED)
         if (self._reported | silent).issuperset(self._others) and self._recording.ledger.complete:
             return True
@@ -208,7 +248,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
 
     def _open(self, name: str, type_name: str, profile: QoSProfile, period_ns: int) -> None:
         """Open a topic in the bag."""
-        self._recording.add_topic(name, type_name, (stored(profile),), period_ns)
+        self._recordings.add_topic(name, type_name, (stored(profile),), period_ns)
         self._topics.add(name)
 
     def _receive(self, name: str, data: bytes, sent_ns: int) -> None:
@@ -255,7 +295,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
             self._topics.add(name)
             offers = [publisher.qos_profile for publisher in publishers]
             try:
-                self._recording.add_topic(name, type_names[0], list(dict.fromkeys(map(stored, offers))))
+                self._recordings.add_topic(name, type_names[0], list(dict.fromkeys(map(stored, offers))))
                 kind = message_class(type_names[0])
             except SmsHandoverError as error:
                 self.get_logger().warning(f"{name} is not recorded: {error}")

@@ -16,6 +16,7 @@ from sms_handover.ros.convert import (
     joint_positions_message,
     joints_in_order,
     pose_message,
+    stamp_ns_of,
 )
 from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.inputs import Receive
@@ -53,8 +54,11 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
     """
 
     def __init__(self) -> None:
-        """Read the schedule and check that it can be carried out; raises ScheduleError."""
+        """Declare the parameters."""
         super().__init__(TRAJECTORY, TrajectoryParameters)
+
+    def prepare(self) -> None:
+        """Read the schedule and check that it can be carried out; raises ScheduleError."""
         schedule = load_task(self.common, self.robot)
         check_feasibility(Scenario(_for_any_plant(load_parameters()), self.robot, schedule))
         self._generator = TrajectoryGenerator(self.robot, schedule, self.parameters)
@@ -66,7 +70,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._inputs: StampSync[bytes] = StampSync(ahead_ns=ahead_ns, paced=not self._lockstep)
         self._stamp_ns = self._newest_ns = 0
         self._answer: tuple[bytes, bytes] | None = None
-        self._failures = 0
+        self._failures = self._overdue = 0
         self._solver = self.inputs.asker(SolveIK, SOLVE_IK, self._on_solution)
         self._asked: tuple[RobotState, TaskPhase, Targets] | None = None
         self._phase = self.endpoints.publisher(TASK_PHASE)
@@ -81,6 +85,14 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
     def prepared(self) -> bool:
         """Tell whether the IK service is there."""
         return self._solver.ready()
+
+    def begin_anew(self) -> None:
+        """Forget the run: phases, what waits of it, and the question that is under way."""
+        self._generator.reset()
+        self._inputs.begin_anew()
+        self._stamp_ns = self._newest_ns = self._failures = 0
+        self._overdue += self._asked is not None
+        self._answer = self._asked = None
 
     def diagnostic_values(self) -> dict[str, object]:
         """Return how many references were given and how many IK requests did not converge."""
@@ -163,6 +175,9 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
 
     def _on_solution(self, answer: Any) -> None:
         """Publish the reference that follows from a solution, converged or not."""
+        if self._overdue and (self._asked is None or not _answers(answer, self._asked[0].stamp_ns)):
+            self._overdue -= 1  # it is due to the run before
+            return
         if self._asked is None:
             return
         asked, self._asked = self._asked, None
@@ -193,6 +208,11 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
             phase, reference = self._answer
             self._phase.publish(phase)
             self._reference.publish(reference)
+
+
+def _answers(answer: Any, stamp_ns: int) -> bool:
+    """Tell whether an answer of the IK service is that to a request of this stamp."""
+    return stamp_ns_of(answer.solution.header.stamp) == stamp_ns
 
 
 def _for_any_plant(parameters: ParameterSet) -> ParameterSet:

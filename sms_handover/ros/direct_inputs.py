@@ -70,7 +70,10 @@ class DirectInputs(Inputs):
         Other nodes have their turn when nothing has come, so that what is not urgent does not hold up
         what is: the plant and the controller answer each other before a reference is worked out.
         """
-        found = sum([source.take_all() for source in self._sources.values()])
+        if self.closed:
+            found = sum([source.take_closed(drop=self.drops) for source in self._sources.values()])
+        else:
+            found = sum([source.take_all() for source in self._sources.values()])
         for other in self._others:
             found = found or other.poll()
         return found
@@ -83,7 +86,7 @@ class DirectInputs(Inputs):
             self._hot_until = now + _HOT_S
             self.wakes += self._slept
             self._slept = False
-        elif now > self._hot_until or awaited not in self._sources:
+        elif self.closed or now > self._hot_until or awaited not in self._sources:
             executor.spin_once(timeout_sec=min(timeout_s, _IDLE_S))
             return
         else:
@@ -119,6 +122,10 @@ class _Source(ABC):
     def take_all(self) -> int:
         """Hand over what has come, ``_BATCH`` at most, and return how many there were."""
 
+    def take_closed(self, *, drop: bool) -> int:
+        """Do what is due while the inputs are closed, and return how many there were: by default, wait."""
+        return 0
+
     def wait(self, timeout_s: float) -> None:
         """Sleep until something comes."""
         self._wait_set.clear_entities()
@@ -152,6 +159,14 @@ class _Messages(_Source):
             info = message[1]
             self._deliver(message[0], info.get(_SENT) or time_ns(), info.get(_NUMBER) or 0)
         return _BATCH
+
+    def take_closed(self, *, drop: bool) -> int:
+        """Lose what has come, if that is wanted."""
+        if drop:
+            deliver, self._deliver = self._deliver, _never
+            self.take_all()
+            self._deliver = deliver
+        return 0
 
 
 class _Answers(_Source, Asker):
@@ -205,6 +220,10 @@ class _Requests(_Source):
             response = self._answer(request, self._kind.Response())
             self._entity.send_response(response, header)
         return _BATCH
+
+    def take_closed(self, *, drop: bool) -> int:
+        """Answer all the same."""
+        return self.take_all()
 
 
 def _never(*arguments: object) -> None:

@@ -144,6 +144,11 @@ class Endpoints:
         """Return how many messages have been published on each topic, by its full name."""
         return {publisher.topic_name: publisher.count for publisher in self._publishers.values()}
 
+    def begin_anew(self) -> None:
+        """Count the messages of a new run."""
+        for publisher in self._publishers.values():
+            publisher.count = 0
+
     @property
     def topics(self) -> tuple[Topic, ...]:
         """Return every topic of the graph."""

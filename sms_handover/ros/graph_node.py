@@ -9,7 +9,7 @@ from rclpy.node import Node
 from sms_handover_interfaces.msg import PublishedCounts, RunState
 from std_msgs.msg import String
 
-from sms_handover.errors import MessageError, Reason
+from sms_handover.errors import ConfigurationError, MessageError, Reason
 from sms_handover.events import Severity
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.parameters import EVERY_NODE
@@ -20,9 +20,10 @@ from sms_handover.ros.endpoints import Endpoints
 from sms_handover.ros.event_publisher import EventPublisher
 from sms_handover.ros.inputs import ExecutorInputs, Inputs, Receive
 from sms_handover.ros.main import EXIT_OK, WAIT_S, RunnableNode, Stop
+from sms_handover.ros.managed_node import ManagedNode
 from sms_handover.ros.parameters import declare, refuse_unknown
 from sms_handover.ros.process import settle
-from sms_handover.simulation.parameters import DIRECT, EXECUTOR, CommonParameters
+from sms_handover.simulation.parameters import DIRECT, EXECUTOR, LOCKSTEP, CommonParameters
 from sms_handover.simulation.scenario import load_robot_model
 from sms_handover.topics import (
     DIAGNOSTICS,
@@ -42,27 +43,47 @@ _DIAGNOSTICS_PERIOD_S = 1.0  # [s] of wall time
 _MATCHING_PERIOD_S = 0.02  # [s] of wall time between two looks at who has matched
 
 
-class GraphNode(RunnableNode, Generic[P]):
+class GraphNode(ManagedNode, Generic[P]):
     """A node with its parameter group ``P``, its endpoints, and its part in start and end of a run.
 
-    A run starts when every node has found the endpoints it needs and has said so on ``run/ready``;
-    when the plant says that it has ended, every node tells how much it has published.
+    A run starts when every node is active, has found the endpoints it needs and has said so on
+    ``run/ready``; when the plant says that it has ended, every node tells how much it has published.
     """
 
     def __init__(self, name: str, group: type[P], *, shipped: bool = True) -> None:
-        """Declare the parameters and load the robot; raises ConfigurationError.
+        """Declare the parameters; what is wrong with them is told when the node is configured.
 
         Unless the group is ``shipped`` with a file in ``config/`` its fields have the defaults.
         """
-        super().__init__(name, automatically_declare_parameters_from_overrides=True)
-        self.common: CommonParameters = declare(self, CommonParameters, "common.yaml", EVERY_NODE)
-        self.parameters: P = declare(self, group, f"{name}.yaml" if shipped else None, name)
-        refuse_unknown(self, CommonParameters, group)
+        super().__init__(name)
+        self._refusal: ConfigurationError | None = None
+        self.finished = False
+        self.inputs: Inputs = ExecutorInputs(self)
+        try:
+            self.common: CommonParameters = declare(self, CommonParameters, "common.yaml", EVERY_NODE)
+            self.parameters: P = declare(self, group, f"{name}.yaml" if shipped else None, name)
+            refuse_unknown(self, CommonParameters, group)
+            self.inputs = INPUTS[self.common.transport](self)
+        except ConfigurationError as error:
+            self._refusal = error
+        self.inputs.close(drop=False)
+
+    # Transitions; docs/lifecycle.md tells what each means for the run
+
+    def start(self) -> None:
+        """Configure and activate, unless somebody else is to: parameter ``autostart``."""
+        if self._refusal is not None or self.common.autostart:
+            super().start()
+
+    def configure(self) -> None:
+        """Load the robot and make the endpoints; raises ConfigurationError."""
+        if self._refusal is not None:
+            raise self._refusal
+        name = self.get_name()
         self.robot: RobotModel = load_robot_model(self.common)
         self.endpoints = Endpoints(
             self, graph_topics(self.robot.arms), self.common.peers, self.common.external
         )
-        self.inputs: Inputs = INPUTS[self.common.transport](self)
         self.refusals = Refusals(self.get_logger().warning, self._on_refusal)
         self.finished = False
         self._counts = self.endpoints.publisher(RUN_PUBLISHED)
@@ -71,18 +92,42 @@ class GraphNode(RunnableNode, Generic[P]):
         if name != PLANT:
             self._ready = self.endpoints.publisher(RUN_READY)
             self.endpoints.subscribe(RUN_STATE, self._on_run_state)
+        self.prepare()
         self._matching = self.create_timer(_MATCHING_PERIOD_S, self._look_for_peers)
         self.create_timer(_DIAGNOSTICS_PERIOD_S, self.publish_diagnostics)
+        self.settle()
+
+    def prepare(self) -> None:
+        """Make what a node has beyond that; a node overrides this. Raises SmsHandoverError."""
+
+    def activate(self) -> None:
+        """Take part in the run: what has waited in lock step is worked on now."""
+        self.inputs.open()
+
+    def deactivate(self) -> None:
+        """Take no more part: in lock step what comes waits, in real time it is lost."""
+        self.inputs.close(drop=self.common.mode != LOCKSTEP)
+
+    def clean_up(self) -> None:
+        """Give the inputs back to the middleware."""
+        self.inputs.destroy()
+        self.inputs.close(drop=False)
 
     def run(self, executor: Executor, stop: Stop) -> int:
-        """Handle events until asked to stop, and return the exit code; a node may override this."""
-        while not stop.asked:
-            self.inputs.spin_once(executor, WAIT_S, self.awaited)
+        """Handle events until asked to stop or shut down, and return the exit code."""
+        while self.goes_on(stop):
+            self.turn(executor)
         return EXIT_OK
+
+    def turn(self, executor: Executor) -> None:
+        """Handle what has come, or wait a little for something to come; a node may override this."""
+        self.inputs.spin_once(executor, WAIT_S, self.awaited if self.active else "")
 
     def accompany(self, others: Sequence[RunnableNode]) -> None:
         """Serve the inputs of other nodes of the same process in the loop of this one."""
-        self.inputs.accompany([other.inputs for other in others if isinstance(other, GraphNode)])
+        company = tuple(other for other in others if isinstance(other, GraphNode))
+        self.keep_company(company)
+        self.inputs.accompany([other.inputs for other in company])
 
     @property
     def awaited(self) -> str:
@@ -100,7 +145,7 @@ class GraphNode(RunnableNode, Generic[P]):
         self.endpoints.receive(name, self.inputs, self.refusals.guarding(name, receive, check, sender))
 
     def settle(self) -> None:
-        """Set up the process as the parameters ask; raises ConfigurationError where it is not permitted."""
+        """Set up the process as the parameters ask; raises ConfigurationError. A node may override this."""
         settle(self.common)
 
     def prepared(self) -> bool:
@@ -110,6 +155,9 @@ class GraphNode(RunnableNode, Generic[P]):
     def on_matched(self) -> None:
         """Do what is due once every endpoint has matched: by default, say that this node is ready."""
         self._ready.publish(String(data=self.get_name()))
+
+    def begin_anew(self) -> None:
+        """Forget the run, as if this node had just been configured; a node overrides this."""
 
     def on_end(self) -> None:
         """Do what is due at the end of the run: by default, tell how it went and what has been published."""
@@ -131,8 +179,9 @@ class GraphNode(RunnableNode, Generic[P]):
     def publish_counts(self) -> None:
         """Tell how many messages have gone out on every topic that ends with the run."""
         counts = self.endpoints.counts
-        for still_growing in (self._counts, self._diagnostics):
-            del counts[still_growing.topic_name]
+        between_runs = [] if self.get_name() == PLANT else [self._ready]
+        for publisher in (self._counts, self._diagnostics, *between_runs):
+            del counts[publisher.topic_name]
         self._counts.publish(
             PublishedCounts(node=self.get_name(), topics=list(counts), counts=list(counts.values()))
         )
@@ -143,18 +192,28 @@ class GraphNode(RunnableNode, Generic[P]):
         self.events.tell("refused", Severity.WARNING, detail, self.diagnostic_stamp_ns())
 
     def _look_for_peers(self) -> None:
-        """Go on once every endpoint has matched."""
-        if self.prepared() and not self.endpoints.unmatched:
+        """Go on once this node is active and every endpoint has matched."""
+        if self.active and not self.endpoints.unmatched and self.prepared():
             self._matching.cancel()
             self.on_matched()
 
     def _on_run_state(self, message: RunState) -> None:
-        """Take notice of the end of the run, or of its beginning anew."""
+        """Take notice of the end of the run, and get ready for the next if the plant waits for it."""
         ended = message.state in (RunState.FINISHED, RunState.FAILED)
-        if ended and not self.finished:
-            self.inputs.poll()  # in real time answers may be due still; they belong to the counts
+        waits = message.state == RunState.WAITING
+        took_part = self._matching.is_canceled()
+        if (ended or (waits and took_part)) and not self.finished:
+            self.inputs.poll()  # answers may be due still; they belong to the counts
             self.on_end()
         self.finished = ended
+        if waits:
+            self.begin_anew()
+            self.look_again()
+
+    def look_again(self) -> None:
+        """Say that this node is ready for the next run as soon as it is."""
+        self.endpoints.begin_anew()
+        self._matching.reset()
 
     def publish_diagnostics(self) -> None:
         """Publish the state of this node; it does so itself once a second and at the end of the run.
@@ -167,6 +226,8 @@ class GraphNode(RunnableNode, Generic[P]):
             text = f"waiting in vain for {self.endpoints.intruders[0]}; only with transport {DIRECT!r}"
             raise MessageError(Reason.SENDER, f"{text} its messages can be told apart")
         waiting = self.endpoints.unmatched if not self._matching.is_canceled() else []
+        if not self.active:
+            waiting = ["somebody to activate it"]
         level, words = self.diagnosis()
         refused = self.refusals.counts
         if refused and not level:

@@ -41,6 +41,20 @@ class Inputs(ABC):
     """
 
     wakes: int = 0
+    closed: bool = False
+    drops: bool = False
+
+    def close(self, *, drop: bool) -> None:
+        """Hand over no message or answer until opened; messages wait, or with ``drop`` are lost.
+
+        Requests are answered all the same.
+        """
+        self.closed, self.drops = True, drop
+
+    def open(self) -> None:
+        """Hand over what has waited, and again what comes."""
+        self.poll()
+        self.closed = False
 
     @abstractmethod
     def subscribe(self, kind: Any, topic: str, profile: QoSProfile, deliver: Deliver) -> Subscription:
@@ -54,8 +68,9 @@ class Inputs(ABC):
     def serve(self, kind: Any, service: str, answer: Answer) -> None:
         """Offer a service."""
 
-    def destroy(self) -> None:  # noqa: B027  an executor's entities are destroyed with the node
-        """Give back to the middleware what the node does not know of."""
+    @abstractmethod
+    def destroy(self) -> None:
+        """Give back to the middleware what the node does not know of, and forget what waits."""
 
     def accompany(self, others: Sequence["Inputs"]) -> None:  # noqa: B027  an executor serves every node
         """Serve those of other nodes of the same process and thread too, in this order."""
@@ -79,18 +94,41 @@ class ExecutorInputs(Inputs):
     def __init__(self, node: Node) -> None:
         """Serve a node."""
         self._node = node
+        self._waiting: list[Callable[[], object]] = []
+
+    def open(self) -> None:
+        """Hand over what has waited, and again what comes."""
+        super().open()
+        waiting, self._waiting = self._waiting, []
+        for hand_over in waiting:
+            hand_over()
+
+    def destroy(self) -> None:
+        """Forget what waits; the entities are destroyed with the node or when it is cleaned up."""
+        self._waiting.clear()
 
     def subscribe(self, kind: Any, topic: str, profile: QoSProfile, deliver: Deliver) -> Subscription:
         """Hand every message of a topic to ``deliver``."""
 
         def callback(data: bytes) -> None:
-            deliver(data, time_ns(), 0)  # EventsExecutor fails on callbacks that ask for the time of sending
+            now_ns = time_ns()  # EventsExecutor fails on callbacks that ask for the time of sending
+            if not self.closed:
+                deliver(data, now_ns, 0)
+            elif not self.drops:
+                self._waiting.append(lambda: deliver(data, now_ns, 0))
 
         return self._node.create_subscription(kind, topic, callback, profile, raw=True)
 
     def asker(self, kind: Any, service: str, receive: Callable[[Any], None]) -> Asker:
         """Return what asks a service, and hand every answer to ``receive``."""
-        return _ExecutorAsker(self._node, kind, service, receive)
+
+        def callback(answer: Any) -> None:
+            if self.closed:
+                self._waiting.append(lambda: receive(answer))
+            else:
+                receive(answer)
+
+        return _ExecutorAsker(self._node, kind, service, callback)
 
     def serve(self, kind: Any, service: str, answer: Answer) -> None:
         """Offer a service."""

@@ -62,7 +62,9 @@ class LoopClock:
         self._ran, self._since = self.ran, None
 
     def reset(self) -> None:
-        """Count the wall time of a run from now on."""
+        """Count the ticks and the wall time of a run from now on."""
+        self._ticks = self._late = self._held = 0
+        self._level = (0, "")
         self._ran = 0.0
         if self._since is not None:
             self._since = monotonic()

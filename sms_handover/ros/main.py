@@ -63,8 +63,8 @@ class RunnableNode(Node, ABC):
         """Return how far the process stands back behind others, as in nice(1); a node may override this."""
         return 0
 
-    def settle(self) -> None:
-        """Set up the process before the node runs; raises ConfigurationError. A node may override this."""
+    def start(self) -> None:
+        """Do what is due before the node is spun; raises SmsHandoverError. A node may override this."""
 
     def accompany(self, others: Sequence["RunnableNode"]) -> None:
         """Let the loop of this node serve other nodes of the same process too."""
@@ -106,6 +106,7 @@ def run_nodes(makes: Sequence[Callable[[], RunnableNode]], arguments: list[str],
         executor = EventsExecutor()
         for make in makes:
             nodes.append(make())
+            nodes[-1].start()
             executor.add_node(nodes[-1])
         first, *others = nodes
         if others:
@@ -113,7 +114,6 @@ def run_nodes(makes: Sequence[Callable[[], RunnableNode]], arguments: list[str],
         else:
             name = first.get_name()
         os.nice(first.niceness)
-        first.settle()
         gc.collect()
         gc.freeze()  # what start-up has made lives to the end; no collection needs to look at it again
         return first.run(executor, stop)

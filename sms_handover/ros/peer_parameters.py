@@ -17,6 +17,11 @@ class PeerParameters:
         self._asked: set[str] = set()
         self.values: dict[str, dict[str, object]] = {}
 
+    def ask_again(self) -> None:
+        """Forget the answers, for nodes that may have been configured anew."""
+        self._asked.clear()
+        self.values = {}
+
     def poll(self) -> bool:
         """Ask every node that has appeared since; tell whether all have answered."""
         for peer, client in self._clients.items():

@@ -53,6 +53,7 @@ class StampSync(Generic[V]):
         self._waiting: dict[int, dict[str, V]] = {}
         self._taken_ns = -1
         self._taken_at_ns = monotonic_ns()
+        self._begun: set[str] | None = None
         self.dropped = 0
 
     def begins_anew(self, stamp_ns: int) -> bool:
@@ -67,8 +68,31 @@ class StampSync(Generic[V]):
         self._waiting.clear()
         self._taken_ns = -1
 
+    def begin_anew(self) -> None:
+        """Begin a run behind another: of each input, what comes before its time zero is still of the other.
+
+        Inputs keep their order, each for itself; so nothing of the other run gets into the new one.
+        """
+        self.reset()
+        self._begun = set()
+        self.dropped = 0
+
+    def admits(self, stamp_ns: int, name: str) -> bool:
+        """Tell whether an input belongs to this run, and not to the one before."""
+        if self._begun is None or name in self._begun:
+            return True
+        if stamp_ns == 0:
+            self._begun.add(name)
+        return stamp_ns == 0
+
     def add(self, stamp_ns: int, name: str, value: V) -> None:
-        """Keep an input; raises MessageError if its stamp is not one of those to come."""
+        """Keep an input; raises MessageError if its stamp is not one of those to come.
+
+        What is left over from the run before is dropped and counted without a word: nobody is to blame.
+        """
+        if self._begun is not None and not self.admits(stamp_ns, name):
+            self.dropped += 1
+            return
         if stamp_ns <= self._taken_ns:
             self.dropped += 1
             taken = f"{ns_to_seconds(self._taken_ns):g} s has been worked on"

@@ -43,6 +43,9 @@ class CommonParameters:
         maximum=99,
     )
     lock_memory: bool = parameter("keep the memory of the nodes of the loop from being swapped out")
+    autostart: bool = parameter(
+        "whether a node configures and activates itself; false: its lifecycle services ask it to"
+    )
     peers: tuple[str, ...] = parameter("nodes of the graph; the run starts when all have matched")
     external: tuple[str, ...] = parameter(
         "those of the peers that are not of this package; of them only states and commands are waited for",

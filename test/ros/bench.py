@@ -68,6 +68,8 @@ class Bench:
         """Return the node that ``make`` returns, spun with the others from now on."""
         node = make()
         self._nodes.append(node)
+        if isinstance(node, GraphNode):
+            node.start()
         self.spin(node)
         return node
 

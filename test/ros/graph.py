@@ -5,6 +5,7 @@ from functools import partial
 from typing import Any
 
 from rclpy.node import Node
+from sms_handover_interfaces.msg import RunState
 from std_msgs.msg import Header, String
 
 from sms_handover.bag.message_types import MessageTypes
@@ -25,6 +26,7 @@ from sms_handover.topics import (
     RECORDER,
     RUN_READY,
     RUN_RECORDED,
+    RUN_STATE,
     TRAJECTORY,
     Topic,
     graph_topics,
@@ -37,6 +39,7 @@ ARMS = ("arm_a", "arm_b")
 TOPICS = graph_topics(ARMS)
 _LATE_NS = 3_000_000_000  # ns, after the end of every run that is tested
 _TICK_NS = 1_000_000  # ns
+_RUN_STATE = "sms_handover_interfaces/msg/RunState"
 _NEVER_S = 3600.0  # s of wall time: a node that is slow on a busy machine is asked once
 REAL: Mapping[str, Callable[[], GraphNode[Any]]] = {
     PLANT: PlantNode,
@@ -56,12 +59,15 @@ class Ear:
         self._ready = self._endpoints.publisher(RUN_READY)
         self._recorded = self._endpoints.publisher(RUN_RECORDED)
         self.recorded_ns: int | None = None  # how far a recorder that does not keep up has come
+        self._types = MessageTypes()
         for topic in TOPICS:
             self._endpoints.subscribe(topic.name, partial(self._hear, topic.name), raw=True)
 
     def _hear(self, topic: str, data: bytes) -> None:
         """Keep a message, and tell the plant that it need not wait."""
         self.heard[topic].append(data)
+        if topic == RUN_STATE and self._types.deserialize(data, _RUN_STATE).state == RunState.WAITING:
+            self._ready.publish(String(data=RECORDER))
         if topic == JOINT_STATES and len(data) == len(self.heard[topic][0]):
             time_ns = stamp_ns(data)
             if not 0 <= time_ns < _LATE_NS or time_ns % _TICK_NS:

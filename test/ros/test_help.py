@@ -57,7 +57,7 @@ GRAPH: dict[str, Callable[[], GraphNode[Any]]] = {
     "recorder": RecorderNode,
 }
 ROS_OWN = {"/rosout", "/parameter_events"}
-ROS_SERVICES = ("parameter", "type_description")
+ROS_SERVICES = ("parameter", "type_description", "change_state", "/get_available", "/get_state", "_graph")
 
 
 def absolute(names: set[str]) -> set[str]:
@@ -85,9 +85,10 @@ def test_the_reference_is_what_the_node_has(
         lambda: name != CONTROLLER or node.count_publishers(command), "the last endpoint of the controller"
     )
     theirs = node.get_publisher_names_and_types_by_node(name, "/")
-    assert {topic for topic, _ in theirs} - ROS_OWN == absolute(expanded(set(told)))
+    ros_own = {*ROS_OWN, f"/{name}/transition_event"}
+    assert {topic for topic, _ in theirs} - ros_own == absolute(expanded(set(told)))
     for topic, (type_name,) in theirs:
-        assert topic in ROS_OWN or type_name in told.values()
+        assert topic in ros_own or type_name in told.values()
     theirs = node.get_subscriber_names_and_types_by_node(name, "/")
     assert {topic for topic, _ in theirs} - ROS_OWN == absolute(expanded({t.name for t in subscribed}))
     offered, called = services_of(name)

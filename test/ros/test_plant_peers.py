@@ -73,12 +73,17 @@ class FakeController:
             self._endpoints.publisher(unused)
         self._endpoints.subscribe(JOINT_STATES, self._on_state)
         self._endpoints.subscribe(BASE_ODOMETRY, lambda message: None)
-        self._endpoints.subscribe(RUN_STATE, lambda message: None)
+        self._endpoints.subscribe(RUN_STATE, self._on_run)
 
     def get_ready(self, bench: Bench) -> None:
         """Wait for the plant, and say so."""
         bench.until(lambda: not self._endpoints.unmatched, "the endpoints of the plant")
         self._ready.publish(String(data=CONTROLLER))
+
+    def _on_run(self, message: Any) -> None:
+        """Be ready for the next run."""
+        if message.state == RunState.WAITING:
+            self._ready.publish(String(data=CONTROLLER))
 
     def _on_state(self, message: Any) -> None:
         """Answer a state, a phase first where one is due."""
@@ -287,12 +292,13 @@ def test_in_real_time_a_reset_after_the_end_runs_again(bench: Bench, fast_clock:
         changes = len(graph.heard[RUN_STATE])
         if changes == 2 and not asked:
             asked.append(client.call_async(Trigger.Request()))
-        return changes == 4
+        return changes == 5
 
     run_until(graph, ended_twice)
     bench.until(graph.everything_heard, "all messages")
     states = [state.state for state in Messages().of(graph, RUN_STATE)]
-    assert states == [RunState.RUNNING, RunState.FINISHED] * 2
+    once = [RunState.RUNNING, RunState.FINISHED]
+    assert states == [*once, RunState.WAITING, *once]
     assert graph.stamps(JOINT_STATES) == [k * TICK_NS for k in range(101)] * 2
 
 

@@ -14,6 +14,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from sms_handover.analysis.equality import compare_runs
+from sms_handover.bag.check import check
 from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.message_types import MessageTypes
@@ -232,7 +233,8 @@ def test_an_error_leaves_a_whole_bag(bench: Bench) -> None:
     assert len(read_run(recorded.folder).tick_ns) >= 50
 
 
-def test_a_reset_run_is_read_from_its_last_start(bench: Bench) -> None:
+def test_every_run_has_a_bag_of_its_own(bench: Bench) -> None:
+    """A reset closes the bag of the run before, whole, and opens another for the next run."""
     recorded = Recorded(bench)
     client = bench.plain("client").create_client(Trigger, f"{PLANT}/reset")
     asked: list[Any] = []
@@ -244,10 +246,18 @@ def test_a_reset_run_is_read_from_its_last_start(bench: Bench) -> None:
 
     assert recorded.run(reset_once) == EXIT_OK
     assert asked
-    info, run = recorded.info, read_run(recorded.folder)
-    assert info.topics["/joint_states"].message_count > TICKS + 150
-    assert info.ledger is not None and info.ledger.complete
-    assert compare_runs(run, simulate(load_scenario(recorded.overrides))) == ()
+    whole = simulate(load_scenario(recorded.overrides))
+    first = read_run(recorded.folder)
+    assert 150 < len(first.tick_ns) < TICKS
+    assert np.array_equal(first.joint_position, whole.joint_position[: len(first.tick_ns)])
+    second = recorded.folder.with_name("bag_2")
+    assert compare_runs(read_run(second), whole) == ()
+    for bag in (recorded.folder, second):
+        info = read_info(bag)
+        assert info.ledger is not None and info.ledger.complete
+        assert info.parameters.keys() == {*NODES} and info.urdf_text and info.schedule_text
+        result = check(bag)
+        assert result.complete, result.findings
 
 
 # A recorder alone with a made-up plant
