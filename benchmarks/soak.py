@@ -88,12 +88,12 @@ class Soak:
         return max(0, counts[1] - counts[0])
 
 
-def soak(minutes: float, folder: Path, *, compose: bool) -> Soak:
-    """Run for so many minutes of simulated time and look."""
+def soak(minutes: float, folder: Path, more: Sequence[str]) -> Soak:
+    """Run for so many minutes of simulated time, with more options, and look."""
     schedule = write_schedule(folder / "schedule.yaml", 60.0 * minutes)
     command = [sys.executable, "-m", "sms_handover.cli.main", "run", "-o", str(folder / "run")]
     command += ["--schedule", str(schedule), "--time-law", "quintic", "--duration", str(60.0 * minutes)]
-    command += ["-p", f"recorder.split_duration:={_SPLIT_S}", *(["--compose"] if compose else [])]
+    command += ["-p", f"recorder.split_duration:={_SPLIT_S}", *more]
     log = folder / "printed"
     begin = monotonic()
     with log.open("wb") as stream:
@@ -210,7 +210,7 @@ handovers a minute, and records it into files of a minute. It writes this page a
 grows or is lost.""",
         bullets(machine()),
         f"""\
-**Memory is {"flat" if result.flat else "NOT flat"}; {"nothing is lost" if result.whole else "NOT all is there"}.**
+**Memory is {"flat" if result.flat else "NOT flat"}; {"nothing is lost" if result.whole else "NOT whole"}.**
 {size}: {lost}, by the loss ledger over all files. {found}
 It took {result.wall_s / 60:.0f} minutes ({speed} x real time; the machine had other work too).""",
         f"![Memory of every process over simulated time](images/{FIGURE.name})",
@@ -236,14 +236,20 @@ def main() -> int:
     parser = ArgumentParser(prog="python -m benchmarks.soak", description=__doc__.partition("\n")[0])
     parser.add_argument("--minutes", type=float, default=30.0, help="of simulated time (default: 30)")
     parser.add_argument("--compose", action="store_true", help="the nodes of the loop in one process: faster")
+    parser.add_argument("--domain-id", metavar="N", help="ROS domain (default: a free one)")
     parser.add_argument("--write", action="store_true", help=f"write {PAGE.name} and its figure")
-    parser.add_argument("--folder", type=Path, help="keep the run and the samples there (default: removed)")
+    parser.add_argument(
+        "--folder", type=Path, help="a new one for the run and the samples (default: removed)"
+    )
     options = parser.parse_args()
-    folder = Path(options.folder or tempfile.mkdtemp(prefix="soak_"))
-    folder.mkdir(exist_ok=True)
+    folder = options.folder or Path(tempfile.mkdtemp(prefix="soak_"))
+    if options.folder:
+        folder.mkdir()
+    composed = ["--compose"] if options.compose else []
+    more = composed + (["--domain-id", options.domain_id] if options.domain_id else [])
     print(f"load average {load_average():.1f}; the run goes to {folder}", flush=True)
     try:
-        result = soak(options.minutes, folder, compose=options.compose)
+        result = soak(options.minutes, folder, more)
         if options.folder:
             (folder / "soak.json").write_text(json.dumps(asdict(result)), encoding="utf-8")
     finally:
@@ -252,7 +258,7 @@ def main() -> int:
     arguments = "".join(
         [
             "" if options.minutes == parser.get_default("minutes") else f" --minutes {options.minutes:g}",
-            " --compose" if options.compose else "",
+            *(f" {option}" for option in composed),
         ]
     )
     text = page(result, f"python -m benchmarks.soak --write{arguments}")

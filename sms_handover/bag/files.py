@@ -64,6 +64,9 @@ def files_of(path: Path) -> tuple[Path, ...]:
             raise BagError(f"{path} is not a bag: it holds {file.name}, only .mcap files are read; {remedy}")
     if not files:
         raise BagError(f"{path} is not a bag: no .mcap file in it")
+    for file in files:
+        if not file.is_file():  # to open a pipe would wait for whoever writes to it
+            raise BagError(f"{file} is not a file")
     return files
 
 

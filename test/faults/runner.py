@@ -1,7 +1,6 @@
 """Tries faults, each in a process of its own, several at a time if wanted."""
 
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -52,7 +51,7 @@ def run_one(family: Family, fault: Fault[Any], seed: int, kept_in: Path | None =
         outcome = _in_a_process(name, fault.timeout_s, seed, folder)
         if outcome.status is Status.BROKEN and kept_in is None:
             copy = Path(tempfile.mkdtemp(prefix=f"broken_{fault.name}_"))
-            shutil.copytree(folder, copy, dirs_exist_ok=True, ignore_dangling_symlinks=True)
+            folder.rename(copy)
             outcome = replace(outcome, note=f"its files are in {copy}")
     return outcome
 
