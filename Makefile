@@ -15,7 +15,7 @@ MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evi
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover figures report simulate test verify measure bench docs faults reference lint install colcon clean
+.PHONY: help handover figures report simulate test verify measure bench docs faults soak reference lint install colcon clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -60,6 +60,9 @@ docs: $(VENV)/.docs  ## build the documentation as a site, every warning an erro
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -d build/docs/doctrees docs $(SITE)
 	$(BIN)/python -m pytest test/site --site $(SITE)
 	@echo "The site begins at $(SITE)/index.html"
+
+soak: $(VENV)/.test  ## run 30 minutes of simulated time, watch every process, write docs/soak.md
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.soak --write
 
 reference: install  ## write the pages of docs/ that list what is in the code
 	$(BIN)/python -m docs.reference

@@ -238,9 +238,7 @@ def main() -> int:
     parser.add_argument("--compose", action="store_true", help="the nodes of the loop in one process: faster")
     parser.add_argument("--domain-id", metavar="N", help="ROS domain (default: a free one)")
     parser.add_argument("--write", action="store_true", help=f"write {PAGE.name} and its figure")
-    parser.add_argument(
-        "--folder", type=Path, help="a new one for the run and the samples (default: removed)"
-    )
+    parser.add_argument("--folder", type=Path, help="new, keeps the run and samples (default: removed)")
     options = parser.parse_args()
     folder = options.folder or Path(tempfile.mkdtemp(prefix="soak_"))
     if options.folder:
