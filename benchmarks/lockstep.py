@@ -19,19 +19,24 @@ SIMULATED_S = 4.0  # s of simulated time per run
 TICKS = round(SIMULATED_S * 1e3)
 TRIPS = 5000
 _CPU = max(os.sched_getaffinity(0))
+_EXECUTOR = ("-p", "common.transport:=executor")
 _FACTOR = re.compile(r"([\d.]+) x real time")
 
-FLOOR = "bare exchange of the same messages, no work"
+FLOOR = "bare exchange of the same messages between two processes, no work"
+SOLO = "the same between two nodes of one process"
 ALONE = "one process, no DDS"
 GRAPH = "graph, not recorded"
 RECORDED = "graph, recorded"
+COMPOSED = "graph with --compose, not recorded"
+COMPOSED_RECORDED = "graph with --compose, recorded"
 ONE_CPU = "graph on one processor, not recorded"
 FALLBACK = "graph by rclpy's executor, not recorded"
+COMPOSED_FALLBACK = "graph with --compose by rclpy's executor, not recorded"
 
 
-def floor() -> float:
+def bare(role: str) -> float:
     """Return the time in s of a bare round trip."""
-    command = [sys.executable, "-m", "benchmarks.ping_pong", "ping", str(TRIPS)]
+    command = [sys.executable, "-m", "benchmarks.ping_pong", role, str(TRIPS)]
     return 1e-6 * float(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
@@ -55,19 +60,23 @@ def main() -> None:
     """Measure and publish."""
     with TemporaryDirectory() as folder:
         contestants: dict[str, Callable[[], float]] = {
-            FLOOR: floor,
+            FLOOR: partial(bare, "ping"),
+            SOLO: partial(bare, "solo"),
             ALONE: alone,
             GRAPH: partial(graph, folder, ["--no-record"]),
             RECORDED: partial(graph, folder, []),
+            COMPOSED: partial(graph, folder, ["--compose", "--no-record"]),
+            COMPOSED_RECORDED: partial(graph, folder, ["--compose"]),
             ONE_CPU: partial(graph, folder, ["--no-record", "-p", f"common.cpu:={_CPU}"]),
-            FALLBACK: partial(graph, folder, ["--no-record", "-p", "common.transport:=executor"]),
+            FALLBACK: partial(graph, folder, ["--no-record", *_EXECUTOR]),
+            COMPOSED_FALLBACK: partial(graph, folder, ["--compose", "--no-record", *_EXECUTOR]),
         }
         times: dict[str, list[float]] = {name: [] for name in contestants}
         for _ in range(ROUNDS):
             for name, measure in contestants.items():
                 times[name].append(measure())
-    bare = times[FLOOR]
-    ratio = {name: median(a / b for a, b in zip(each, bare, strict=True)) for name, each in times.items()}
+    least = times[FLOOR]
+    ratio = {name: median(a / b for a, b in zip(each, least, strict=True)) for name, each in times.items()}
     rows = [
         row(name, 1e6 * min(each), 1e6 * median(each), 1e-3 / min(each), ratio[name])
         for name, each in times.items()
@@ -81,7 +90,8 @@ def main() -> None:
                 f"{SIMULATED_S:g} s at 1 kHz, a reference with inverse kinematics by service every 20 ms; "
                 f"{ROUNDS} rounds in turn. The bare exchange is two processes that hand each other the two "
                 "messages of a state and the command, with the same bytes, quality of service and way of "
-                "taking them; its time depends on which processors the system puts the two on."
+                "taking them; its time depends on which processors the system puts the two on. With "
+                "--compose the four nodes of the loop are in one process and thread."
             ],
             tables=[Table(heading, rows)],
             values={"us_per_tick": {name: [1e6 * t for t in each] for name, each in times.items()}},

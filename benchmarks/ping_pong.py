@@ -1,7 +1,7 @@
 """The floor of lock step: two processes hand the loop's messages to each other and compute nothing.
 
-The same bytes, quality of service and way of taking them as in the graph. Run as a module, it prints the
-mean time of a round trip in us.
+The same bytes, quality of service and way of taking them as in the graph. Run as a module, as ``ping`` or,
+for both sides in one process, as ``solo``, it prints the mean time of a round trip in us.
 """
 
 import os
@@ -35,9 +35,9 @@ class Side:
     """One of the two nodes: it publishes the messages of a stamp, and sleeps until the other's have come."""
 
     def __init__(self, name: str, sends: tuple[str, ...], takes: tuple[str, ...]) -> None:
-        """Make the endpoints and wait for the other side."""
+        """Make the endpoints."""
         node = Node(name, start_parameter_services=False, enable_rosout=False)
-        endpoints = Endpoints(node, graph_topics(_ARMS), (PLANT, CONTROLLER))
+        endpoints = self._endpoints = Endpoints(node, graph_topics(_ARMS), (PLANT, CONTROLLER))
         self._inputs = DirectInputs(node)
         self._last = takes[-1]
         self._came = dict.fromkeys(takes, -_TICK_NS)
@@ -46,8 +46,6 @@ class Side:
             endpoints.receive(topic, self._inputs, self._taker(topic))
         self._executor = EventsExecutor()
         self._executor.add_node(node)
-        while endpoints.unmatched:
-            self._executor.spin_once(timeout_sec=_WAIT_S)
         zeros = np.zeros(len(NAMES))
         pose, twist = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]), np.zeros(6)
         states = JointStateWire(NAMES, ("position", "velocity", "effort"))
@@ -59,6 +57,11 @@ class Side:
             JOINT_COMMAND: lambda stamp: commands.pack(stamp, effort=zeros),
         }
         self._pack = [pack[topic] for topic in sends]
+
+    def match(self) -> None:
+        """Wait for the other side."""
+        while self._endpoints.unmatched:
+            self._executor.spin_once(timeout_sec=_WAIT_S)
 
     def send(self, stamp: int) -> None:
         """Publish the messages of a stamp."""
@@ -83,6 +86,7 @@ def pong(trips: int) -> None:
     """Answer the other process."""
     rclpy.init()
     side = Side(CONTROLLER, _COMMAND, _STATE)
+    side.match()
     for trip in range(trips):
         side.wait(trip * _TICK_NS)
         side.send(trip * _TICK_NS)
@@ -96,6 +100,7 @@ def ping(trips: int) -> float:
         with subprocess.Popen(command) as other:
             rclpy.init()
             side = Side(PLANT, _STATE, _COMMAND)
+            side.match()
             start = perf_counter()
             for trip in range(trips):
                 side.send(trip * _TICK_NS)
@@ -105,15 +110,32 @@ def ping(trips: int) -> float:
     return elapsed / trips
 
 
+def solo(trips: int) -> float:
+    """Return the mean time in s of a round trip between two nodes of this process and thread."""
+    with reserved_domain(None) as domain:
+        rclpy.init(domain_id=domain)
+        sides = Side(PLANT, _STATE, _COMMAND), Side(CONTROLLER, _COMMAND, _STATE)
+        for side in sides:
+            side.match()
+        plant, controller = sides
+        start = perf_counter()
+        for trip in range(trips):
+            plant.send(trip * _TICK_NS)
+            controller.wait(trip * _TICK_NS)
+            controller.send(trip * _TICK_NS)
+            plant.wait(trip * _TICK_NS)
+        return (perf_counter() - start) / trips
+
+
 def main() -> None:
-    """Play one of the two sides."""
+    """Play one of the two sides, or both."""
     use_profile()
     os.environ.update(ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST", ROS_STATIC_PEERS="")
     role, trips = sys.argv[1], int(sys.argv[2])
     if role == "pong":
         pong(trips)
     else:
-        print(1e6 * ping(trips))
+        print(1e6 * (solo if role == "solo" else ping)(trips))
     rclpy.try_shutdown()
 
 
