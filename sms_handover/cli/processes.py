@@ -67,10 +67,16 @@ class NodeProcesses:
     def start(self, node: str, arguments: Sequence[str], program: Sequence[str] = ()) -> None:
         """Start a node or the container, of this package unless it is another ``program``.
 
-        Raises GraphError if its log cannot be written.
+        Another program need not know of us; it is sent SIGTERM if this process is killed. Raises
+        GraphError if the log cannot be written.
         """
-        program = program or (sys.executable, "-m", f"sms_handover.nodes.{node}")
-        command = [*program, *arguments]
+        foreign = ("sms_handover.ros.parent", *program)
+        command = [
+            sys.executable,
+            "-m",
+            *(foreign if program else (f"sms_handover.nodes.{node}",)),
+            *arguments,
+        ]
         log = self._logs[node] = NodeLog(self._folder / f"{node}.log")
         self._processes[node] = subprocess.Popen(
             command,

@@ -1,8 +1,13 @@
-"""The process that started this one: a launcher, whose end is the end of its nodes, or anything else."""
+"""The process that started this one: a launcher, whose end is the end of its nodes, or anything else.
+
+As a program, ``python -m sms_handover.ros.parent COMMAND ...``, it becomes a command that is ended with
+its launcher: for nodes of others, which do not look for it themselves.
+"""
 
 import ctypes
 import os
 import signal
+import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -37,6 +42,17 @@ def wake_when_parent_ends() -> None:
     SIGCONT does nothing to a process that runs. It comes too late only for a parent that has ended
     already, which the parent's process id tells.
     """
+    _signal_when_parent_ends(signal.SIGCONT)
+
+
+def _signal_when_parent_ends(number: signal.Signals) -> None:
+    """Let the system send a signal to this process, and what it becomes, when its parent ends (Linux)."""
     libc = ctypes.CDLL(None, use_errno=True)
     if hasattr(libc, "prctl"):
-        libc.prctl(_PR_SET_PDEATHSIG, int(signal.SIGCONT), 0, 0, 0)
+        libc.prctl(_PR_SET_PDEATHSIG, int(number), 0, 0, 0)
+
+
+if __name__ == "__main__":
+    _signal_when_parent_ends(signal.SIGTERM)
+    if os.getppid() == launcher_of_this_process():
+        os.execvp(sys.argv[1], sys.argv[1:])

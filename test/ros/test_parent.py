@@ -47,7 +47,9 @@ def no_launcher(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def start(command: list[str]) -> tuple["subprocess.Popen[str]", int]:
     """Start a command and return it with the process id that the node prints."""
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)
+    process = subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
     assert process.stdout is not None
     return process, int(process.stdout.readline())
 
@@ -55,7 +57,7 @@ def start(command: list[str]) -> tuple["subprocess.Popen[str]", int]:
 def kill(process: "subprocess.Popen[str]") -> None:
     process.kill()
     process.wait()
-    assert process.stdout is not None
+    assert process.stdin is not None and process.stdout is not None
     process.stdout.close()
 
 
@@ -85,6 +87,19 @@ def test_a_suspended_node_wakes_to_end_when_its_launcher_is_killed(
     process, pid = start([sys.executable, "-c", command, *node, "suspend"])
     while Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()[0] != "T":
         assert not has_ended(pid, 0.01)
+    kill(process)
+    assert has_ended(pid, DEADLINE_S)
+
+
+def test_a_program_of_others_is_ended_with_its_launcher(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "theirs.py"
+    file.write_text("import os, sys\nprint(os.getpid(), flush=True)\nos.read(0, 1)\n", encoding="utf-8")
+    command = "import os; os.environ['" + LAUNCHER_PID + "'] = str(os.getpid()); " + STARTER.format(skip=1)
+    ward = ("-m", "sms_handover.ros.parent", sys.executable, str(file))
+    process, pid = start([sys.executable, "-c", command, *ward])
+    assert not has_ended(pid, 0.1)
     kill(process)
     assert has_ended(pid, DEADLINE_S)
 
