@@ -5,7 +5,6 @@ same YAML files; both go through :func:`build`, so both refuse the same values w
 The numbers live in ``config/``, never here.
 """
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields
 from math import inf, isfinite
@@ -14,6 +13,7 @@ from typing import Any, TypeVar, get_type_hints
 
 import yaml
 
+from sms_handover import yaml_files
 from sms_handover.errors import ConfigurationError, UnknownNameError
 
 T = TypeVar("T")
@@ -22,15 +22,13 @@ _SPEC = "sms_handover.spec"
 EVERY_NODE = "/**"  # section of ROS parameter files that holds for every node
 
 
-class YamlLoader(yaml.SafeLoader):
-    """YAML as ROS reads it: 1e-3 and 1.5e3 are numbers, also without a decimal point or a sign."""
+class ParameterValues(dict[str, object]):
+    """Parameters by name, with the file and line that each was read from."""
 
-
-YamlLoader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+$"),
-    list("-+.0123456789"),
-)
+    def __init__(self) -> None:
+        """Begin without any."""
+        super().__init__()
+        self.places: dict[str, str] = {}
 
 
 @dataclass(frozen=True)
@@ -67,24 +65,28 @@ def spec_of(item: "Field[Any]") -> ParameterSpec:
     return spec
 
 
-def build(cls: type[T], values: Mapping[str, object], where: str) -> T:
+def build(
+    cls: type[T], values: Mapping[str, object], where: str, places: Mapping[str, str] | None = None
+) -> T:
     """Return ``cls`` filled from ``values`` after checking names, types, ranges and choices.
 
-    ``where`` names the origin (a file, a node) in error messages. A list gives a tuple, an
+    ``where`` names the origin (a file, a node) in error messages, ``places`` those of single values
+    where they are known more closely. A list gives a tuple, an
     integer is taken where a float is asked for. Raises ConfigurationError on a missing or bad
     value and UnknownNameError on a name that ``cls`` does not have.
     """
     hints = get_type_hints(cls)
     known = {item.name: item for item in fields(cls)}  # type: ignore[arg-type]
+    origin = {name: where for name in (*known, *values)} | dict(places or {})
     for name in values:
         if name not in known:
-            raise UnknownNameError("parameter", name, known, where)
+            raise UnknownNameError("parameter", name, known, origin[name])
     values = {**defaults_of(cls), **values}
     missing = [name for name in known if name not in values]
     if missing:
         raise ConfigurationError(f"{where}: parameter {missing[0]!r} is missing")
     checked = {
-        name: _check(values[name], hints[name], spec_of(item), f"{where}: parameter {name!r}")
+        name: _check(values[name], hints[name], spec_of(item), f"{origin[name]}: parameter {name!r}")
         for name, item in known.items()
     }
     return cls(**checked)
@@ -96,31 +98,34 @@ def defaults_of(cls: type[object]) -> dict[str, object]:
     return {item.name: item.default for item in all_fields if item.default is not MISSING}
 
 
-def read_parameter_files(paths: Sequence[Path], section: str) -> dict[str, object]:
+def read_parameter_files(paths: Sequence[Path], section: str) -> ParameterValues:
     """Return the parameters in one section of files in ROS 2 form; later files win.
 
     A section is the name of a node, or :data:`EVERY_NODE` for parameters that all nodes share.
     """
-    merged: dict[str, object] = {}
+    merged = ParameterValues()
     for path in paths:
-        content = read_yaml(path).get(section)
+        document = read_yaml(path)
+        content = document.get(section)
         if content is None:
             continue
-        if not isinstance(content, dict) or not isinstance(content.get("ros__parameters"), dict):
-            raise ConfigurationError(f"{path}: section {section!r} needs a mapping 'ros__parameters'")
-        merged.update(content["ros__parameters"])
+        values = content.get("ros__parameters") if isinstance(content, dict) else None
+        if not isinstance(values, dict):
+            place = f"{path}{yaml_files.line_in(document, section)}"
+            raise ConfigurationError(f"{place}: section {section!r} needs a mapping 'ros__parameters'")
+        merged.update(values)
+        merged.places.update((name, f"{path}{yaml_files.line_in(values, name)}") for name in values)
     return merged
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
     """Return the mapping in a YAML file, loaded safely; raises ConfigurationError naming the line."""
     try:
-        document = yaml.load(path.read_text(encoding="utf-8"), YamlLoader)
+        document = yaml_files.load(yaml_files.read_text(path))
     except OSError as error:
         raise ConfigurationError(f"cannot read {path}: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        reason = " ".join(str(error).split())
-        raise ConfigurationError(f"{path} is not valid YAML: {reason}") from error
+    except (yaml.YAMLError, ValueError) as error:
+        raise ConfigurationError(f"{path} is not valid YAML: {yaml_files.reason(error)}") from error
     if not isinstance(document, dict):
         raise ConfigurationError(f"{path}: expected a mapping at the top level")
     return document

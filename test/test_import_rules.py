@@ -29,6 +29,7 @@ FOUNDATION_MODULES = {
     "status_line",
     "run_data",
     "checks",
+    "yaml_files",
 }
 MIDDLE = {"plant", "trajectory", "ik", "control"}
 CORE = {"model", *MIDDLE, "simulation", "bag", "analysis", "scene", "playback", "report", "export"}

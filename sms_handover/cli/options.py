@@ -7,10 +7,11 @@ from pathlib import Path
 
 import yaml
 
+from sms_handover import yaml_files
 from sms_handover.bag.parameters import RecorderParameters
 from sms_handover.control.parameters import LAWS
 from sms_handover.errors import ConfigurationError
-from sms_handover.parameters import YamlLoader, build, read_parameter_files
+from sms_handover.parameters import build, read_parameter_files
 from sms_handover.share import config_file
 from sms_handover.simulation.parameters import MODES
 from sms_handover.simulation.scenario import COMMON, Scenario, load_scenario
@@ -99,6 +100,7 @@ def _parse(text: str) -> tuple[str, str, object]:
     if not (assigned and dot and node and name):
         raise ConfigurationError(f"parameter {text!r} is not of the form NODE.NAME:=VALUE")
     try:
-        return node, name, yaml.load(value, YamlLoader)
-    except yaml.YAMLError as error:
-        raise ConfigurationError(f"the value of parameter {text!r} is not YAML") from error
+        return node, name, yaml_files.load(value)
+    except (yaml.YAMLError, ValueError) as error:
+        reason = yaml_files.reason(error)
+        raise ConfigurationError(f"the value of parameter {text!r} is not YAML: {reason}") from error

@@ -7,7 +7,7 @@ from sms_handover.errors import RobotDescriptionError
 from sms_handover.frames import joint_name
 from sms_handover.model.assembly import link_name
 from sms_handover.model.parts import Inertia, JointDescription, LinkDescription, Origin
-from sms_handover.model.sections import Section, naming, read_list, read_origin, read_section
+from sms_handover.model.sections import Section, at, naming, read_list, read_origin, read_section
 from sms_handover.model.validation import number, vector
 from sms_handover.parameters import read_yaml
 
@@ -26,21 +26,21 @@ def read_arm_file(file: Path, arm: str) -> tuple[list[JointDescription], list[Li
             section = read_section(item, where, ("origin", "axis", "limits", "link"))
             joints.append(_joint(section, where))
             links.append(_link(section["link"], link_name(arm, number_from_1)))
-        return joints, links, read_origin(root["flange"], "flange")
+        return joints, links, read_origin(root["flange"], at(root, "flange", "flange"))
 
 
 def _joint(section: Section, name: str) -> JointDescription:
     """Return one joint; its rotor inertia is for the robot file to give."""
     limits = read_section(section["limits"], f"{name}: limits", ("position", "velocity", "effort"))
-    lower, upper = vector(limits["position"], 2, f"{name}: position limit", "rad")
+    lower, upper = vector(limits["position"], 2, at(limits, "position", f"{name}: position limit"), "rad")
     return JointDescription(
         name=name,
-        origin=read_origin(section["origin"], f"{name}: origin"),
-        axis=vector(section["axis"], 3, f"{name}: axis"),
+        origin=read_origin(section["origin"], at(section, "origin", f"{name}: origin")),
+        axis=vector(section["axis"], 3, at(section, "axis", f"{name}: axis")),
         lower=lower,
         upper=upper,
-        velocity=number(limits["velocity"], f"{name}: velocity limit", "rad/s"),
-        effort=number(limits["effort"], f"{name}: effort limit", "N m"),
+        velocity=number(limits["velocity"], at(limits, "velocity", f"{name}: velocity limit"), "rad/s"),
+        effort=number(limits["effort"], at(limits, "effort", f"{name}: effort limit"), "N m"),
     )
 
 
@@ -49,11 +49,13 @@ def _link(value: object, name: str) -> LinkDescription:
     section = read_section(value, name, ("mass", "com", "inertia", "radius"))
     inertia = Inertia(
         name,
-        number(section["mass"], f"{name}: mass", "kg"),
-        vector(section["com"], 3, f"{name}: com", "m"),
-        vector(section["inertia"], 6, f"{name}: inertia", "kg m^2"),
+        number(section["mass"], at(section, "mass", f"{name}: mass"), "kg"),
+        vector(section["com"], 3, at(section, "com", f"{name}: com"), "m"),
+        vector(section["inertia"], 6, at(section, "inertia", f"{name}: inertia"), "kg m^2"),
     )
-    return LinkDescription(name, inertia, number(section["radius"], f"{name}: radius", "m"))
+    return LinkDescription(
+        name, inertia, number(section["radius"], at(section, "radius", f"{name}: radius"), "m")
+    )
 
 
 def override_limits(value: object, joints: list[JointDescription], where: str) -> list[JointDescription]:
@@ -68,8 +70,8 @@ def override_limits(value: object, joints: list[JointDescription], where: str) -
         joint = joints[index]
         before = {"position": (joint.lower, joint.upper), "velocity": joint.velocity, "effort": joint.effort}
         limits = {**before, **section}
-        lower, upper = vector(limits["position"], 2, f"{inner}: position", "rad")
-        velocity = number(limits["velocity"], f"{inner}: velocity", "rad/s")
-        effort = number(limits["effort"], f"{inner}: effort", "N m")
+        lower, upper = vector(limits["position"], 2, at(limits, "position", f"{inner}: position"), "rad")
+        velocity = number(limits["velocity"], at(limits, "velocity", f"{inner}: velocity"), "rad/s")
+        effort = number(limits["effort"], at(limits, "effort", f"{inner}: effort"), "N m")
         changed[index] = replace(joint, lower=lower, upper=upper, velocity=velocity, effort=effort)
     return changed

@@ -15,7 +15,7 @@ from sms_handover.model.parts import (
     Origin,
     box_moments,
 )
-from sms_handover.model.sections import naming, read_list, read_origin, read_section, read_text, unknown
+from sms_handover.model.sections import at, naming, read_list, read_origin, read_section, read_text, unknown
 from sms_handover.model.validation import number, positive, positive_vector, vector
 from sms_handover.parameters import read_yaml
 from sms_handover.share import config_file
@@ -47,7 +47,7 @@ def load_robot(path: Path | None = None) -> RobotDescription:
     document = read_yaml(path)
     with naming(path):
         root = read_section(document, "robot", ("name", "base", "arms"))
-        name = read_text(root["name"], "name")
+        name = read_text(root["name"], at(root, "name", "name"))
         base = _base(root["base"])
         arms = read_list(root["arms"], "arms")
     described = tuple(_arm(item, index, path) for index, item in enumerate(arms))
@@ -58,9 +58,9 @@ def load_robot(path: Path | None = None) -> RobotDescription:
 def _base(value: object) -> Base:
     """Return the spacecraft."""
     section = read_section(value, "base", ("mass", "size", "com", "inertia"), optional=("panels",))
-    mass = positive(section["mass"], "base: mass", "kg")
-    size = positive_vector(section["size"], 3, "base: size", "m")
-    com = vector(section["com"], 3, "base: com", "m")
+    mass = positive(section["mass"], at(section, "mass", "base: mass"), "kg")
+    size = positive_vector(section["size"], 3, at(section, "size", "base: size"), "m")
+    com = vector(section["com"], 3, at(section, "com", "base: com"), "m")
     panels = tuple(
         _panel(item, f"base: panels[{index}]")
         for index, item in enumerate(read_list(section.get("panels", []), "base: panels"))
@@ -80,8 +80,8 @@ def _base_moments(value: object, mass: float, size: Floats) -> Floats:
 def _panel(value: object, where: str) -> Panel:
     """Return one solar panel."""
     section = read_section(value, where, ("xyz", "size"))
-    xyz = vector(section["xyz"], 3, f"{where}: xyz", "m")
-    return Panel(xyz, positive_vector(section["size"], 3, f"{where}: size", "m"))
+    xyz = vector(section["xyz"], 3, at(section, "xyz", f"{where}: xyz"), "m")
+    return Panel(xyz, positive_vector(section["size"], 3, at(section, "size", f"{where}: size"), "m"))
 
 
 def _arm(value: object, index: int, path: Path) -> ArmDescription:
@@ -89,14 +89,21 @@ def _arm(value: object, index: int, path: Path) -> ArmDescription:
     keys = ("name", "description", "mount", "gripper", "rotor_inertia")
     with naming(path):
         section = read_section(value, f"arms[{index}]", keys, optional=("limits",))
-        name = read_text(section["name"], f"arms[{index}]: name")
-        file = path.parent / read_text(section["description"], f"{name}: description")
+        name = read_text(section["name"], at(section, "name", f"arms[{index}]: name"))
+        file = path.parent / read_text(
+            section["description"], at(section, "description", f"{name}: description")
+        )
     joints, links, flange = read_arm_file(file, name)
     with naming(path):
-        rotor = vector(section["rotor_inertia"], len(joints), f"{name}: rotor_inertia", "kg m^2")
+        rotor = vector(
+            section["rotor_inertia"],
+            len(joints),
+            at(section, "rotor_inertia", f"{name}: rotor_inertia"),
+            "kg m^2",
+        )
         joints = [replace(joint, rotor_inertia=kg_m2) for joint, kg_m2 in zip(joints, rotor, strict=True)]
         joints = override_limits(section.get("limits", {}), joints, f"{name}: limits")
-        mount = read_origin(section["mount"], f"{name}: mount")
+        mount = read_origin(section["mount"], at(section, "mount", f"{name}: mount"))
         gripper = _gripper(section["gripper"], gripper_name(name))
         return ArmDescription(name, mount, tuple(joints), tuple(links), flange, gripper)
 
@@ -106,7 +113,7 @@ def _gripper(value: object, name: str) -> Gripper:
     section = read_section(value, name, ("mass", "radius", "length"))
     return Gripper(
         name,
-        number(section["mass"], f"{name}: mass", "kg"),
-        number(section["radius"], f"{name}: radius", "m"),
-        number(section["length"], f"{name}: length", "m"),
+        number(section["mass"], at(section, "mass", f"{name}: mass"), "kg"),
+        number(section["radius"], at(section, "radius", f"{name}: radius"), "m"),
+        number(section["length"], at(section, "length", f"{name}: length"), "m"),
     )

@@ -1,5 +1,6 @@
 """Checks on the shape of a description file: which keys it has, and what kind of value stands where."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -7,8 +8,11 @@ from pathlib import Path
 from sms_handover.errors import RobotDescriptionError, UnknownNameError
 from sms_handover.model.parts import Origin
 from sms_handover.model.validation import vector
+from sms_handover.yaml_files import line_in
 
 Section = Mapping[str, object]
+
+_LINE = re.compile(r"^line \d+: ")  # that of the section around the key
 
 
 def read_section(value: object, where: str, required: Sequence[str], optional: Sequence[str] = ()) -> Section:
@@ -18,11 +22,19 @@ def read_section(value: object, where: str, required: Sequence[str], optional: S
     known = (*required, *optional)
     for key in value:
         if key not in known:
-            raise unknown("key", key, known, where)
+            raise unknown("key", key, known, at(value, key, where))
     for key in required:
         if key not in value:
             raise RobotDescriptionError(f"{where}: key {key!r} is missing")
     return value
+
+
+def at(section: Section, key: str, what: str) -> str:
+    """Return what is named, with the line of a key before it where the section knows it."""
+    line = line_in(section, key)
+    if not line:
+        return what
+    return f"line {line[1:]}: {_LINE.sub('', what)}"
 
 
 def read_list(value: object, where: str) -> list[object]:
@@ -47,8 +59,8 @@ def unknown(kind: str, name: str, known: Sequence[str], where: str) -> RobotDesc
 def read_origin(value: object, where: str) -> Origin:
     """Return a mapping of ``xyz`` m and ``rpy`` rad as an Origin; raises RobotDescriptionError."""
     section = read_section(value, where, ("xyz", "rpy"))
-    xyz = vector(section["xyz"], 3, f"{where}: xyz", "m")
-    return Origin(xyz, vector(section["rpy"], 3, f"{where}: rpy", "rad"))
+    xyz = vector(section["xyz"], 3, at(section, "xyz", f"{where}: xyz"), "m")
+    return Origin(xyz, vector(section["rpy"], 3, at(section, "rpy", f"{where}: rpy"), "rad"))
 
 
 @contextmanager

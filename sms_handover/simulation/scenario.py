@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TypeVar
 
@@ -9,16 +10,20 @@ from sms_handover.control.parameters import ControllerParameters
 from sms_handover.errors import UnknownNameError
 from sms_handover.ik.parameters import IkParameters
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.parameters import EVERY_NODE, build, read_parameter_files
+from sms_handover.parameters import EVERY_NODE, build, read_parameter_files, read_yaml
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.share import config_file
 from sms_handover.simulation.parameters import CommonParameters
-from sms_handover.topics import CONTROLLER, IK, PLANT, TRAJECTORY
+from sms_handover.topics import CONTROLLER, IK, NODES, PLANT, PLAYER, TOPIC_RECORDER, TRAJECTORY, VIEWER
 from sms_handover.trajectory.load import load_schedule
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.schedule import Schedule
+from sms_handover.yaml_files import line_in
 
 T = TypeVar("T")
+
+_SECTIONS = (EVERY_NODE, *NODES, PLAYER, TOPIC_RECORDER, VIEWER)  # of parameter files
+_SLIP = 0.8  # [-] likeness of names, from difflib, from which on one is a slip of the pen
 
 COMMON = "common"  # prefix of an override that holds for every node
 
@@ -57,11 +62,16 @@ def load_parameters(overrides: Overrides | None = None, files: Sequence[Path] = 
         if node not in known:
             raise UnknownNameError("node", node, known, "parameter overrides")
 
+    for path in files:
+        _refuse_misspelt(path)
+
     def group(cls: type[T], node: str, section: str, external: Sequence[str] = ()) -> T:
         if node in external:  # what is given is for a node that we know nothing of
             return build(cls, read_parameter_files([config_file(f"{node}.yaml")], section), node)
-        paths = [config_file(f"{node}.yaml"), *files]
-        return build(cls, {**read_parameter_files(paths, section), **overrides.get(node, {})}, node)
+        values = read_parameter_files([config_file(f"{node}.yaml"), *files], section)
+        given = overrides.get(node, {})
+        places = {name: place for name, place in values.places.items() if name not in given}
+        return build(cls, {**values, **given}, node, places)
 
     common = group(CommonParameters, COMMON, EVERY_NODE)
     return ParameterSet(
@@ -71,6 +81,17 @@ def load_parameters(overrides: Overrides | None = None, files: Sequence[Path] = 
         ik=group(IkParameters, IK, IK),
         controller=group(ControllerParameters, CONTROLLER, CONTROLLER, common.external),
     )
+
+
+def _refuse_misspelt(path: Path) -> None:
+    """Raise UnknownNameError on a section of a parameter file that nearly has the name of a node.
+
+    A file may have sections for nodes of others, so only what looks like a slip is refused.
+    """
+    document = read_yaml(path)
+    for section in map(str, document):
+        if section not in _SECTIONS and get_close_matches(section, _SECTIONS, n=1, cutoff=_SLIP):
+            raise UnknownNameError("node", section, _SECTIONS, f"{path}{line_in(document, section)}")
 
 
 def load_scenario(overrides: Overrides | None = None, files: Sequence[Path] = ()) -> Scenario:

@@ -7,8 +7,9 @@ from typing import Any
 
 import yaml
 
+from sms_handover import yaml_files
 from sms_handover.errors import ScheduleError, UnknownNameError
-from sms_handover.parameters import YamlLoader, as_float
+from sms_handover.parameters import as_float
 
 
 class Section:
@@ -77,12 +78,11 @@ class Section:
 
     def value(self, key: str) -> Any:
         """Return the plain value under a key."""
-        loader = yaml.SafeLoader("")
+        loader = yaml_files.YamlLoader("")
         try:
             return loader.construct_object(self._get(key), deep=True)
         except yaml.YAMLError as error:
-            reason = " ".join(str(error).split())
-            raise self.error(f"{key!r}: {reason}", self.line_of(key)) from error
+            raise self.error(f"{key!r}: {yaml_files.reason(error)}", self.line_of(key)) from error
 
     def text(self, key: str) -> str:
         """Return the text under a key."""
@@ -130,12 +130,12 @@ class Section:
 def read_section(path: Path) -> tuple[Section, str]:
     """Return the top-level mapping of a YAML file and the file's text; raises ScheduleError."""
     try:
-        text = path.read_text(encoding="utf-8")
-        node = yaml.compose(text, Loader=YamlLoader)
+        text = yaml_files.read_text(path)
+        node = yaml_files.compose(text)
     except OSError as error:
         raise ScheduleError(f"cannot read the schedule {path}: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ScheduleError(f"{path} is not valid YAML: {' '.join(str(error).split())}") from error
+    except (yaml.YAMLError, ValueError) as error:
+        raise ScheduleError(f"{path} is not valid YAML: {yaml_files.reason(error)}") from error
     if not isinstance(node, yaml.MappingNode):
         raise ScheduleError(f"{path}: expected a mapping at the top level")
     return Section(path, node), text

@@ -152,7 +152,7 @@ def test_a_section_without_parameters_is_refused(tmp_path: Path, text: str) -> N
     """A file that is not in ROS form is said to be so instead of being ignored."""
     path = _write(tmp_path / "p.yaml", text)
     with pytest.raises(
-        ConfigurationError, match=r"p\.yaml: section 'plant' needs a mapping 'ros__parameters'"
+        ConfigurationError, match=r"p\.yaml:1: section 'plant' needs a mapping 'ros__parameters'"
     ):
         read_parameter_files([path], "plant")
 

@@ -322,7 +322,7 @@ def _robot_arm(key: str, value: object) -> Spoil:
 
 
 _AXIS = r"arm_a_joint_1: axis"
-_HALF_ARM = r"gen3.yaml: arm_a_link_3: "
+_HALF_ARM = r"gen3.yaml: (line \d+: )?arm_a_link_3: "
 _PRINCIPAL = r"principal moments .* kg m\^2, "
 
 REFUSED: dict[str, tuple[Spoil, str]] = {
@@ -373,11 +373,17 @@ REFUSED: dict[str, tuple[Spoil, str]] = {
     "unknown key in a limit": (_limit("torque", 1.0), r"arm_a_joint_2: limits: unknown key 'torque': known"),
     "unknown key of the arm": (
         _set("arm", "flangee", value=0),
-        r"gen3.yaml: arm description: unknown key 'flangee' \(did you mean 'flange'\?\)",
+        r"gen3.yaml: (line \d+: )?arm description: unknown key 'flangee' \(did you mean 'flange'\?\)",
     ),
     "missing link": (_drop("arm", "joints", 6, "link"), r"arm_a_joint_7: key 'link' is missing"),
-    "missing flange": (_drop("arm", "flange"), r"gen3.yaml: arm description: key 'flange' is missing"),
-    "no joints": (_set("arm", "joints", value=[]), r"gen3.yaml: joints has 0 entries, allowed is at least 1"),
+    "missing flange": (
+        _drop("arm", "flange"),
+        r"gen3.yaml: (line \d+: )?arm description: key 'flange' is missing",
+    ),
+    "no joints": (
+        _set("arm", "joints", value=[]),
+        r"gen3.yaml: (line \d+: )?joints has 0 entries, allowed is at least 1",
+    ),
     "joints not a list": (_set("arm", "joints", value={}), r"joints is \{\}, expected a list"),
     "base mass": (_set("robot", "base", "mass", value=0), r"base: mass is 0.0 kg, allowed is more than 0"),
     "base size": (
@@ -392,7 +398,10 @@ REFUSED: dict[str, tuple[Spoil, str]] = {
         _set("robot", "base", "inertia", value=[1, 0, 0, 1, 0, 3]),
         r"base_link: inertia has .* none above the sum of the other two",
     ),
-    "missing base key": (_drop("robot", "base", "com"), r"robot.yaml: base: key 'com' is missing"),
+    "missing base key": (
+        _drop("robot", "base", "com"),
+        r"robot.yaml: (line \d+: )?base: key 'com' is missing",
+    ),
     "unknown base key": (_set("robot", "base", "sizes", value=1), r"unknown key 'sizes' .*'size'"),
     "unknown key of the robot": (_set("robot", "arm", value=1), r"robot: unknown key 'arm' .*'arms'"),
     "key that is a number": (_set("robot", 7, value=1), r"robot: unknown key 7: known are"),
@@ -400,7 +409,10 @@ REFUSED: dict[str, tuple[Spoil, str]] = {
         _set("robot", "base", "panels", 1, "size", value=[1, 1, -1]),
         r"base: panels\[1\]: size\[2\] is -1.0 m, allowed is more than 0",
     ),
-    "robot without a name": (_set("robot", "name", value=""), r"robot.yaml: name is '', expected text"),
+    "robot without a name": (
+        _set("robot", "name", value=""),
+        r"robot.yaml: (line \d+: )?name is '', expected text",
+    ),
     "no arms": (_set("robot", "arms", value=[]), r"robot.yaml: the robot has 0 arms, allowed is at least 1"),
     "arms not a list": (_set("robot", "arms", value=None), r"arms is None, expected a list"),
     "duplicate arm": (_robot_arm("name", "arm_b"), r"arm name 'arm_b' is given 2 times, allowed is once"),
@@ -408,11 +420,11 @@ REFUSED: dict[str, tuple[Spoil, str]] = {
     "missing mount": (_drop("robot", "arms", 0, "mount"), r"arms\[0\]: key 'mount' is missing"),
     "mount angle": (
         _set("robot", "arms", 0, "mount", "rpy", value=[0, 0, nan]),
-        r"robot.yaml: arm_a: mount: rpy\[2\] is nan rad, expected a finite number",
+        r"robot.yaml: (line \d+: )?arm_a: mount: rpy\[2\] is nan rad, expected a finite number",
     ),
     "gripper mass": (
         _set("robot", "arms", 0, "gripper", "mass", value=0),
-        r"robot.yaml: arm_a_gripper: mass is 0.0 kg, allowed is more than 0",
+        r"robot.yaml: (line \d+: )?arm_a_gripper: mass is 0.0 kg, allowed is more than 0",
     ),
     "gripper length": (
         _set("robot", "arms", 0, "gripper", "length", value=-1),
@@ -428,7 +440,7 @@ REFUSED: dict[str, tuple[Spoil, str]] = {
     ),
     "negative rotor inertia": (
         _robot_arm("rotor_inertia", [0.4] * 6 + [-0.2]),
-        r"robot.yaml: arm_a_joint_7: rotor inertia is -0.2 kg m\^2, allowed is 0 or more",
+        r"robot.yaml: (line \d+: )?arm_a_joint_7: rotor inertia is -0.2 kg m\^2, allowed is 0 or more",
     ),
     "override of an unknown joint": (
         _robot_arm("limits", {"joint_8": {"effort": 1.0}}),
