@@ -12,13 +12,14 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from my_controller.task_space_pd import TaskSpaceGains
 
 from docs.commands import sub_parsers
 from sms_handover.cli.main import _COMMANDS
 from sms_handover.ros.launch_arguments import ARGUMENTS
 from sms_handover.ros.reference import COMMON_GROUP, OWN_GROUPS, groups_of
 from sms_handover.services import SERVICES
-from sms_handover.topics import TF, graph_topics
+from sms_handover.topics import CONTROLLER, TF, graph_topics
 
 from .documents import DOCUMENTS, SHELL, Block, anchors, blocks, commands, inline_code, links
 from .workspace import PACKAGE, ROOT, executables
@@ -87,7 +88,9 @@ def check_ours(words: list[str]) -> None:
         node, _, name = text.partition(":=")[0].partition(".")
         groups = {"common": COMMON_GROUP, **OWN_GROUPS}
         require([node], groups, "node")
-        require([name], [item.name for item in fields(groups[node].cls)], f"parameter of {node}")
+        theirs = node == CONTROLLER and getattr(options, "own_controller", None)
+        cls = TaskSpaceGains if theirs else groups[node].cls  # the pages start our example
+        require([name], [item.name for item in fields(cls)], f"parameter of {node}")
 
 
 def check_python(words: list[str]) -> None:
