@@ -1,10 +1,12 @@
 """The phases of a run as spans of time and of rows."""
 
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
+from sms_handover.events import GRASP_FAILED
 from sms_handover.run_data import RunData
 from sms_handover.types import TaskPhase
 from sms_handover.units import ns_to_seconds
@@ -13,6 +15,9 @@ from sms_handover.units import ns_to_seconds
 @dataclass(frozen=True)
 class PhaseSpan:
     """One phase, from its start to the start of the next one or the end of the run.
+
+    A phase that is done again is another one, and so is what is left of one that has failed; ``name``
+    tells them apart. The plain name is that of the first time that it was not left for a missed grasp.
 
     ``rows`` are the reference periods with this phase's targets. ``states`` are the ticks from
     start to end, both included, because the state has no jump there; ``efforts`` are the ticks
@@ -38,14 +43,33 @@ def phase_spans(run: RunData) -> tuple[PhaseSpan, ...]:
     entered = [
         phase
         for before, phase in zip((None, *run.phases), run.phases, strict=False)
-        if before is None or before.index != phase.index
+        if before is None or before.entry != phase.entry
     ]
     last_ns = max([int(stamps[-1]) for stamps in (run.tick_ns, run.reference_ns) if len(stamps)], default=0)
     starts = [phase.stamp_ns for phase in entered]
+    names = _names(entered, {e.stamp_ns for e in run.run_events if e.kind == GRASP_FAILED})
     return tuple(
-        _span(run, phase, end_ns, is_last=phase is entered[-1])
-        for phase, end_ns in zip(entered, [*starts[1:], last_ns], strict=False)
+        _span(run, replace(phase, name=name), end_ns, is_last=phase is entered[-1])
+        for phase, name, end_ns in zip(entered, names, [*starts[1:], last_ns], strict=False)
     )
+
+
+def _names(entered: Sequence[TaskPhase], aborted_ns: Collection[int]) -> Iterator[str]:
+    """Yield a name for each phase, in the order of time; no two are the same.
+
+    One was left for a missed grasp if the one before it followed, or its failure at one of ``aborted_ns``.
+    """
+    taken: set[str] = set()
+    for phase, following in zip(entered, (*entered[1:], None), strict=False):
+        if phase.failed:
+            yield f"{phase.name} (failed)"
+        elif following and (following.index < phase.index or following.stamp_ns in aborted_ns):
+            yield f"{phase.name} (missed, attempt {phase.attempt})"
+        elif phase.name in taken:
+            yield f"{phase.name} (attempt {phase.attempt})"
+        else:
+            taken.add(phase.name)
+            yield phase.name
 
 
 def _span(run: RunData, phase: TaskPhase, end_ns: int, *, is_last: bool) -> PhaseSpan:

@@ -86,3 +86,21 @@ def test_reset_forgets_every_reference() -> None:
     assert not track.ready
     track.update(_reference(0))
     assert not np.any(track.at(0)[2])
+
+
+def test_a_reference_that_is_too_old_stands_still_where_it_led() -> None:
+    """It is carried on as ever up to the limit; beyond it the position is that of the limit, for ever."""
+    longest_ns = 6 * _PERIOD_NS
+    track, free = ReferenceTrack(longest_ns), ReferenceTrack()
+    for one in (track, free):
+        one.update(_reference(0))
+        one.update(_reference(_PERIOD_NS))
+    at_limit = _PERIOD_NS + longest_ns
+    for stamp_ns in (_PERIOD_NS, 3 * _PERIOD_NS, at_limit):
+        np.testing.assert_array_equal(track.at(stamp_ns), free.at(stamp_ns))
+    for later_ns in (at_limit + 1, 10 * at_limit):
+        position, velocity, acceleration = track.at(later_ns)
+        np.testing.assert_array_equal(position, free.at(at_limit)[0])
+        assert not np.any(velocity) and not np.any(acceleration)
+    track.update(_reference(10 * at_limit))
+    np.testing.assert_array_equal(track.at(10 * at_limit)[1], _true(ns_to_seconds(10 * at_limit))[1])

@@ -12,7 +12,15 @@ from sms_handover.share import config_file
 from sms_handover.simulation.scenario import Scenario
 from sms_handover.simulation.wiring import gains_by_phase
 from sms_handover.trajectory.load import load_schedule
-from sms_handover.trajectory.schedule import GraspFrameTarget, Hold, JointTarget, Schedule, ToolTarget
+from sms_handover.trajectory.schedule import (
+    GraspFrameTarget,
+    Hold,
+    JointTarget,
+    MissAction,
+    OnMiss,
+    Schedule,
+    ToolTarget,
+)
 from sms_handover.types import GraspAction, GraspCommand
 
 from .conftest import SCHEDULE, MakeScenario
@@ -41,6 +49,16 @@ class Files:
         assert "\n" not in str(caught.value)
         assert isinstance(caught.value, ConfigurationError)
         return str(caught.value)
+
+
+def with_policy(policy: str) -> str:
+    """Return the schedule with a policy for its second phase."""
+    return SCHEDULE.replace("  - name: carry\n", f"  - name: carry\n    {policy}\n")
+
+
+def line_of(words: str, text: str) -> int:
+    """Return the first line that has some words."""
+    return next(number for number, line in enumerate(text.splitlines(), 1) if words in line)
 
 
 @pytest.fixture
@@ -101,6 +119,52 @@ def test_every_kind_of_event_and_gains(files: Files) -> None:
     ]
     assert phases[0].gains == {}
     assert phases[1].gains == {"nmpc": {"rolling_period": 2.0}}
+
+
+@pytest.mark.parametrize(
+    ("written", "read"),
+    [
+        ("continue", OnMiss()),
+        ("abort", OnMiss(MissAction.ABORT)),
+        ("{retry: 3}", OnMiss(MissAction.RETRY, 3)),
+    ],
+)
+def test_what_a_phase_does_about_a_miss(files: Files, written: str, read: OnMiss) -> None:
+    """Without a word the task goes on."""
+    schedule = files.load(with_policy(f"on_miss: {written}"))
+    assert [phase.on_miss for phase in schedule.phases] == [OnMiss(), read, OnMiss(), OnMiss()]
+
+
+@pytest.mark.parametrize(
+    ("policy", "words"),
+    [
+        ("on_miss: abbort", ["unknown value 'abbort'", "did you mean 'abort'"]),
+        ("on_miss: retry", ["needs to know how often: write {retry: 2}"]),
+        ("on_miss: {retry: 0}", ["'retry' is 0, expected a whole number from 1 to 100"]),
+        ("on_miss: {retry: 2.5}", ["'retry' is 2.5, expected a whole number"]),
+        ("on_miss: {retry: true}", ["'retry' is True, expected a whole number"]),
+        ("on_miss: {retry: 101}", ["'retry' is 101, expected a whole number from 1 to 100"]),
+        ("on_miss: {retries: 2}", ["unknown key 'retries'", "did you mean 'retry'"]),
+        ("on_miss: {}", ["key 'retry' is missing"]),
+        ("on_miss: 3", ["'on_miss' is 3, expected text"]),
+        ("on_miss: [abort]", ["'on_miss' must be a mapping"]),
+    ],
+)
+def test_a_policy_that_makes_no_sense_is_refused(files: Files, policy: str, words: list[str]) -> None:
+    refusal = files.refusal(with_policy(policy))
+    assert f":{line_of('on_miss', with_policy(policy))}: " in refusal
+    for word in words:
+        assert word in refusal
+
+
+def test_a_policy_needs_a_grasp_and_a_retry_a_phase_before(files: Files) -> None:
+    text = SCHEDULE.replace("  - name: approach\n", "  - name: approach\n    on_miss: abort\n")
+    assert "no event of the phase is a grasp or transfer" in files.refusal(text)
+    text = SCHEDULE.replace("  - name: let go\n", "  - name: let go\n    on_miss: abort\n")
+    assert "no event of the phase is a grasp or transfer" in files.refusal(text)
+    grasp = "    on_miss: {retry: 1}\n    events:\n      - grasp: {arm: arm_a, grasp_frame: left}\n"
+    text = SCHEDULE.replace("  - name: approach\n", f"  - name: approach\n{grasp}")
+    assert "a retry does the phase before again, but this is the first one" in files.refusal(text)
 
 
 def test_phase_in_force(files: Files) -> None:

@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 from sms_handover.errors import ConfigurationError, UnstableLoopError
+from sms_handover.events import GRASP_FAILED, GRASP_MISSED, IK_FAILED, PHASE_RETRIED
 from sms_handover.model.poses import pose_of, pose_row, se3_of
 from sms_handover.model.reduced import base_twist_per_joint_rate, reduced_dynamics
 from sms_handover.run_data import RunData
@@ -292,6 +293,68 @@ def test_a_missed_grasp_is_told_and_the_run_goes_on(make_scenario: MakeScenario)
     assert [event.stamp_ns for event in data.grasp_events] == [400_000_000, 1_000_000_000, 1_200_000_000]
     assert data.tick_ns[-1] == 1_400_000_000
     assert max(row_distance(data.deputy_pose[0], data.deputy_pose[-1])) <= 1400 * _ROUNDING
+
+
+RETRY = SCHEDULE.replace("  - name: carry\n", "  - name: carry\n    on_miss: {retry: 5}\n")
+ABORT = SCHEDULE.replace("  - name: carry\n", "  - name: carry\n    on_miss: abort\n")
+FASTER: dict[str, object] = {"rolling_period": 0.3}  # s: the first approach is still too fast
+
+
+def test_a_retry_mends_a_miss_and_the_run_is_longer(make_scenario: MakeScenario) -> None:
+    """The approach is done again from 0.42 s, when the miss is known; what follows is later by that."""
+    data = simulate(make_scenario(RETRY, controller=FASTER))
+    grasps = [event for event in data.grasp_events if event.command.arm == "arm_a"]
+    assert [(e.stamp_ns, e.status) for e in grasps] == [
+        (400_000_000, GraspStatus.MISSED),
+        (820_000_000, GraspStatus.SUCCEEDED),
+    ]
+    assert (data.run_events[0].kind, data.run_events[0].stamp_ns) == (PHASE_RETRIED, 420_000_000)
+    assert data.tick_ns[-1] == 1_820_000_000
+    np.testing.assert_array_equal(data.tick_ns, np.arange(1821) * _TICK_NS)
+    np.testing.assert_array_equal(data.reference_ns, np.arange(92) * _PERIOD_NS)
+    for item in fields(RunData):
+        value = getattr(data, item.name)
+        if isinstance(value, np.ndarray):
+            assert np.all(np.isfinite(value)), item.name
+
+
+def test_until_it_is_known_that_a_grasp_missed_the_policy_changes_no_bit(make_scenario: MakeScenario) -> None:
+    plain = simulate(make_scenario(controller=FASTER))
+    again = simulate(make_scenario(RETRY, controller=FASTER))
+    known = 420  # [ticks]; the command of that tick is the first that can differ
+    for name in ("joint_position", "joint_velocity", "joint_effort", "base_pose", "base_twist"):
+        one, other = getattr(plain, name), getattr(again, name)
+        assert one[: known + 1].tobytes() == other[: known + 1].tobytes(), name
+    assert plain.joint_command[:known].tobytes() == again.joint_command[:known].tobytes()
+    assert plain.joint_command[known].tobytes() != again.joint_command[known].tobytes()
+
+
+def test_an_aborted_task_holds_the_joints_and_ends(make_scenario: MakeScenario) -> None:
+    """Their reference is where they were when the miss was known, without a jump of the desired rates."""
+    data = simulate(make_scenario(ABORT, trajectory={"failure_hold": 0.5}))
+    assert data.tick_ns[-1] == 920_000_000
+    assert [event.kind for event in data.run_events] == [GRASP_FAILED]
+    assert data.phases[-1].failed and not data.phases[20].failed
+    held = data.reference_position[data.reference_ns >= 420_000_000]
+    np.testing.assert_array_equal(held, np.tile(data.joint_position[420], (len(held), 1)))
+    assert not np.any(data.reference_velocity[data.reference_ns >= 420_000_000])
+    speed = np.abs(data.joint_velocity).max(axis=1)
+    assert speed[-1] < 0.5 * speed[420]
+
+
+def test_a_duration_that_is_given_holds_whatever_is_done_again(make_scenario: MakeScenario) -> None:
+    """But a task that has failed ends before it."""
+    longer: dict[str, object] = {"duration": 2.5}
+    assert simulate(make_scenario(RETRY, common=longer, controller=FASTER)).tick_ns[-1] == 2_500_000_000
+    hold: dict[str, object] = {"failure_hold": 0.1}
+    assert simulate(make_scenario(ABORT, common=longer, trajectory=hold)).tick_ns[-1] == 520_000_000
+
+
+def test_targets_out_of_reach_for_long_fail_the_phase(make_scenario: MakeScenario) -> None:
+    far = SCHEDULE.replace("xyz: [1.15, 0.02, 0.75]", "xyz: [4.0, 0.02, 0.75]")
+    data = simulate(make_scenario(far, trajectory={"ik_failures": 5, "failure_hold": 0.0}))
+    assert [event.kind for event in data.run_events] == [GRASP_MISSED, IK_FAILED]
+    assert data.tick_ns[-1] == 500_000_000  # from 0.4 s on, 5 periods
 
 
 def test_no_inverse_kinematics_where_no_tool_has_a_target(make_scenario: MakeScenario) -> None:
