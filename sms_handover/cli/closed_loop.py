@@ -96,7 +96,7 @@ def _at(deviation: StateDeviation | None) -> str:
 def _plant_arguments(scenario: Scenario) -> list[str]:
     """Return the ROS arguments of a plant that waits for the commands and for nobody else."""
     overrides = scenario.overrides
-    common = {**overrides.get(COMMON, {}), "mode": LOCKSTEP, "peers": PEERS}
+    common = {**overrides.get(COMMON, {}), "mode": LOCKSTEP, "peers": PEERS, "autostart": True}
     return as_arguments({**common, **overrides.get(PLANT, {})})
 
 

@@ -22,10 +22,11 @@ from sms_handover.errors import GraphError
 from sms_handover.events import RunEvent
 from sms_handover.ros.composition import ProcessArguments, nodes_together, process_arguments
 from sms_handover.ros.graph_node import INPUTS
+from sms_handover.ros.lifecycle_driver import LifecycleDriver
 from sms_handover.ros.main import EXIT_LOSS, EXIT_OK
 from sms_handover.ros.monitor import RunMonitor
 from sms_handover.simulation.scenario import COMMON, Scenario
-from sms_handover.topics import RECORDER
+from sms_handover.topics import LOOP_NODES, NODES, RECORDER
 from sms_handover.types import GraspEvent
 from sms_handover.units import ns_to_seconds
 
@@ -34,6 +35,8 @@ _START_PATIENCE_S = 60.0  # [s] of wall time until the run must have begun
 _BEGUN_PATIENCE_S = 10.0  # [s] of wall time for the news that the run has begun, when it is interrupted
 _STALL_PATIENCE_S = 30.0  # [s] of wall time without progress of simulated time
 _NEWS_PATIENCE_S = 20.0  # [s] of wall time for the news that the run is over, once the recorder has ended
+_SHUTDOWN_PATIENCE_S = 3.0  # [s] of wall time for the nodes to end when they are shut down
+_SHUTDOWN_POLL_S = 0.01  # [s] longest wait for an answer then
 _DRAIN_PATIENCE_S = 60.0  # [s] of wall time for the recorder to finish
 
 
@@ -101,7 +104,8 @@ def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outc
                 elif plan.controller:
                     named = ("--remap", f"__node:={name}")
                     processes.start(name, (*arguments.line, *named), plan.controller)
-            return _Watch(plan, monitor, executor, processes, interrupts, memory).to_the_end()
+            driver = LifecycleDriver(node, nodes_of(plan))
+            return _Watch(plan, monitor, driver, executor, processes, interrupts, memory).to_the_end()
     finally:
         inputs.destroy()
         node.destroy_node()
@@ -120,9 +124,17 @@ def graph_environment(plan: LaunchPlan) -> dict[str, str]:
     }
 
 
+def nodes_of(plan: LaunchPlan) -> tuple[str, ...]:
+    """Return the nodes that are ours, which the launcher takes through their lifecycle."""
+    nodes = NODES if plan.bag else LOOP_NODES
+    return tuple(name for name in nodes if name not in plan.external)
+
+
 def arguments_of(plan: LaunchPlan) -> Mapping[str, ProcessArguments]:
     """Return what every process is to be started with."""
     own = {name: dict(values) for name, values in plan.scenario.overrides.items()}
+    for name in nodes_of(plan):
+        own.setdefault(name, {})["autostart"] = False
     if plan.bag:
         own.setdefault(RECORDER, {})["folder"] = str(plan.bag)
     files = [str(path) for path in plan.parameter_files]
@@ -138,6 +150,7 @@ class _Watch:
         self,
         plan: LaunchPlan,
         monitor: RunMonitor,
+        driver: LifecycleDriver,
         executor: Executor,
         processes: NodeProcesses,
         interrupts: Interrupts,
@@ -147,7 +160,7 @@ class _Watch:
         common = plan.scenario.parameters.common
         end_ns = common.last_tick(plan.scenario.schedule.end_ns) * common.tick_ns
         self._plan, self._monitor, self._executor, self._processes = plan, monitor, executor, processes
-        self._common = common
+        self._driver, self._common = driver, common
         self._display = Display(end_ns)
         self._events_shown = self._run_events_shown = 0
         self._interrupts, self._memory = interrupts, memory
@@ -160,9 +173,12 @@ class _Watch:
         Raises KeyboardInterrupt on an interrupt before the run has begun, and on a second one.
         """
         self._wait_for_start()
-        self._wait_for_end()
-        self._wait_for_events()
-        code = self._wait_for_recorder() if self._plan.bag else EXIT_OK
+        code = None
+        while code is None:  # the run may be reset at any moment, also at its end
+            self._wait_for_end()
+            self._wait_for_events()
+            code = self._wait_for_recorder() if self._plan.bag else EXIT_OK
+        self._shut_down()
         progress = self._monitor.progress
         self._show(last=True)
         return Outcome(
@@ -183,6 +199,7 @@ class _Watch:
         interrupted = inf
         asked = False
         while self._monitor.progress.state == RunState.WAITING:
+            self._driver.look()
             self._look()
             self._memory.note((os.getpid(), *self._processes.ids.values()))
             if self._interrupts.asked:
@@ -191,9 +208,8 @@ class _Watch:
                 if self._interrupts.at_once or self._time.seconds - interrupted > _BEGUN_PATIENCE_S:
                     raise KeyboardInterrupt
             if self._time.seconds > deadline:
-                raise GraphError(
-                    f"the run has not begun after {_START_PATIENCE_S:g} s: {self._monitor.waiting_for()}"
-                )
+                why = self._driver.waiting_for or self._monitor.waiting_for()
+                raise GraphError(f"the run has not begun after {_START_PATIENCE_S:g} s: {why}")
         self._display.start(self._monitor.progress.stamp_ns)
 
     def _wait_for_end(self) -> None:
@@ -208,7 +224,7 @@ class _Watch:
             if self._interrupts.asked and not asked:
                 asked = self._monitor.ask_to_finish()
             now_ns = self._monitor.progress.stamp_ns
-            if now_ns != seen_ns:
+            if now_ns != seen_ns or self._monitor.progress.state == RunState.PAUSED:
                 seen_ns, since = now_ns, self._time.seconds
             elif self._time.seconds - since > _STALL_PATIENCE_S:
                 raise GraphError(
@@ -226,10 +242,15 @@ class _Watch:
         ):
             self._look()
 
-    def _wait_for_recorder(self) -> int:
-        """Wait until the recorder has everything and has closed the bag; return its exit code."""
+    def _wait_for_recorder(self) -> int | None:
+        """Wait until the recorder has everything and has closed the bag; return its exit code.
+
+        Returns None if a new run begins instead.
+        """
         deadline = self._time.seconds + _DRAIN_PATIENCE_S
         while True:
+            if not self._monitor.finished:
+                return None
             code = self._processes.exit_code(RECORDER)
             if code is not None:
                 return code
@@ -238,6 +259,14 @@ class _Watch:
                 raise KeyboardInterrupt
             if self._time.seconds > deadline:
                 raise GraphError(f"the recorder has not closed the bag; {self._remedy}")
+
+    def _shut_down(self) -> None:
+        """Let every node end in order; whoever does not is ended with its process."""
+        self._driver.shut_down()
+        deadline = self._time.seconds + _SHUTDOWN_PATIENCE_S
+        while len(self._processes.dead()) < len(self._processes.ids) and self._time.seconds < deadline:
+            self._executor.spin_once(timeout_sec=_SHUTDOWN_POLL_S)
+            self._time.look()
 
     def _look(self) -> None:
         """Handle what has come, and raise GraphError if a node has died."""
@@ -263,6 +292,8 @@ class _Watch:
     def _show(self, *, last: bool = False) -> None:
         """Show progress, and every event once."""
         progress = self._monitor.progress
+        self._events_shown = min(self._events_shown, len(progress.events))
+        self._run_events_shown = min(self._run_events_shown, len(progress.run_events))
         for event in progress.events[self._events_shown :]:
             self._display.event(event)
         for decision in progress.run_events[self._run_events_shown :]:

@@ -15,6 +15,7 @@ from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.topics import CONTROLLER, RECORDER, TRAJECTORY
 
 _EVERY_NODE = ""
+_TRUE = "true"
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,8 @@ class LaunchArgument:
     @property
     def choices(self) -> list[str] | None:
         """The values allowed, with '' for not given; None if there is no such list."""
+        if get_type_hints(self.group.cls)[self.parameter] is bool:
+            return ["", _TRUE, "false"]
         return ["", *self.spec.choices] if self.spec.choices else None
 
 
@@ -55,6 +58,7 @@ ARGUMENTS = {
     "mode": LaunchArgument(_EVERY_NODE, "mode"),
     "bag": LaunchArgument(RECORDER, "folder"),
     "external": LaunchArgument(_EVERY_NODE, "external"),
+    "autostart": LaunchArgument(_EVERY_NODE, "autostart"),
 }
 
 
@@ -78,9 +82,12 @@ def launch_processes(given: Mapping[str, str], *, record: bool, compose: bool) -
 
 def _typed(argument: LaunchArgument, name: str, text: str) -> object:
     """Return the text of an argument as its parameter is typed."""
-    if get_type_hints(argument.group.cls)[argument.parameter] == tuple[str, ...]:
+    hint = get_type_hints(argument.group.cls)[argument.parameter]
+    if hint == tuple[str, ...]:
         return (text,)
-    if get_type_hints(argument.group.cls)[argument.parameter] is not float:
+    if hint is bool:
+        return text == _TRUE
+    if hint is not float:
         return text
     try:
         return float(text)

@@ -131,6 +131,10 @@ class RunMonitor:
         return "; ".join(f"{name} is {text}" for name, text in waiting.items()) or "no node says why"
 
     def _on_state(self, message: Any) -> None:
+        if message.state == RunState.WAITING:  # behind a run: what has come of it is history
+            self.progress.events.clear()
+            self.progress.run_events.clear()
+            self._published.clear()
         self.progress.state = message.state
         self.progress.detail = message.detail
         self.progress.wall_time = message.wall_time

@@ -73,6 +73,12 @@ class Bench:
         self.spin(node)
         return node
 
+    def later(self, make: Callable[[], N]) -> N:
+        """Return the node that ``make`` returns, which is neither started nor spun."""
+        node = make()
+        self._nodes.append(node)
+        return node
+
     def loose(self, name: str) -> Node:
         """Return a node with nothing in it that is not spun before :meth:`spin`."""
         node = Node(name, start_parameter_services=False)

@@ -28,6 +28,7 @@ from sms_handover.topics import (
     RUN_RECORDED,
     RUN_STATE,
     TRAJECTORY,
+    Rate,
     Topic,
     graph_topics,
 )
@@ -148,7 +149,11 @@ class Graph:
             for name, count in node.endpoints.counts.items():
                 published[name.lstrip("/")] = published.get(name.lstrip("/"), 0) + count
         heard = {name.lstrip("/"): len(messages) for name, messages in self.heard.items()}
-        return all(heard[name] >= count for name, count in published.items())
+        return all(heard[name] >= count for name, count in published.items()) and all(
+            stamp_ns(self.heard[topic.name][-published[topic.name]]) == 0  # else they are of the run before
+            for topic in TOPICS
+            if topic.rate in (Rate.TICK, Rate.REFERENCE) and published.get(topic.name)
+        )
 
     def call(self, service: str, kind: Any, **values: Any) -> Any:
         """Return the answer of a service of the plant."""

@@ -34,6 +34,7 @@ SAMPLES = {
     "mode": "realtime",
     "bag": "runs/mine",
     "external": "controller",
+    "autostart": "false",
 }
 
 
@@ -103,7 +104,7 @@ def test_every_sample_is_a_value_of_its_parameter(name: str) -> None:
     group, parameter = ARGUMENTS[name].group, ARGUMENTS[name].parameter
     defaults = read_parameter_files([config_file(group.file)], group.section)
     assert parameter in defaults
-    typed: dict[str, object] = {"duration": 5.0, "external": ["controller"]}
+    typed: dict[str, object] = {"duration": 5.0, "external": ["controller"], "autostart": False}
     value = typed.get(name, SAMPLES[name])
     build(group.cls, {**defaults, parameter: value}, name)
     choices = ARGUMENTS[name].choices
