@@ -15,7 +15,7 @@ MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evi
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover figures report simulate test verify measure bench docs faults soak reference lint install colcon clean
+.PHONY: help handover figures report simulate test verify measure bench docs screenshots faults soak reference lint install colcon clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -63,6 +63,9 @@ docs: $(VENV)/.docs  ## build the documentation as a site, every warning an erro
 
 soak: $(VENV)/.test  ## run 30 minutes of simulated time, watch every process, write docs/soak.md
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.soak --write
+
+screenshots: docs report  ## take the pictures of docs/images again: this site, and report and 3D view of `make handover`
+	$(BIN)/python test/browser/screenshots.py $(REPORT)/index.html $(SITE) $(RUNS)/nmpc
 
 reference: install  ## write the pages of docs/ that list what is in the code
 	$(BIN)/python -m docs.reference

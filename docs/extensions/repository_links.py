@@ -21,8 +21,8 @@ _PAGES = {
 def for_the_site(markdown: str, page: str) -> str:
     """Return the text of a page with links that the site can follow; raises SphinxError at a dead one.
 
-    A file of config leads to where it is shown, a package to its API, other files are kept with the site. Of
-    what the site has not, a folder or a page elsewhere, the words remain.
+    A file of config or interfaces leads to where it is shown, a package to its API, other files are kept with
+    the site. Of what the site has not, a folder or a page elsewhere, the words remain.
     """
 
     def replace(found: re.Match[str]) -> str:
@@ -40,6 +40,8 @@ def _target(path: str, anchor: str) -> str:
     if path in _PAGES:
         return _PAGES[path] + anchor
     folder, _, name = path.rpartition("/")
+    if folder in ("interfaces/msg", "interfaces/srv"):
+        return f"messages.md#{Path(name).stem.lower()}"
     if folder == "config" and name.endswith(".yaml"):
         return f"configuration.md#{name.replace('.', '')}"
     if path.startswith("sms_handover") and (ROOT / path / "__init__.py").is_file():

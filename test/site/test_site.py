@@ -73,7 +73,7 @@ def test_a_telephone_gets_to_every_section(site: Path, browser: Browser) -> None
     page.locator("label.nav-overlay-icon").first.click()
     page.wait_for_function("document.querySelector('.sidebar-drawer').getBoundingClientRect().left >= 0")
     captions = [text.lower() for text in menu.locator(".caption-text").all_inner_texts()]
-    assert captions == ["how to", "reference", "explanation", "the project"]
+    assert captions == ["tutorials", "how to", "reference", "explanation", "the project"]
     menu.get_by_role("link", name="Commands", exact=True).click()
     assert page.locator("h1").inner_text().startswith("Commands")
     page.context.close()
