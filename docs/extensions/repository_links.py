@@ -1,4 +1,4 @@
-"""Links of the pages to files beside docs/: on GitHub they show the file, on the site the page about it."""
+"""Links of the pages: on GitHub they show a file by its name, on the site a page by its title."""
 
 import re
 from pathlib import Path
@@ -9,6 +9,7 @@ from sphinx.errors import SphinxError
 ROOT = Path(__file__).resolve().parents[2]
 
 _LINK = re.compile(r"(!?)\[([^\]]*)\]\(\.\./([^)\s#]*)(#[^)\s]*)?\)")
+_FILE_NAME = re.compile(r"(?<!!)\[([\w]+\.md)\]\((\1[^)]*)\)")
 _PAGES = {
     "README.md": "index.md",
     "CHANGELOG.rst": "changelog.rst",
@@ -22,7 +23,8 @@ def for_the_site(markdown: str, page: str) -> str:
     """Return the text of a page with links that the site can follow; raises SphinxError at a dead one.
 
     A file of config or interfaces leads to where it is shown, a package to its API, other files are kept with
-    the site. Of what the site has not, a folder or a page elsewhere, the words remain.
+    the site. Of what the site has not, a folder or a page elsewhere, the words remain. Words that are the
+    name of the file of a page become its title.
     """
 
     def replace(found: re.Match[str]) -> str:
@@ -32,7 +34,7 @@ def for_the_site(markdown: str, page: str) -> str:
         target = _target(path, anchor)
         return f"{image}[{words}]({target})" if target else words
 
-    return _LINK.sub(replace, markdown)
+    return _FILE_NAME.sub(r"[](\2)", _LINK.sub(replace, markdown))
 
 
 def _target(path: str, anchor: str) -> str:

@@ -1,4 +1,4 @@
-"""Take the pictures that the documents show of themselves, of a report and of the live view: `make screenshots`.
+"""Take the pictures in the documents of these themselves, of a report and of the live view.
 
 Each at the width of a desk and of a telephone, as PNG of few colours, which keeps it small.
 """
