@@ -90,7 +90,10 @@ def launch(plan: LaunchPlan) -> Outcome:
 
 def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outcome:
     """Take part in the graph, and let go of the middleware at the end."""
-    rclpy.init(domain_id=plan.domain, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        rclpy.init(domain_id=plan.domain, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # such as no thread or no memory left
+        raise GraphError(f"ROS cannot be started: {error}") from error
     node = Node("launcher", start_parameter_services=False, enable_rosout=False)
     inputs = INPUTS[plan.scenario.parameters.common.transport](node)
     try:

@@ -8,6 +8,7 @@ from importlib import import_module
 
 from sms_handover import __version__
 from sms_handover.errors import ConfigurationError, SmsHandoverError
+from sms_handover.ros.transports import avoid_full_shared_memory, require_shared_memory
 
 _COMMANDS = {
     "run": "run the handover as a graph of ROS 2 nodes and record it",
@@ -21,6 +22,7 @@ _COMMANDS = {
     "play": "publish the messages of any MCAP bag again, with keys to control it",
     "record": "record any topics of any graph to an MCAP bag",
 }
+_WITH_ROS = ("run", "play", "record")
 _EXIT_FAILED, _EXIT_USAGE, _EXIT_INTERRUPTED = 1, 2, 130
 
 
@@ -40,14 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("command", choices=tuple(_COMMANDS), metavar="COMMAND", help="see below")
     parser.add_argument("arguments", nargs=REMAINDER, metavar="...", help="options of the command")
     chosen = parser.parse_args(arguments)
-    module = import_module(f"sms_handover.cli.{chosen.command}")
-    command_parser = ArgumentParser(prog=f"sms-handover {chosen.command}")
-    module.add_parser(command_parser)
-    options = command_parser.parse_args(chosen.arguments)
     try:
-        code = int(module.command(options))
-        sys.stdout.flush()
-        return code
+        return _carry_out(chosen.command, chosen.arguments)
     except ConfigurationError as error:
         print(f"sms-handover {chosen.command}: error: {error}", file=sys.stderr)
         return _EXIT_USAGE
@@ -57,9 +53,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # whoever reads the output has seen enough, as head(1) does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return _EXIT_FAILED
+    except (OSError, MemoryError) as error:  # what the system refuses: files, processes, memory
+        print(f"sms-handover {chosen.command}: error: {error or 'no memory left'}", file=sys.stderr)
+        return _EXIT_FAILED
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return _EXIT_INTERRUPTED
+
+
+def _carry_out(name: str, arguments: Sequence[str]) -> int:
+    """Import the module of one command and carry it out; return the exit code."""
+    if name in _WITH_ROS:
+        require_shared_memory()
+        if told := avoid_full_shared_memory():
+            print(f"sms-handover {name}: {told}", file=sys.stderr)
+    module = import_module(f"sms_handover.cli.{name}")
+    parser = ArgumentParser(prog=f"sms-handover {name}")
+    module.add_parser(parser)
+    code = int(module.command(parser.parse_args(arguments)))
+    sys.stdout.flush()
+    return code
 
 
 def run_main() -> int:

