@@ -4,6 +4,7 @@ VENV ?= .venv
 RUNS ?= runs
 FIGURES ?= figures
 REPORT ?= report
+FUZZ_SECONDS ?= 600
 MEASURED := build/verification
 SITE := build/docs/html
 
@@ -15,7 +16,7 @@ MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evi
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover figures report simulate test verify measure bench docs screenshots faults soak reference lint install colcon clean
+.PHONY: help handover figures report simulate test verify measure bench docs screenshots faults fuzz soak reference lint install colcon clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -60,6 +61,9 @@ docs: $(VENV)/.docs  ## build the documentation as a site, every warning an erro
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -d build/docs/doctrees docs $(SITE)
 	$(BIN)/python -m pytest test/site --site $(SITE)
 	@echo "The site begins at $(SITE)/index.html"
+
+fuzz: $(VENV)/.test  ## feed broken inputs to every reader for FUZZ_SECONDS each, write docs/fuzzing.md
+	$(BIN)/python test/fuzz --seconds $(FUZZ_SECONDS) --write docs/fuzzing.md
 
 soak: $(VENV)/.test  ## run 30 minutes of simulated time, watch every process, write docs/soak.md
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.soak --write

@@ -87,6 +87,7 @@ setup(
         ],
         "parquet": ["pyarrow>=18,<27"],
         "test": [
+            "hypothesis>=6.140,<7",  # draws the inputs of the fuzzers
             "mcap-ros2-support>=0.5.7,<1",
             "mypy>=1.15",
             "playwright>=1.50,<2",  # drives a Chromium that the machine has

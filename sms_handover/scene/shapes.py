@@ -29,7 +29,10 @@ def read_shapes(model: pin.Model, urdf: str) -> tuple[Shape, ...]:
 
     Raises RobotDescriptionError on a shape that is neither a box nor a cylinder.
     """
-    drawn = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.VISUAL)
+    try:
+        drawn = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.VISUAL)
+    except (ValueError, RuntimeError) as error:
+        raise RobotDescriptionError(f"the shapes of the robot cannot be read: {error}") from error
     return tuple(_shape(model, item) for item in drawn.geometryObjects)
 
 
