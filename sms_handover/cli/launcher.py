@@ -30,6 +30,7 @@ from sms_handover.topics import LOOP_NODES, NODES, RECORDER
 from sms_handover.types import GraspEvent
 from sms_handover.units import ns_to_seconds
 
+_LOG_FOLDER = "ROS_LOG_DIR"  # environment variable that ROS reads
 _POLL_S = 0.1  # [s] longest wait for a message before the processes are looked at again
 _START_PATIENCE_S = 60.0  # [s] of wall time until the run must have begun
 _BEGUN_PATIENCE_S = 10.0  # [s] of wall time for the news that the run has begun, when it is interrupted
@@ -90,6 +91,7 @@ def launch(plan: LaunchPlan) -> Outcome:
 
 def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outcome:
     """Take part in the graph, and let go of the middleware at the end."""
+    os.environ.setdefault(_LOG_FOLDER, str(plan.log_folder / "ros"))  # its default needs a HOME
     try:
         rclpy.init(domain_id=plan.domain, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # such as no thread or no memory left
@@ -121,7 +123,7 @@ def graph_environment(plan: LaunchPlan) -> dict[str, str]:
         "ROS_DOMAIN_ID": str(plan.domain),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "ROS_STATIC_PEERS": "",
-        "ROS_LOG_DIR": str(plan.log_folder / "ros"),
+        _LOG_FOLDER: str(plan.log_folder / "ros"),
         "OPENBLAS_NUM_THREADS": "1",  # matrices of 14 columns gain nothing from threads
         "PYTHONUNBUFFERED": "1",
     }

@@ -1,5 +1,6 @@
 """A disk that is full, slow, gone or not allowed, at several moments of a run."""
 
+import re
 import shutil
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -17,6 +18,7 @@ from .trial import Trial
 
 TITLE = "Disk and folders"
 
+_DOMAIN = re.compile(r"running on ROS domain (\d+),")
 _BOUND_MS = 50.0  # [ms] of simulated time: the plant goes no further ahead of what has been written
 _UNDER_WAY = (200_000, 900_000)  # [byte] of the bag at which a fault comes: within some seconds of a run
 _STALL_S = 3.0  # [s] of wall time for which the disk takes nothing
@@ -33,8 +35,9 @@ def schedule(trial: Trial) -> Path:
 
 def watched(trial: Trial, output: Path, *more: object) -> tuple[Ended, int]:
     """Run until it ends by itself; return how, and the newest state [ns] that had been published."""
-    with trial.start("run", "-o", output, "--domain-id", trial.domain, *more) as run:
-        witness = Witness(trial.domain)
+    with trial.start("run", "-o", output, *more) as run:
+        run.until(lambda: _DOMAIN.search(run.text), "the domain of the run")
+        witness = Witness(int(_DOMAIN.findall(run.text)[0]))
         try:
             while run.process.poll() is None:
                 witness.newest_ns()  # takes what has come: a reader that keeps all would hold the loop up
@@ -83,9 +86,7 @@ def limit_size(trial: Trial) -> tuple[Ended, int]:
     blocks = trial.random.randint(500_000, 1_500_000)
     output = trial.folder / "small" / "run"
     output.parent.mkdir()
-    with trial.start(
-        "run", "-o", output, "--domain-id", trial.domain, prefix=("prlimit", f"--fsize={blocks}")
-    ) as run:
+    with trial.start("run", "-o", output, prefix=("prlimit", f"--fsize={blocks}")) as run:
         return trial.ended(run), -1
 
 

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -141,34 +140,6 @@ def fixed_shared_memory(trial: Trial) -> Ended:
 # The surroundings
 
 
-def no_free_domain(trial: Trial) -> Ended:
-    """Hold every ROS domain, as a hundred other runs would."""
-    holder = (
-        "import fcntl, subprocess, sys, tempfile, os, pathlib\n"
-        "folder = pathlib.Path(tempfile.gettempdir()) / f'sms_handover_domains_{os.getuid()}'\n"
-        "folder.mkdir(mode=0o700)\n"
-        "locks = [(folder / str(n)).open('w') for n in range(0, 234)]\n"
-        "for lock in locks: fcntl.flock(lock, fcntl.LOCK_EX)\n"
-        "raise SystemExit(subprocess.call(sys.argv[1:]))\n"
-    )
-    temporary = trial.folder / "tmp"
-    temporary.mkdir()
-    command = [sys.executable, "-c", holder, *_plain_run()]
-    return trial.command(command, environment={"TMPDIR": str(temporary)})
-
-
-def _plain_run() -> list[str]:
-    """Return the command of a run."""
-    return [sys.executable, "-m", "sms_handover.cli.main", "run", "-o", "run"]
-
-
-def says_no_domain(trial: Trial, ended: Ended) -> Kept:
-    """Require exit code 2 and what to do."""
-    exit_code(ended, 2)
-    one_line(ended, "domain", "--domain-id")
-    return Kept(ended.code, NOTHING_LOST)
-
-
 def bare_environment(trial: Trial) -> Ended:
     """Run with next to no environment variables, as a service or a cron job does."""
     keep = ("PATH", "PYTHONPATH", "SMS_HANDOVER_FAULT")
@@ -246,13 +217,6 @@ FAULTS = (
         seeded=True,
     ),
     Fault("shared-memory-fixed", "/dev/shm is read-only", _SAME, fixed_shared_memory, same_bits),
-    Fault(
-        "no-domain",
-        "every ROS domain is held by another run",
-        "exit code 2 and one line that says what to do",
-        no_free_domain,
-        says_no_domain,
-    ),
     Fault(
         "bare-environment",
         "no environment variables but PATH, as for a service",
