@@ -1,5 +1,6 @@
 """An own ROS domain for every run, so that runs side by side never hear each other."""
 
+import errno
 import socket
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -9,7 +10,7 @@ from sms_handover.errors import ConfigurationError
 
 FIRST_DOMAIN, LAST_DOMAIN = 1, 101  # above 101 the ports of DDS meet the ephemeral ports of Linux
 
-_LOCALHOST = "127.0.0.1"
+_LOCALHOST, _EVERYWHERE = "127.0.0.1", ""  # addresses to bind to
 # The mapping of RTPS 2.2, 9.6.1: every domain has 250 ports from 7400 on; participant n of it receives at
 # 10 + 2 n and 11 + 2 n. Ports 2 to 9 of a domain are nobody's, so that one of them can stand for it.
 _FIRST_PORT, _PORTS = 7400, 250
@@ -38,7 +39,9 @@ def reservation(asked: int | None) -> Iterator[Reservation]:
     with ExitStack() as stack:
         for domain in (asked,) if asked is not None else range(FIRST_DOMAIN, LAST_DOMAIN + 1):
             held = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_STREAM))
-            if _is_free(held, domain, _RESERVATION) and (asked is not None or not _is_used(domain)):
+            if _is_free(held, _LOCALHOST, domain, _RESERVATION) and (
+                asked is not None or not _is_used(domain)
+            ):
                 yield Reservation(domain, (held.fileno(),))
                 return
             held.close()
@@ -64,15 +67,19 @@ def _is_used(domain: int) -> bool:
     """Tell whether somebody takes part in a domain, who has not reserved it: any other ROS program."""
     for number in range(_PARTICIPANTS_LOOKED_FOR):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            if not _is_free(probe, domain, _PARTICIPANT + _PER_PARTICIPANT * number, address=""):
+            if not _is_free(probe, _EVERYWHERE, domain, _PARTICIPANT + _PER_PARTICIPANT * number):
                 return True
     return False
 
 
-def _is_free(taker: socket.socket, domain: int, offset: int, *, address: str = _LOCALHOST) -> bool:
-    """Bind a socket to a port of a domain; tell whether it was free."""
+def _is_free(taker: socket.socket, address: str, domain: int, offset: int) -> bool:
+    """Bind a socket to a port of a domain; tell whether it was free. Raises ConfigurationError."""
     try:
         taker.bind((address, _FIRST_PORT + _PORTS * domain + offset))
-    except OSError:
-        return False
+    except OSError as error:
+        if error.errno == errno.EADDRINUSE:
+            return False
+        raise ConfigurationError(
+            f"no domain can be reserved on {_LOCALHOST}: {error.strerror}; is its network interface up?"
+        ) from error
     return True

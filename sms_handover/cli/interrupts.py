@@ -4,20 +4,34 @@ import os
 import select
 import signal
 import sys
+from typing import Any
 
 _ALL = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 _OUTPUTS = (1, 2)  # file descriptors of standard output and standard error
 
 
 class Interrupts:
-    """Counts the signals: the first asks for an orderly end, a second one, or SIGQUIT, for one at once."""
+    """Counts the signals: the first asks for an orderly end, a second one, or SIGQUIT, for one at once.
+
+    Use it as a context manager; before and after it signals do what they did.
+    """
 
     def __init__(self) -> None:
-        """Install the handlers; a hang-up that is ignored, as under nohup(1), stays ignored."""
+        """Know of none."""
         self._count = self._told = 0
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> "Interrupts":
+        """Install the handlers; a hang-up that is ignored, as under nohup(1), stays ignored."""
         for number in _ALL:
             if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
-                signal.signal(number, self._on_signal)
+                self._before[number] = signal.signal(number, self._on_signal)
+        return self
+
+    def __exit__(self, *reason: object) -> None:
+        """Install what was there before."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
 
     @property
     def asked(self) -> bool:

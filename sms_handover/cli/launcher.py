@@ -81,12 +81,11 @@ class Outcome:
 
 def launch(plan: LaunchPlan) -> Outcome:
     """Run the graph of a plan to its end; raises GraphError if it could not go on."""
-    interrupts = Interrupts()
-    try:
-        with SharedMemory() as memory:
+    with Interrupts() as interrupts, SharedMemory() as memory:
+        try:
             return _run(plan, interrupts, memory)
-    finally:
-        let_go_of_closed_output()
+        finally:
+            let_go_of_closed_output()
 
 
 def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outcome:

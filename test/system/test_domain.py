@@ -111,3 +111,9 @@ def test_a_domain_is_held_until_the_last_process_of_the_run_has_ended() -> None:
         launcher.stdout.read()  # until the node has closed it too
     with reservation(domain) as free:
         assert free.domain == domain
+
+
+def test_a_machine_without_a_network_to_itself_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(domains, "_LOCALHOST", "240.0.0.1")  # of nobody, RFC 1112
+    with pytest.raises(ConfigurationError, match=r"no domain can be reserved on 240.0.0.1: .*interface up\?"):
+        reserved_domain(None).__enter__()

@@ -1,0 +1,49 @@
+"""The runs that faults are injected into."""
+
+import re
+from pathlib import Path
+
+from ..ros.short_handover import short_handover
+from ..system.runs import Ended, Running
+from .outcome import Kept, require
+from .promises import whole
+from .trial import Trial
+
+EARLIEST = 200_000  # [byte] of the bag of a run that is under way
+DOMAIN = re.compile(r"running on ROS domain (\d+),")
+
+_LATEST = 900_000  # [byte] of the bag after some seconds
+_STRETCH = 3.0  # [-] of the short handover: one second of simulated time
+
+
+def under_way(trial: Trial) -> int:
+    """Return a random size of the bag [byte] at which the fault comes."""
+    return trial.random.randint(EARLIEST, _LATEST)
+
+
+def domain_of(run: Running) -> int:
+    """Return the domain that a run says it is on."""
+    run.until(lambda: DOMAIN.search(run.text), "the domain of the run")
+    said = DOMAIN.search(run.text)
+    assert said
+    return int(said[1])
+
+
+def bag_of(trial: Trial) -> Path:
+    """Return the bag of the run that is made as ``-o run``."""
+    return trial.folder / "run" / "bag"
+
+
+def short_run(trial: Trial) -> list[object]:
+    """Return the command of a run of one second of simulated time."""
+    schedule = trial.folder / "schedule.yaml"
+    schedule.write_text(short_handover(stretch=_STRETCH), encoding="utf-8")
+    return ["run", "--schedule", schedule, "-o", "run"]
+
+
+def same_as_ever(trial: Trial, ended: Ended) -> Kept:
+    """Require a whole bag with the bits of a run in one process."""
+    kept = whole(bag_of(trial), ended)
+    again = trial.sms_handover("reproduce", "run")
+    require(again.code == 0, f"the run is not reproduced: {(again.err or again.out)[-300:]}")
+    return kept
