@@ -97,9 +97,9 @@ def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outc
         raise GraphError(f"ROS cannot be started: {error}") from error
     node = Node("launcher", start_parameter_services=False, enable_rosout=False)
     inputs = INPUTS[plan.scenario.parameters.common.transport](node)
+    executor = EventsExecutor()
     try:
         monitor = RunMonitor(node, plan.scenario.robot.arms, inputs)
-        executor = EventsExecutor()
         executor.add_node(node)
         with NodeProcesses(plan.log_folder, graph_environment(plan), plan.inherited) as processes:
             for name, arguments in arguments_of(plan).items():
@@ -111,6 +111,7 @@ def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outc
             driver = LifecycleDriver(node, nodes_of(plan))
             return _Watch(plan, monitor, driver, executor, processes, interrupts, memory).to_the_end()
     finally:
+        executor.shutdown()  # it would keep the middleware up behind the node
         inputs.destroy()
         node.destroy_node()
         rclpy.try_shutdown()

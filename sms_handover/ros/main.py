@@ -102,6 +102,7 @@ def run_nodes(makes: Sequence[Callable[[], RunnableNode]], arguments: list[str],
     stop = Stop()
     atexit.register(_ignore_signals)
     nodes: list[RunnableNode] = []
+    executor = None
     try:
         _init(arguments)
         executor = EventsExecutor()
@@ -125,16 +126,18 @@ def run_nodes(makes: Sequence[Callable[[], RunnableNode]], arguments: list[str],
         _tell(name, error)
         return EXIT_FAILED
     finally:
-        _tear_down(nodes)
+        _tear_down(nodes, executor)
 
 
-def _tear_down(nodes: Sequence[RunnableNode]) -> None:
+def _tear_down(nodes: Sequence[RunnableNode], executor: Executor | None) -> None:
     """Let go of the middleware; if it hangs, write to the log where, and exit with 1.
 
     The watch is a thread of faulthandler's, which needs neither the interpreter nor any lock, so that
     not even a deadlock leaves a process behind when the launcher is gone.
     """
     faulthandler.dump_traceback_later(_TEARDOWN_S, exit=True, file=_STANDARD_ERROR)
+    if executor is not None:
+        executor.shutdown()  # it would keep the middleware up behind the last node
     for node in nodes:
         node.destroy_node()
     rclpy.try_shutdown()

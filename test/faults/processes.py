@@ -21,7 +21,10 @@ TITLE = "Processes that die"
 
 _KILLED = (name for name in NODES if name != RECORDER)
 _BOUND_MS = 50.0  # [ms] that a killed recorder may lose in lock step
-_WHOLE_RUN_S = 5.0  # [s] of wall time from the start of the nodes to the end of such a run, roughly
+# Sizes of the bag [byte] in a short run between which a moment is: none for its start, at its end 0.85 MB.
+_MOMENTS = (None, (0, 1.0e5), (1.0e5, 7.0e5), (7.0e5, 8.2e5))
+_SOON_S = 1.0  # [s] of wall time at most after that
+_LOOK_S = 0.01  # [s] of wall time between two looks at the bag
 _LAUNCHER = "launcher"
 
 
@@ -95,11 +98,16 @@ def loses_little(trial: Trial, seen: tuple[Ended, int]) -> Kept:
 
 
 def at_any_moment(victim: str, number: signal.Signals, trial: Trial) -> Ended:
-    """Send a signal to a process of a short run: while it starts, matches, runs, drains, or too late."""
+    """Send a signal to a process of a short run: while it starts, in the middle, or about its end."""
     with trial.start(*short_run(trial)) as run:
         run.until_all_nodes(NODES)
         pid = run.pid if victim == _LAUNCHER else run.nodes[victim]
-        sleep(trial.random.uniform(0.0, _WHOLE_RUN_S))
+        moment = trial.random.choice(_MOMENTS)
+        if moment:
+            file, size = bag_of(trial) / "bag_0.mcap", trial.random.uniform(*moment)
+            while run.process.poll() is None and not (file.is_file() and file.stat().st_size > size):
+                sleep(_LOOK_S)
+        sleep(trial.random.uniform(0.0, _SOON_S))
         if run.process.poll() is None and (victim == _LAUNCHER or is_node(pid)):
             os.kill(pid, number)
         return trial.ended(run)
