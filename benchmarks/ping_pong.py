@@ -20,7 +20,7 @@ from sms_handover.cli.domain import reserved_domain
 from sms_handover.frames import BASE, WORLD
 from sms_handover.ros.direct_inputs import DirectInputs
 from sms_handover.ros.endpoints import Endpoints
-from sms_handover.ros.main import use_profile
+from sms_handover.ros.reach import settle_reach
 from sms_handover.ros.wire import JointStateWire, OdometryWire
 from sms_handover.topics import BASE_ODOMETRY, CONTROLLER, JOINT_COMMAND, JOINT_STATES, PLANT, graph_topics
 
@@ -129,8 +129,8 @@ def solo(trips: int) -> float:
 
 def main() -> None:
     """Play one of the two sides, or both."""
-    use_profile()
     os.environ.update(ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST", ROS_STATIC_PEERS="")
+    settle_reach()
     role, trips = sys.argv[1], int(sys.argv[2])
     if role == "pong":
         pong(trips)

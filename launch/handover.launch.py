@@ -31,6 +31,11 @@ OWN_ARGUMENTS = (
         choices=["true", "false"],
         description="whether nodes that wait for each other share one process, which is faster",
     ),
+    DeclareLaunchArgument(
+        "nodes",
+        default_value="",
+        description="nodes to start on this host, with commas between; not given: all (docs/hosts.md)",
+    ),
     DeclareLaunchArgument("namespace", default_value="", description="namespace of nodes and topics"),
     DeclareLaunchArgument("log_level", default_value="info", description="least severity that is logged"),
 )

@@ -1,5 +1,6 @@
 """``sms-handover play --closed-loop``: recorded commands into a live plant, against the recorded states."""
 
+import os
 import signal
 import tempfile
 from pathlib import Path
@@ -23,6 +24,7 @@ from sms_handover.errors import BagError, ConfigurationError, GraphError
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.ros.command_replay import PEERS, CommandReplay
 from sms_handover.ros.parameters import as_arguments
+from sms_handover.ros.reach import reach_to
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import COMMON, Scenario
 from sms_handover.topics import CONTROLLER, PLANT
@@ -45,7 +47,8 @@ def closed_loop(bag: Path, domain_id: int | None) -> int:
         except BagError as error:
             raise ConfigurationError(str(error)) from error  # exit code 2: what was given cannot be used
         with reserved_domain(domain_id) as domain:
-            plan = LaunchPlan(scenario, (), domain, folder, bag=None)
+            plan = LaunchPlan(scenario, (), domain, folder, bag=None, reach=reach_to(()))
+            os.environ.update(plan.reach.environment)
             begin = monotonic()
             rclpy.init(domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
             for number in (signal.SIGTERM, signal.SIGHUP):

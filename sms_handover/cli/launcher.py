@@ -1,7 +1,7 @@
 """Starts the graph, watches it to the end of the run, and ends it whatever happens."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -25,26 +25,31 @@ from sms_handover.ros.graph_node import INPUTS
 from sms_handover.ros.lifecycle_driver import LifecycleDriver
 from sms_handover.ros.main import EXIT_LOSS, EXIT_OK
 from sms_handover.ros.monitor import RunMonitor
+from sms_handover.ros.reach import THIS_MACHINE, Reach
 from sms_handover.simulation.scenario import COMMON, Scenario
-from sms_handover.topics import LOOP_NODES, NODES, RECORDER
+from sms_handover.topics import NODES, PLANT, RECORDER
 from sms_handover.types import GraspEvent
 from sms_handover.units import ns_to_seconds
 
 _LOG_FOLDER = "ROS_LOG_DIR"  # environment variable that ROS reads
 _POLL_S = 0.1  # [s] longest wait for a message before the processes are looked at again
 _START_PATIENCE_S = 60.0  # [s] of wall time until the run must have begun
+_HOSTS_PATIENCE_S = 600.0  # [s] of wall time likewise, where somebody has to start nodes on other hosts
 _BEGUN_PATIENCE_S = 10.0  # [s] of wall time for the news that the run has begun, when it is interrupted
 _STALL_PATIENCE_S = 30.0  # [s] of wall time without progress of simulated time
 _NEWS_PATIENCE_S = 20.0  # [s] of wall time for the news that the run is over, once the recorder has ended
 _SHUTDOWN_PATIENCE_S = 3.0  # [s] of wall time for the nodes to end when they are shut down
 _SHUTDOWN_POLL_S = 0.01  # [s] longest wait for an answer then
 _DRAIN_PATIENCE_S = 60.0  # [s] of wall time for the recorder to finish
+_GONE_PATIENCE_S = 60.0  # [s] of wall time for nodes of other hosts to end; more than the lease of DDS
 
 
 @dataclass(frozen=True)
 class LaunchPlan:
-    """What to start and where its logs, and if wanted its bag, go; ``compose``: few processes.
+    """What to start and where its logs go; ``compose``: few processes.
 
+    ``nodes`` are those to start here, ``elsewhere`` those that somebody starts on other hosts; ``bag``
+    is where the recorder writes, None if it is not among ``nodes``.
     ``controller`` is the command line of an external controller; empty if the user starts it, or if it
     is ours. Every process keeps the ``inherited`` file descriptors open: what they lock is free after the
     last one.
@@ -58,6 +63,9 @@ class LaunchPlan:
     compose: bool = False
     controller: tuple[str, ...] = ()
     inherited: tuple[int, ...] = ()
+    nodes: tuple[str, ...] = NODES
+    elsewhere: tuple[str, ...] = ()
+    reach: Reach = THIS_MACHINE
 
     @property
     def external(self) -> frozenset[str]:
@@ -91,6 +99,7 @@ def launch(plan: LaunchPlan) -> Outcome:
 def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outcome:
     """Take part in the graph, and let go of the middleware at the end."""
     os.environ.setdefault(_LOG_FOLDER, str(plan.log_folder / "ros"))  # its default needs a HOME
+    os.environ.update(plan.reach.environment)  # the launcher's own ear reaches no further than the nodes
     try:
         rclpy.init(domain_id=plan.domain, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # such as no thread or no memory left
@@ -120,9 +129,8 @@ def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outc
 def graph_environment(plan: LaunchPlan) -> dict[str, str]:
     """Return the environment variables that keep the graph to itself."""
     return {
+        **plan.reach.environment,
         "ROS_DOMAIN_ID": str(plan.domain),
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-        "ROS_STATIC_PEERS": "",
         _LOG_FOLDER: str(plan.log_folder / "ros"),
         "OPENBLAS_NUM_THREADS": "1",  # matrices of 14 columns gain nothing from threads
         "PYTHONUNBUFFERED": "1",
@@ -130,13 +138,12 @@ def graph_environment(plan: LaunchPlan) -> dict[str, str]:
 
 
 def nodes_of(plan: LaunchPlan) -> tuple[str, ...]:
-    """Return the nodes that are ours, which the launcher takes through their lifecycle."""
-    nodes = NODES if plan.bag else LOOP_NODES
-    return tuple(name for name in nodes if name not in plan.external)
+    """Return the nodes here that are ours, which the launcher takes through their lifecycle."""
+    return tuple(name for name in plan.nodes if name not in plan.external)
 
 
 def arguments_of(plan: LaunchPlan) -> Mapping[str, ProcessArguments]:
-    """Return what every process is to be started with."""
+    """Return what every process here is to be started with."""
     own = {name: dict(values) for name, values in plan.scenario.overrides.items()}
     for name in nodes_of(plan):
         own.setdefault(name, {})["autostart"] = False
@@ -145,7 +152,8 @@ def arguments_of(plan: LaunchPlan) -> Mapping[str, ProcessArguments]:
     files = [str(path) for path in plan.parameter_files]
     together = nodes_together(plan.scenario.parameters.common.mode) if plan.compose else ()
     common = own.get(COMMON, {})
-    return process_arguments(common, own, files, record=plan.bag is not None, together=together)
+    record = RECORDER in {*plan.nodes, *plan.elsewhere}
+    return process_arguments(common, own, files, record=record, together=together, here=plan.nodes)
 
 
 class _Watch:
@@ -183,6 +191,7 @@ class _Watch:
             self._wait_for_end()
             self._wait_for_events()
             code = self._wait_for_recorder() if self._plan.bag else EXIT_OK
+        self._wait_for_other_hosts()
         self._shut_down()
         progress = self._monitor.progress
         self._show(last=True)
@@ -200,7 +209,8 @@ class _Watch:
     def _wait_for_start(self) -> None:
         """Wait until every endpoint has matched and the plant has begun."""
         by_hand = bool(self._plan.external) and not self._plan.controller
-        deadline = inf if by_hand else self._time.seconds + _START_PATIENCE_S
+        patience_s = _HOSTS_PATIENCE_S if self._plan.elsewhere else _START_PATIENCE_S
+        deadline = inf if by_hand else self._time.seconds + patience_s
         interrupted = inf
         asked = False
         while self._monitor.progress.state == RunState.WAITING:
@@ -214,7 +224,7 @@ class _Watch:
                     raise KeyboardInterrupt
             if self._time.seconds > deadline:
                 why = self._driver.waiting_for or self._monitor.waiting_for()
-                raise GraphError(f"the run has not begun after {_START_PATIENCE_S:g} s: {why}")
+                raise GraphError(f"the run has not begun after {patience_s:g} s: {why}")
         self._display.start(self._monitor.progress.stamp_ns)
 
     def _wait_for_end(self) -> None:
@@ -264,6 +274,27 @@ class _Watch:
                 raise KeyboardInterrupt
             if self._time.seconds > deadline:
                 raise GraphError(f"the recorder has not closed the bag; {self._remedy}")
+
+    def _wait_for_other_hosts(self) -> None:
+        """Wait until no node on another host needs those here; raises GraphError if the recorder stays.
+
+        Everybody stays until the recorder has everything, and the plant, which tells of the end, to the last.
+        """
+        if RECORDER in self._plan.elsewhere and not self._are_gone((RECORDER,)):
+            raise GraphError("the recorder, on another host, has not ended; look at its bag there")
+        if PLANT in self._plan.nodes:
+            self._are_gone(self._plan.elsewhere)
+
+    def _are_gone(self, names: Collection[str]) -> bool:
+        """Wait until nodes have left the graph; tell whether they have."""
+        deadline = self._time.seconds + _GONE_PATIENCE_S
+        while self._monitor.present(names):
+            if not self._monitor.finished:  # the run has been reset
+                deadline = self._time.seconds + _GONE_PATIENCE_S
+            if self._time.seconds > deadline or self._interrupts.at_once:
+                return False
+            self._look()
+        return True
 
     def _shut_down(self) -> None:
         """Let every node end in order; whoever does not is ended with its process."""

@@ -16,11 +16,13 @@ from sms_handover.cli.launcher import LaunchPlan, launch
 from sms_handover.cli.options import add_scenario_options, scenario_of
 from sms_handover.errors import ConfigurationError
 from sms_handover.events import graver_in_words
+from sms_handover.ros.composition import listed, placed
 from sms_handover.ros.main import EXIT_LOSS
+from sms_handover.ros.reach import reach_to
 from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.parameters import LOCKSTEP, REALTIME
 from sms_handover.simulation.scenario import Scenario
-from sms_handover.topics import CONTROLLER
+from sms_handover.topics import CONTROLLER, NODES, RECORDER
 
 EXIT_INTERRUPTED = 130
 
@@ -73,11 +75,34 @@ def add_parser(parser: ArgumentParser) -> None:
     group.add_argument(
         "--domain-id", type=int, metavar="N", help="ROS domain (default: a free one of this machine's)"
     )
+    group = parser.add_argument_group(
+        "several hosts",
+        "The same command on each host, with the same scenario and domain; see docs/hosts.md.",
+    )
+    group.add_argument(
+        "--nodes",
+        default="",
+        metavar="NODE,...",
+        help=f"start only these here, because the others are started elsewhere (default: {','.join(NODES)})",
+    )
+    group.add_argument(
+        "--peers",
+        default="",
+        metavar="HOST,...",
+        help="names or addresses of the other hosts. This opens the graph to the network: whoever reaches "
+        "this machine can then read and command it (default: this machine only)",
+    )
 
 
 def command(options: Namespace) -> int:
     """Carry out the command; return the exit code."""
     mode = REALTIME if options.real_time else LOCKSTEP
+    here, elsewhere = placed(options.nodes, record=not options.no_record)
+    reach = reach_to(listed(options.peers))
+    if (elsewhere or reach.hosts) and options.domain_id is None:
+        raise ConfigurationError(
+            "nodes of several hosts meet on a ROS domain: give each host the same --domain-id"
+        )
     own = _own_controller(options)
     external = (CONTROLLER,) if own or options.without_controller else ()
     scenario = scenario_of(options, mode, recorded=not options.no_record, external=external)
@@ -88,13 +113,18 @@ def command(options: Namespace) -> int:
             parameter_files=tuple(path.resolve() for path in options.params_file),
             domain=held.domain,
             log_folder=output / LOGS,
-            bag=None if options.no_record else output / BAG,
+            bag=output / BAG if RECORDER in here else None,
             compose=options.compose,
             controller=own,
             inherited=(*held.descriptors, lock),
+            nodes=here,
+            elsewhere=elsewhere,
+            reach=reach,
         )
         where = options.output or output
-        print(f"running on ROS domain {held.domain}, this machine only; output in {where}", flush=True)
+        print(f"running on ROS domain {held.domain}, {reach}; output in {where}", flush=True)
+        if elsewhere:
+            print(f"this host runs {', '.join(here)}; waiting for {', '.join(elsewhere)}", flush=True)
         if options.without_controller:
             print(_how_to_join(held.domain), flush=True)
         outcome = launch(plan)

@@ -3,9 +3,10 @@
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
+from sms_handover.errors import ConfigurationError
 from sms_handover.ros.parameters import as_arguments
 from sms_handover.simulation.parameters import LOCKSTEP
-from sms_handover.topics import CONTAINER, CONTROLLER, LOOP_NODES, PLANT, RECORDER
+from sms_handover.topics import CONTAINER, CONTROLLER, LOOP_NODES, NODES, PLANT
 
 Values = Mapping[str, object]
 
@@ -39,16 +40,18 @@ def process_arguments(
     *,
     record: bool,
     together: Collection[str],
+    here: Collection[str] = NODES,
 ) -> dict[str, ProcessArguments]:
-    """Return the processes of a graph by executable, with their arguments.
+    """Return the processes of a graph on this host by executable, with their arguments.
 
     A process is a node, or the container that runs the nodes of ``together``. ``common`` are the
     parameters of every node, ``own`` those of single ones; both lie over the parameter files. An external
-    node has its arguments too, and may take or leave them.
+    node has its arguments too, and may take or leave them. Those not ``here`` run on other hosts.
     """
-    nodes = (*LOOP_NODES, RECORDER) if record else LOOP_NODES
+    graph = NODES if record else LOOP_NODES
+    nodes = [node for node in graph if node in here]
     begin = [part for file in files for part in ("--params-file", file)]
-    begin += as_arguments({**common, "peers": nodes})
+    begin += as_arguments({**common, "peers": graph})
     external = common.get("external", ())
     assert isinstance(external, Sequence)
     inside = tuple(node for node in nodes if node in together and node not in external)
@@ -60,3 +63,23 @@ def process_arguments(
         named = group if name == CONTAINER else ()
         processes[name] = ProcessArguments(named, (*begin, *values))
     return processes
+
+
+def placed(asked: str, *, record: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the nodes to start on this host and those of the graph that run elsewhere.
+
+    ``asked`` names those of this host, with commas between; "" is all of them. Raises ConfigurationError.
+    """
+    graph = NODES if record else LOOP_NODES
+    names = listed(asked) or graph
+    for name in names:
+        if name not in graph:
+            unrecorded = " without a recorder" if name in NODES else ""
+            allowed = f"allowed{unrecorded} are {', '.join(graph)}, with commas between"
+            raise ConfigurationError(f"node {name!r} cannot be started, {allowed}")
+    return tuple(n for n in graph if n in names), tuple(n for n in graph if n not in names)
+
+
+def listed(text: str) -> tuple[str, ...]:
+    """Return the items of a list with commas between."""
+    return tuple(item.strip() for item in text.split(",") if item.strip())

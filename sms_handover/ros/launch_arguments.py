@@ -9,7 +9,7 @@ from typing import get_type_hints
 
 from sms_handover.errors import ConfigurationError
 from sms_handover.parameters import ParameterSpec, spec_of
-from sms_handover.ros.composition import ProcessArguments, nodes_together, process_arguments
+from sms_handover.ros.composition import ProcessArguments, nodes_together, placed, process_arguments
 from sms_handover.ros.reference import COMMON_GROUP, OWN_GROUPS, ParameterGroup
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.topics import CONTROLLER, RECORDER, TRAJECTORY
@@ -65,9 +65,11 @@ ARGUMENTS = {
 def launch_processes(given: Mapping[str, str], *, record: bool, compose: bool) -> dict[str, ProcessArguments]:
     """Return the processes to start, each with the arguments that the launch arguments make.
 
-    ``given`` may hold other launch arguments too; '' is one that was not given. Raises
+    ``given`` may hold other launch arguments too; '' is one that was not given. Its ``nodes`` names the
+    nodes of this host, with commas between. Raises
     ConfigurationError on a number that is none.
     """
+    here, _ = placed(given.get("nodes", ""), record=record)
     values: dict[str, dict[str, object]] = {}
     for name, argument in ARGUMENTS.items():
         if given.get(name):
@@ -76,7 +78,7 @@ def launch_processes(given: Mapping[str, str], *, record: bool, compose: bool) -
     files = [given["params_file"]] if given.get("params_file") else []
     together = nodes_together(given.get("mode") or LOCKSTEP) if compose else ()
     common = values.get(_EVERY_NODE, {})
-    processes = process_arguments(common, values, files, record=record, together=together)
+    processes = process_arguments(common, values, files, record=record, together=together, here=here)
     return {name: arguments for name, arguments in processes.items() if name != given.get("external")}
 
 

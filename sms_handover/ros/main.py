@@ -17,17 +17,15 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from sms_handover.errors import ConfigurationError, SmsHandoverError
-from sms_handover.ros.parent import launcher_of_this_process, wake_when_parent_ends
+from sms_handover.ros.parent import LAUNCHER_PID, launcher_of_this_process, wake_when_parent_ends
+from sms_handover.ros.reach import settle_reach
 from sms_handover.ros.transports import avoid_full_shared_memory
-from sms_handover.share import config_file
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
 EXIT_LOSS = 3  # the recorder: the bag is whole, but messages are missing in it
 EXIT_STOPPED = 130  # the recorder: the bag is whole, but the run was not over when a signal came
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
-_FAST_DDS_FILE = "FASTRTPS_DEFAULT_PROFILES_FILE"  # environment variable that Fast DDS reads
-
 WAIT_S = 0.2  # [s] longest wait for an event, so that a signal is noticed
 
 _TEARDOWN_S = 15.0  # [s] of wall time for the middleware to let go; less than a launcher waits
@@ -149,11 +147,6 @@ def _tell(name: str, error: SmsHandoverError) -> None:
     print(f"{name}: error: {str(error).removeprefix(f'{name}: ')}", file=sys.stderr)
 
 
-def use_profile() -> None:
-    """Let Fast DDS read the profile of the graph, unless the user names another; before ROS is started."""
-    os.environ.setdefault(_FAST_DDS_FILE, str(config_file("fastdds.xml")))
-
-
 def _ignore_signals() -> None:
     """Keep the exit code: a second signal while the interpreter ends would otherwise kill the process."""
     for number in _SIGNALS:
@@ -167,8 +160,10 @@ def _init(args: list[str]) -> None:
         raise ConfigurationError(
             f"unknown argument {before_ros[0]!r}; give a parameter as --ros-args -p NAME:=VALUE, see --help"
         )
-    use_profile()
     avoid_full_shared_memory()
+    reach = settle_reach()
+    if reach.is_open and LAUNCHER_PID not in os.environ:  # else the launcher has said so
+        print(f"this process is {reach}", file=sys.stderr)
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:

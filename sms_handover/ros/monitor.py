@@ -1,6 +1,6 @@
 """The launcher's ear on a running graph: how far it is, what was grasped, what it waits for."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -72,6 +72,7 @@ class RunMonitor:
         """Subscribe to what tells the progress of the run."""
         self.progress = Progress()
         self._inputs = inputs
+        self._node = node
         self._targets: dict[str, PoseStamped] = {}
         self._published: dict[str, dict[str, int]] = {}
         self._finish = node.create_client(Trigger, f"{PLANT}/finish")
@@ -117,6 +118,15 @@ class RunMonitor:
             and len(self.progress.events) >= self._told(GRASP_EVENT)
             and len(self.progress.run_events) >= self._told(RUN_EVENTS)
         )
+
+    def present(self, names: Collection[str]) -> set[str]:
+        """Return those of some nodes that are in the graph.
+
+        A node that leaves says so twice: as a node, and for each of its publishers. On a bad network one
+        of the two may be lost, and only after the lease of DDS is the other noticed.
+        """
+        publishers = {info.node_name for info in self._node.get_publishers_info_by_topic(RUN_PUBLISHED)}
+        return publishers.intersection(names, self._node.get_node_names())
 
     def ask_to_finish(self) -> bool:
         """Ask the plant to end the run at the present tick; tell whether it could be asked."""

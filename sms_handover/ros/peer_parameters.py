@@ -1,33 +1,43 @@
 """Asks other nodes for all their parameters, so that a recording can tell what it was made with."""
 
 from collections.abc import Collection, Iterable
+from time import monotonic
 from typing import Any
 
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 
+_ASK_AGAIN_S = 2.0  # [s] of wall time; many times what an answer takes
+
 
 class PeerParameters:
-    """Collects the parameters of some nodes without blocking; call :meth:`poll` until it is done."""
+    """Collects the parameters of some nodes without blocking; call :meth:`poll` until it is done.
 
-    def __init__(self, node: Node, peers: Collection[str]) -> None:
-        """Prepare to ask ``peers``."""
+    An answer may be lost: a service drops it where it has not found the reader of the one who asks, who
+    has already found it. So a node that is silent is asked again.
+    """
+
+    def __init__(self, node: Node, peers: Collection[str], ask_again_s: float = _ASK_AGAIN_S) -> None:
+        """Prepare to ask ``peers``, again after so long in s."""
         self._clients = {peer: AsyncParameterClient(node, peer) for peer in peers}
-        self._asked: set[str] = set()
+        self._ask_again_s = ask_again_s
+        self._asked_at: dict[str, float] = {}
         self.values: dict[str, dict[str, object]] = {}
 
     def ask_again(self) -> None:
         """Forget the answers, for nodes that may have been configured anew."""
-        self._asked.clear()
+        self._asked_at.clear()
         self.values = {}
 
     def poll(self) -> bool:
-        """Ask every node that has appeared since; tell whether all have answered."""
-        for peer, client in self._clients.items():
-            if peer not in self._asked and client.services_are_ready():
-                self._asked.add(peer)
-                client.list_parameters(callback=self._then_get(peer))
+        """Ask every node that has appeared since or has not answered; tell whether all have answered."""
+        now = monotonic()
+        for peer in self._clients.keys() - self.values.keys():
+            due = peer not in self._asked_at or now - self._asked_at[peer] > self._ask_again_s
+            if due and self._clients[peer].services_are_ready():
+                self._asked_at[peer] = now
+                self._clients[peer].list_parameters(callback=self._then_get(peer))
         return len(self.values) == len(self._clients)
 
     def _then_get(self, peer: str) -> Any:

@@ -57,6 +57,12 @@ def test_without_a_recorder_nobody_waits_for_one() -> None:
     assert all(RECORDER not in " ".join(arguments.ros) for arguments in nodes.values())
 
 
+def test_a_host_starts_its_nodes_and_these_wait_for_all() -> None:
+    whole = launch_processes({}, record=True, compose=False)
+    here = launch_processes({"nodes": "ik, recorder"}, record=True, compose=False)
+    assert here == {name: whole[name] for name in ("ik", "recorder")}
+
+
 @pytest.mark.parametrize("name", list(ARGUMENTS))
 def test_an_argument_reaches_its_nodes_and_no_other(name: str) -> None:
     argument = ARGUMENTS[name]

@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 from rclpy.node import Node
+from rclpy.parameter_client import AsyncParameterClient
 
 from sms_handover.bag.contents import parameters_from_json, parameters_json
 from sms_handover.ros.peer_parameters import PeerParameters
@@ -62,3 +63,21 @@ def test_a_node_can_ask_itself(bench: Bench) -> None:
     peers = PeerParameters(node, ("plant",))
     bench.until(peers.poll, "the parameters")
     assert own(peers.values["plant"]) == VALUES["plant"]
+
+
+def test_a_node_whose_answer_is_lost_is_asked_again(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A service drops an answer for one whom it has not found yet; nobody tells the one who waits for it."""
+    bench.start()
+    ask, asked = AsyncParameterClient.list_parameters, []
+
+    def lossy(client: AsyncParameterClient, *arguments: Any, **named: Any) -> None:
+        asked.append(client)
+        if len(asked) > 1:
+            ask(client, *arguments, **named)
+
+    monkeypatch.setattr(AsyncParameterClient, "list_parameters", lossy)
+    peer(bench, "plant")
+    peers = PeerParameters(bench.plain("recorder"), ("plant",), ask_again_s=0.01)
+    bench.until(peers.poll, "the parameters")
+    assert own(peers.values["plant"]) == VALUES["plant"]
+    assert len(asked) > 1

@@ -13,6 +13,8 @@ from time import monotonic
 
 from sms_handover.ros.parent import LAUNCHER_PID
 
+from .hosts import Host
+
 DEADLINE_S = 180.0  # s of wall time after which something that hangs has failed; nothing is measured by it
 
 _LOOK_S = 0.02  # s of wall time between two looks at a condition
@@ -119,10 +121,15 @@ def has_ended(pid: int, patience_s: float) -> bool:
 
 
 @contextmanager
-def running(*arguments: object, cwd: Path, module: str = "") -> Iterator[Running]:
-    """Start a command, or the ``module`` of a node, and see to it that nothing of it is left at the end."""
+def running(*arguments: object, cwd: Path, module: str = "", on: Host | None = None) -> Iterator[Running]:
+    """Start a command, or the ``module`` of a node, and see to it that nothing of it is left at the end.
+
+    It is started ``on`` a host of its own network, else on this machine.
+    """
     log = cwd / f"printed_{len(list(cwd.glob('printed_*')))}"
     command = [sys.executable, "-m", module, *map(str, arguments)] if module else command_of(arguments)
+    if on is not None:
+        command = on.command(cwd, command)
     with log.open("w", encoding="utf-8") as stream:
         process = subprocess.Popen(command, cwd=cwd, stdout=stream, stderr=subprocess.STDOUT, text=True)
     run = Running(process, log)

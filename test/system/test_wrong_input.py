@@ -71,6 +71,20 @@ WRONG = {
     "domain": (["--domain-id", "400"], "allowed is 0 to 101"),
     "negative domain": (["--domain-id", "-1"], "allowed is 0 to 101"),
     "domain that is no number": (["--domain-id", "one"], "invalid int value"),
+    "node of a host": (
+        ["--nodes", "plant,recoder", "--domain-id", "5"],
+        "'recoder' cannot be started, allowed",
+    ),
+    "recorder of no recording": (
+        ["--nodes", "recorder", "--no-record"],
+        "allowed without a recorder are plant",
+    ),
+    "hosts without a domain": (["--peers", "127.0.0.1"], "give each host the same --domain-id"),
+    "nodes without a domain": (["--nodes", "plant"], "give each host the same --domain-id"),
+    "host that is not known": (
+        ["--peers", "no.such.invalid", "--domain-id", "5"],
+        "'no.such.invalid' has no IPv4",
+    ),
     "output that cannot be": (["-o", "text/run"], "cannot be made"),
     "output that is a file": (["-o", "text"], "exists"),
     "output that exists": (["-o", "taken"], "exists"),
