@@ -135,12 +135,14 @@ class ContentCheck:
     def _close_run(self, findings: Findings) -> None:
         """Tell whether the run came to its end, and whether everybody told what was published."""
         state = self._state
-        if state is None or state.state not in (state.FINISHED, state.WAITING):  # the latter by a reset
+        over = () if state is None else (state.FINISHED, state.FAILED, state.WAITING)  # the last by a reset
+        if state is None or state.state not in over:
             newest_s = max(self._newest.values(), default=0) / NS_PER_S
             findings.missing(f"the run was not finished when the recording ended, at {newest_s:g} s")
             return
         stamp = state.header.stamp
-        findings.note(f"the run ended at {stamp.sec + stamp.nanosec / NS_PER_S:g} s: {state.detail}")
+        how = "failed" if state.state == state.FAILED else "ended"
+        findings.note(f"the run {how} at {stamp.sec + stamp.nanosec / NS_PER_S:g} s: {state.detail}")
         silent = [name for name in topics.LOOP_NODES if not any(node.endswith(name) for node in self._told)]
         if silent:
             findings.missing(f"how many messages were published is not told by {', '.join(silent)}")

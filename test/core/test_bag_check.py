@@ -31,8 +31,10 @@ from .bag_messages import (
 TICKS = 201
 
 
-def write_finished(folder: Path, *, finished: bool = True, skipped: int = 0, published: int = TICKS) -> Path:
-    """Write a bag of a run that was finished, of which the recorder has missed some states."""
+def write_finished(
+    folder: Path, *, finished: bool = True, failed: bool = False, skipped: int = 0, published: int = TICKS
+) -> Path:
+    """Write a bag of a run that has ended, of which the recorder has missed some states."""
     run = made_up_run(TICKS)
     run = replace(run, ik_status=np.zeros_like(run.ik_status))  # a message each reference period
     with Recording(folder, types=TYPES) as recording:
@@ -51,7 +53,7 @@ def write_finished(folder: Path, *, finished: bool = True, skipped: int = 0, pub
             state = TYPES.make(
                 f"{OURS}/RunState",
                 header=header(int(run.tick_ns[-1])),
-                state=3,
+                state=4 if failed else 3,
                 tick=200,
                 wall_time=0.1,
                 detail="done",
@@ -72,6 +74,13 @@ def test_a_finished_run_is_complete(tmp_path: Path) -> None:
     assert result.complete and result.is_ours and not result.damaged, result.findings
     assert result.counts["/joint_states"] == TICKS
     assert "the run ended at 0.2 s: done" in texts(result, Severity.NOTE)
+
+
+def test_a_run_that_has_failed_is_complete_too(tmp_path: Path) -> None:
+    """A task that was given up ends the run in an orderly way: nothing is missing of it."""
+    result = check(write_finished(tmp_path / "bag", failed=True))
+    assert result.complete, result.findings
+    assert "the run failed at 0.2 s: done" in texts(result, Severity.NOTE)
 
 
 def test_an_unfinished_run_is_not(tmp_path: Path) -> None:

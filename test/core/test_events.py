@@ -1,9 +1,11 @@
 """What a node has decided, in words."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+from sms_handover import events
 from sms_handover.events import RunEvent, Severity, graver_in_words
 
 EVENT = RunEvent(2_500_000_000, "plant", "command_lost", Severity.WARNING, "no command comes")
@@ -27,3 +29,12 @@ def test_warnings_and_errors_are_counted() -> None:
     assert graver_in_words([]) == graver_in_words([info]) == ""
     assert graver_in_words([EVENT, info]) == "1 warning"
     assert graver_in_words([EVENT, error, EVENT]) == "1 error, 2 warnings"
+
+
+def test_every_kind_is_in_the_table_of_the_document() -> None:
+    kinds = [v for name, v in vars(events).items() if name.isupper() and isinstance(v, str)]
+    assert len(kinds) >= 10
+    table = (Path(__file__).parents[2] / "docs" / "watchdogs.md").read_text(encoding="utf-8")
+    rows = [line for line in table.splitlines() if line.startswith("| ")]
+    missing = [kind for kind in kinds if not any(f"`{kind}`" in row for row in rows)]
+    assert missing == []
