@@ -69,16 +69,25 @@ def attempt(fault: Fault[Any], family: str, seed: int, folder: Path) -> Outcome:
 
 def write_outcome(outcome: Outcome, folder: Path) -> None:
     """Leave an outcome for the process that asked for it."""
-    values = {**asdict(outcome), "status": outcome.status.name}
-    (folder / _FILE).write_text(json.dumps(values), encoding="utf-8")
+    (folder / _FILE).write_text(to_json(outcome), encoding="utf-8")
 
 
 def read_outcome(folder: Path) -> Outcome | None:
     """Return the outcome in a folder, None if there is none."""
     try:
-        values = json.loads((folder / _FILE).read_text(encoding="utf-8"))
+        return from_json((folder / _FILE).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
+
+
+def to_json(outcome: Outcome) -> str:
+    """Return an outcome as a line of JSON."""
+    return json.dumps({**asdict(outcome), "status": outcome.status.name})
+
+
+def from_json(text: str) -> Outcome:
+    """Return the outcome in a line of JSON."""
+    values = json.loads(text)
     return Outcome(**{**values, "status": Status[values["status"]], "lost": Loss(**values["lost"])})
 
 

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from .attempt import attempt, write_outcome
+from .attempt import attempt, from_json, to_json, write_outcome
 from .discover import chosen, families
 from .outcome import Outcome, Status
 from .page import page
@@ -35,12 +35,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return EXIT_OK
     if not own_mounts():
         print("no mounts of its own on this machine: some faults cannot be tried", file=sys.stderr)
-    progress = _Progress(len(jobs))
+    done = _done(options.resume, options.seed)
+    left = [(family, fault) for family, fault in jobs if f"{family.name}/{fault.name}" not in done]
+    progress = _Progress(len(left), options.resume, options.seed)
     try:
-        outcomes = run_all(jobs, options.seed, options.jobs, options.folder, progress.tell)
+        run_all(left, options.seed, options.jobs, options.folder, progress.tell)
     except KeyboardInterrupt:
         print("\ninterrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
+    done.update({outcome.fault: outcome for outcome in progress.outcomes})
+    outcomes = [done[f"{family.name}/{fault.name}"] for family, fault in jobs]
     if options.write:
         options.write.write_text(page(found, outcomes, options.seed), encoding="utf-8")
         print(f"wrote {options.write}")
@@ -48,25 +52,39 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 class _Progress:
-    """A line for every outcome, with how many are done."""
+    """A line for every outcome, with how many are done; kept in a file too, if wanted."""
 
-    def __init__(self, total: int) -> None:
+    def __init__(self, total: int, file: Path | None, seed: int) -> None:
         """Begin with none."""
-        self._total, self._done, self._broken = total, 0, 0
+        self._total, self._file, self._seed = total, file, seed
+        self.outcomes: list[Outcome] = []
+        self._broken = 0
 
     def tell(self, outcome: Outcome) -> None:
         """Print an outcome."""
-        self._done += 1
+        self.outcomes.append(outcome)
+        if self._file is not None:
+            with self._file.open("a", encoding="utf-8") as stream:
+                stream.write(f"{self._seed} {to_json(outcome)}\n")
         self._broken += outcome.status is Status.BROKEN
         width = len(str(self._total))
         broken = f", {self._broken} broken so far" if self._broken else ""
         print(
-            f"[{self._done:>{width}}/{self._total}{broken}] {outcome.fault}: {outcome.status.value}, "
+            f"[{len(self.outcomes):>{width}}/{self._total}{broken}] {outcome.fault}: {outcome.status.value}, "
             f"lost {outcome.lost}, {outcome.wall_s:.1f} s"
             + (f"\n    {outcome.reason}" if outcome.reason else "")
             + (f"\n    {outcome.note}" if outcome.note else ""),
             flush=True,
         )
+
+
+def _done(file: Path | None, seed: int) -> dict[str, Outcome]:
+    """Return the promises kept in an earlier run with this seed, by name; what was broken is tried again."""
+    if file is None or not file.is_file():
+        return {}
+    lines = [line.partition(" ") for line in file.read_text(encoding="utf-8").splitlines()]
+    outcomes = [from_json(text) for number, _, text in lines if number == str(seed)]
+    return {outcome.fault: outcome for outcome in outcomes if outcome.status is Status.KEPT}
 
 
 def _summary(outcomes: Sequence[Outcome], options: Namespace) -> int:
@@ -105,6 +123,12 @@ def _parser() -> ArgumentParser:
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="faults at a time (default: 1)")
     parser.add_argument("--list", action="store_true", help="show the faults, try none")
     parser.add_argument("--write", type=Path, metavar="FILE", help="write the page, docs/reliability.md")
+    parser.add_argument(
+        "--resume",
+        type=Path,
+        metavar="FILE",
+        help="keep outcomes there, and go on after those that were kept",
+    )
     parser.add_argument(
         "--folder", type=Path, metavar="FOLDER", help="keep the files of every attempt there (a new folder)"
     )

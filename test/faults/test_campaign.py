@@ -1,21 +1,21 @@
 """The campaign notices every way to break a promise; a few real faults are tried in each run of the tests."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from . import leftovers
+from . import command, leftovers
 from .attempt import attempt, read_outcome, write_outcome
-from .command import EXIT_USAGE, main
+from .command import EXIT_BROKEN, EXIT_OK, EXIT_USAGE, main
 from .discover import chosen, families
 from .fault import Family, Fault
 from .leftovers import MARK, end_all, of_trial
 from .outcome import NOTHING_LOST, CannotTry, Kept, Loss, Outcome, Status, require
 from .page import page
-from .runner import run_one
+from .runner import Job, run_one
 from .trial import Trial
 
 pytestmark = pytest.mark.system
@@ -24,6 +24,7 @@ SAMPLE = ("processes/controller-killed", "processes/launcher-killed")
 SEED = 3
 
 Check = Callable[[Trial, None], Kept]
+Told = Callable[[Outcome], None]
 
 
 def nothing(trial: Trial) -> None:
@@ -158,6 +159,28 @@ def test_the_page_shows_what_came_of_each() -> None:
     assert "**2 faults: 1 promises kept, 1 broken, 0 could not be tried on this machine.**" in text
     assert "| `made` | nothing | nothing | yes | nothing | 1 |" in text
     assert "| `other` | nothing | nothing | **NO**: it \\| did not | 45 ms | - |" in text
+
+
+def test_a_campaign_goes_on_after_what_was_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tried: list[str] = []
+
+    def run_all(jobs: Sequence[Job], seed: int, parallel: int, folder: object, told: Told) -> None:
+        for family, made in jobs:
+            tried.append(f"{family.name}/{made.name}")
+            status = Status.KEPT if len(tried) != 2 else Status.BROKEN
+            told(Outcome(tried[-1], status))
+
+    monkeypatch.setattr(command, "run_all", run_all)
+    arguments = ["--only", "processes/*-killed", "--resume", str(tmp_path / "outcomes")]
+    assert main(arguments) == EXIT_BROKEN
+    broken, everything = tried[1], len(tried)
+    assert main(arguments) == EXIT_OK
+    assert tried[everything:] == [broken]
+    assert f"{everything} kept, 0 BROKEN" in capsys.readouterr().out
+    assert main([*arguments, "--seed", "1"]) == EXIT_OK
+    assert len(tried) == 2 * everything + 1
 
 
 def test_wrong_names_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
