@@ -1,6 +1,6 @@
 """Whether two runs are the same, bit for bit."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -8,6 +8,16 @@ import numpy as np
 
 from sms_handover.run_data import RunData
 from sms_handover.topics import TRAJECTORY
+
+_PER_TICK = (
+    "tick_ns",
+    "joint_position",
+    "joint_velocity",
+    "joint_effort",
+    "joint_command",
+    "base_pose",
+    "base_twist",
+)
 
 
 @dataclass(frozen=True)
@@ -29,6 +39,23 @@ def compare_runs(a: RunData, b: RunData) -> tuple[Difference, ...]:
     the others from wall time too.
     """
     return tuple(_differences(a, b))
+
+
+def before(run: RunData, end_ns: int) -> RunData:
+    """Return what a run was before a time."""
+    ticks, periods = run.tick_ns < end_ns, run.reference_ns < end_ns
+    values: dict[str, Any] = {}
+    for item in fields(RunData):
+        value = getattr(run, item.name)
+        if isinstance(value, np.ndarray):
+            values[item.name] = value[ticks if item.name in _PER_TICK else periods]
+        elif isinstance(value, Mapping):
+            values[item.name] = {arm: rows[periods] for arm, rows in value.items()}
+        elif item.name in ("joint_names", "arms"):
+            values[item.name] = value
+        else:
+            values[item.name] = tuple(entry for entry in value if entry.stamp_ns < end_ns)
+    return RunData(**values)
 
 
 def _differences(a: RunData, b: RunData) -> Iterator[Difference]:

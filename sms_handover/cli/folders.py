@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,11 +10,35 @@ from pathlib import Path
 from sms_handover.errors import ConfigurationError
 
 BAG, LOGS = "bag", "log"
+_LATER_RUN = re.compile(rf"{BAG}_(\d+)")  # of a simulation that was reset
+
+
+def bags_of(path: Path) -> tuple[Path, ...]:
+    """Return the bags in the output folder of a run, or ``path`` itself if it is a bag.
+
+    There is one, or if the simulation was reset one per run, in their order.
+    """
+    if not (path / BAG).is_dir():
+        return (path,)
+    later = {int(match[1]): bag for bag in path.iterdir() if (match := _LATER_RUN.fullmatch(bag.name))}
+    return (path / BAG, *(later[number] for number in sorted(later)))
+
+
+def is_bag_of_run(name: str) -> bool:
+    """Tell whether a bag of this name is one in the output folder of a run."""
+    return name == BAG or _LATER_RUN.fullmatch(name) is not None
 
 
 def bag_of(path: Path) -> Path:
-    """Return the bag in the output folder of a run, or ``path`` itself if it is a bag."""
-    return path / BAG if (path / BAG).is_dir() else path
+    """Return the bag in the output folder of a run, or ``path`` itself if it is a bag.
+
+    Raises ConfigurationError if there are those of several runs.
+    """
+    bags = bags_of(path)
+    if len(bags) > 1:
+        names = ", ".join(map(str, bags))
+        raise ConfigurationError(f"{path} has the bags of {len(bags)} runs; name one of {names}")
+    return bags[0]
 
 
 @contextmanager

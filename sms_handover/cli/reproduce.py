@@ -4,15 +4,16 @@ import tempfile
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from sms_handover.analysis.equality import compare_runs
+from sms_handover.analysis.equality import before, compare_runs
 from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.reader import read_run
-from sms_handover.cli.folders import bag_of
+from sms_handover.cli.folders import bags_of
 from sms_handover.errors import BagError, ConfigurationError
 from sms_handover.simulation.parameters import CommonParameters
 from sms_handover.simulation.scenario import COMMON, Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.topics import CONTROLLER, IK, PLANT, TRAJECTORY
+from sms_handover.units import ns_to_seconds
 
 _NODES = (PLANT, TRAJECTORY, IK, CONTROLLER)
 _COMMON_NAMES = tuple(CommonParameters.__dataclass_fields__)
@@ -31,7 +32,15 @@ def add_parser(parser: ArgumentParser) -> None:
 
 def command(options: Namespace) -> int:
     """Carry out the command; return the exit code."""
-    bag = bag_of(options.run)
+    return max([_reproduce(bag) for bag in bags_of(options.run)])
+
+
+def _reproduce(bag: Path) -> int:
+    """Run a bag again, say what differs, and return the exit code.
+
+    A run that was reset or ended before its end is run up to where it had come; the command that would
+    have answered its last state need not have been given any more.
+    """
     with tempfile.TemporaryDirectory() as folder:
         try:
             recorded = read_run(bag)
@@ -39,13 +48,17 @@ def command(options: Namespace) -> int:
         except BagError as error:
             raise ConfigurationError(str(error)) from error  # exit code 2: what was given cannot be used
         again = simulate(scenario)
+    ended_early = 1 < recorded.tick_ns.size < again.tick_ns.size
+    if ended_early:
+        end_ns = int(recorded.tick_ns[-1])
+        recorded, again = before(recorded, end_ns), before(again, end_ns)
     differences = compare_runs(recorded, again)
     for difference in differences:
         print(difference)
     if not differences:
-        print(
-            f"the same bit for bit: {recorded.tick_ns.size} states, {recorded.reference_ns.size} references"
-        )
+        until = f", up to {ns_to_seconds(end_ns):g} s where the run was ended" if ended_early else ""
+        states, references = recorded.tick_ns.size, recorded.reference_ns.size
+        print(f"the same bit for bit: {states} states, {references} references{until}")
     return 1 if differences else 0
 
 

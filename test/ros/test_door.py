@@ -346,13 +346,15 @@ def test_bad_messages_change_no_bit_of_a_run(bench: Bench, transport: str) -> No
     told_back = f"{RUN_RECORDED}: {Reason.OLD.value}"  # the ear follows a bad state with an old stamp
     assert {kind: count for kind, count in refused(graph).items() if kind != told_back} == expected
     assert end_of(graph) == expected_end
-    bench.until(lambda: graph.heard[DIAGNOSTICS], "diagnostics")
     events = [event for event in Messages().of(graph, RUN_EVENTS) if event.kind == "refused"]
     kinds = len(expected) + sum(kind.startswith(TASK_PHASE) for kind in expected)  # two nodes take phases
     assert len([event for event in events if told_back not in event.detail]) == kinds
-    told = Messages().of(graph, DIAGNOSTICS)[-4:]
-    keys = {value.key for message in told for value in message.status[0].values}
-    assert {f"refused {kind}" for kind in expected} <= keys
+
+    def keys() -> set[str]:
+        told = Messages().of(graph, DIAGNOSTICS)
+        return {value.key for message in told for value in message.status[0].values}
+
+    bench.until(lambda: {f"refused {kind}" for kind in expected} <= keys(), "diagnostics that tell them all")
 
 
 @pytest.mark.ros

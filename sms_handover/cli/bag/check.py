@@ -9,7 +9,7 @@ from sms_handover.bag.files import recover_hint
 from sms_handover.bag.findings import CheckResult, Severity
 from sms_handover.cli.bag.progress import ProgressLine
 from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
-from sms_handover.cli.folders import bag_of
+from sms_handover.cli.folders import bags_of
 
 _MARKS = {Severity.DAMAGED: "DAMAGED", Severity.MISSING: "MISSING", Severity.NOTE: "note"}
 
@@ -29,11 +29,16 @@ def add_parser(parser: ArgumentParser) -> None:
 
 def command(options: Namespace) -> int:
     """Carry out the command; return the exit code."""
-    path = bag_of(options.bag)
-    with ProgressLine("checking") as progress:
-        result = check(path, progress)
-    print(json.dumps(_values(result), indent=2) if options.json else _text(result))
-    return EXIT_OK if result.complete else EXIT_LOSS
+    results = []
+    for path in bags_of(options.bag):
+        with ProgressLine("checking") as progress:
+            results.append(check(path, progress))
+    if options.json:
+        values = [_values(result) for result in results]
+        print(json.dumps(values if len(values) > 1 else values[0], indent=2))
+    else:
+        print("\n".join(map(_text, results)))
+    return EXIT_OK if all(result.complete for result in results) else EXIT_LOSS
 
 
 def _values(result: CheckResult) -> dict[str, object]:
