@@ -18,6 +18,7 @@ from sms_handover.ros.convert import (
     pose_message,
     stamp_ns_of,
 )
+from sms_handover.ros.endpoints import CountedPublisher
 from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.inputs import Receive
 from sms_handover.ros.main import run_node
@@ -69,7 +70,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         ahead_ns = self.common.reference_ns if self._lockstep else NS_PER_S
         self._inputs: StampSync[bytes] = StampSync(ahead_ns=ahead_ns, paced=not self._lockstep)
         self._stamp_ns = self._newest_ns = 0
-        self._answer: tuple[bytes, bytes] | None = None
+        self._answer: list[tuple[CountedPublisher, bytes]] = []
         self._failures = self._overdue = 0
         self._solver = self.inputs.asker(SolveIK, SOLVE_IK, self._on_solution)
         self._asked: tuple[RobotState, TaskPhase, Targets] | None = None
@@ -92,7 +93,8 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._inputs.begin_anew()
         self._stamp_ns = self._newest_ns = self._failures = 0
         self._overdue += self._asked is not None
-        self._answer = self._asked = None
+        self._answer = []
+        self._asked = None
 
     def diagnostic_values(self) -> dict[str, object]:
         """Return how many references were given and how many IK requests did not converge."""
@@ -197,17 +199,16 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         reference, targets_in_world = self._generator.reference(state, targets, joints)
         position, velocity = reference.position, reference.velocity
         packed = self._reference_wire.pack(state.stamp_ns, position=position, velocity=velocity)
-        self._answer = self._phase_wire.pack(phase), packed
-        self._publish_again()
+        self._answer = [(self._phase, self._phase_wire.pack(phase)), (self._reference, packed)]
         for arm, pose in targets_in_world.items():
-            self._targets[arm].publish(self._pose_wire.pack(state.stamp_ns, pose_row(pose)))
+            data = self._pose_wire.pack(state.stamp_ns, pose_row(pose))
+            self._answer.append((self._targets[arm], data))
+        self._publish_again()
 
     def _publish_again(self) -> None:
-        """Publish phase and reference, for the first time or because the plant asks again."""
-        if self._answer:
-            phase, reference = self._answer
-            self._phase.publish(phase)
-            self._reference.publish(reference)
+        """Publish what belongs to a period, for the first time or because the plant asks again."""
+        for publisher, data in self._answer:
+            publisher.publish(data)
 
 
 def _answers(answer: Any, stamp_ns: int) -> bool:

@@ -23,6 +23,8 @@ from sms_handover.topics import (
     RUN_READY,
     RUN_STATE,
     SOLVE_IK,
+    TASK_PHASE,
+    target_pose,
 )
 
 from .bench import Bench
@@ -109,6 +111,18 @@ def test_the_service_is_asked_with_the_state_it_is_about(bench: Bench) -> None:
         assert list(reference.position) == list(request.seed.position)
         assert list(request.seed.name) == list(state.name)
     assert list(requests[0].arms) == ["arm_a"]  # arm B holds its joints in the first phase
+
+
+def test_a_state_that_comes_again_is_answered_with_all_that_belongs_to_it(bench: Bench) -> None:
+    """Whoever has missed some of it, such as a controller that joined late, can go on."""
+    graph = graph_with(bench)
+    graph.run()
+    topics = (TASK_PHASE, JOINT_REFERENCE, target_pose("arm_a"), target_pose("arm_b"))
+    before = {topic: len(graph.heard[topic]) for topic in topics}
+    graph.plant._outputs.publish_loop(graph.plant._plant, with_reference=True)
+    bench.until(lambda: all(len(graph.heard[topic]) > before[topic] for topic in topics), "all of it again")
+    for topic in topics:
+        assert graph.heard[topic][-1] == graph.heard[topic][-2]
 
 
 def with_schedule(bench: Bench, text: str, parameters: dict[str, dict[str, object]] | None = None) -> None:
