@@ -62,6 +62,9 @@ docs: $(VENV)/.docs  ## build the documentation as a site, every warning an erro
 	$(BIN)/python -m pytest test/site --site $(SITE)
 	@echo "The site begins at $(SITE)/index.html"
 
+cycles: $(VENV)/.test  ## start and stop the graph 100 times: no orphan, nothing left in shared memory, no growth
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.cycles
+
 fuzz: $(VENV)/.test  ## feed broken inputs to every reader for FUZZ_SECONDS each, write docs/fuzzing.md
 	$(BIN)/python test/fuzz --seconds $(FUZZ_SECONDS) --write docs/fuzzing.md
 

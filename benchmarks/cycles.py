@@ -14,7 +14,6 @@ from argparse import ArgumentDefaultsHelpFormatter, ArgumentParser
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
@@ -69,14 +68,14 @@ def main() -> int:
 def run(output: Path, duration: float, interrupt_after_s: float | None) -> tuple[int, str]:
     """Carry out one run, cut short if wanted; return its exit code and what it said."""
     arguments = ["run", "--duration", str(duration), "--output", str(output)]
-    said = StringIO()
-    with redirect_stdout(said), redirect_stderr(said):
+    log = output.with_suffix(".txt")
+    with log.open("w", encoding="utf-8") as said, redirect_stdout(said), redirect_stderr(said):
         try:
             with interrupted(interrupt_after_s):
                 code = sms_handover(arguments)
         except KeyboardInterrupt:  # it came before the command had begun, or when it was over
             code = 130
-    return code, said.getvalue()
+    return code, log.read_text(encoding="utf-8")
 
 
 @contextmanager

@@ -218,9 +218,11 @@ class _Watch:
             self._look()
             self._memory.note((os.getpid(), *self._processes.ids.values()))
             if self._interrupts.asked:
+                if self._interrupts.at_once or not self._driver.active:
+                    raise KeyboardInterrupt
                 interrupted = min(interrupted, self._time.seconds)
                 asked = asked or self._monitor.ask_to_finish()  # it may run, and only the news be late
-                if self._interrupts.at_once or self._time.seconds - interrupted > _BEGUN_PATIENCE_S:
+                if self._time.seconds - interrupted > _BEGUN_PATIENCE_S:
                     raise KeyboardInterrupt
             if self._time.seconds > deadline:
                 why = self._driver.waiting_for or self._monitor.waiting_for()
