@@ -15,6 +15,7 @@ from argparse import ArgumentParser
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from signal import SIGINT
 from time import monotonic, sleep
 
 import matplotlib
@@ -27,12 +28,15 @@ from benchmarks.process_samples import Sample, growth, sample
 from benchmarks.results import DIAGRAMS, ROOT, Table, bullets, number
 from benchmarks.soak_schedule import write_schedule
 from sms_handover.bag.check import check
+from sms_handover.bag.findings import Severity
 from sms_handover.bag.info import read_info
 from sms_handover.ros.parent import LAUNCHER_PID
+from sms_handover.units import NS_PER_S
 
 PAGE, FIGURE = ROOT / "docs" / "soak.md", DIAGRAMS / "soak.svg"
 ALLOWED = 1e-3  # [1/min] growth of memory per minute of simulated time, of what a process holds in the middle
 _WARM_UP = 0.2  # [-] of the run, in which caches and pools fill
+_INTERRUPTED, _CUT_SHORT = 130, "the run was not finished"  # exit code of a run, finding of its bag
 _PERIOD_S = 5.0  # [s] of wall time between two looks
 _SPLIT_S = 60  # [s] of simulated time in a file of the bag
 _PROGRESS = re.compile(r"^ *([0-9.]+) of [0-9.]+ s ", re.MULTILINE)
@@ -41,8 +45,9 @@ _NODE = "sms_handover.nodes."
 
 @dataclass(frozen=True)
 class Soak:
-    """What one run has shown; samples by process."""
+    """What one run has shown; ``minutes`` of the ``asked`` ones were reached; samples by process."""
 
+    asked: float
     minutes: float
     wall_s: float
     code: int
@@ -68,8 +73,8 @@ class Soak:
 
     @property
     def whole(self) -> bool:
-        """Tell whether the run came to its end and the bag has everything."""
-        return self.code == 0 and self.lost == 0 and not self.findings
+        """Tell whether the run ended in order and the bag has everything up to its end."""
+        return self.code in (0, _INTERRUPTED) and self.lost == 0 and not self.findings
 
     def growth_of(self, process: str) -> float:
         """Return the growth of a process in MiB per simulated minute."""
@@ -98,11 +103,14 @@ def soak(minutes: float, folder: Path, more: Sequence[str]) -> Soak:
     begin = monotonic()
     with log.open("wb") as stream:
         process = subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT)
+    samples: dict[str, list[Sample]] = {}
     try:
-        samples = _watch(process, log)
+        _watch(process, log, samples)
+    except KeyboardInterrupt:
+        print("\nending the run; what it has shown so far counts", flush=True)
     finally:
         if process.poll() is None:
-            process.terminate()
+            process.send_signal(SIGINT)
         code = process.wait()
     wall_s = monotonic() - begin
     print("going through the bag", flush=True)
@@ -110,7 +118,8 @@ def soak(minutes: float, folder: Path, more: Sequence[str]) -> Soak:
     info, result = read_info(bag), check(bag)
     topics = info.ledger.topics if info.ledger else ()
     return Soak(
-        minutes=minutes,
+        asked=minutes,
+        minutes=info.end_ns / NS_PER_S / 60.0,
         wall_s=wall_s,
         code=code,
         samples={name: taken for name, taken in samples.items() if len(taken) > 2},
@@ -119,13 +128,16 @@ def soak(minutes: float, folder: Path, more: Sequence[str]) -> Soak:
         messages=info.message_count,
         lost=sum(max(0, topic.lost or 0) + topic.missing for topic in topics),
         twice=sum(topic.duplicates for topic in topics),
-        findings=[f.text for f in result.findings if f.severity.value != "note"],
+        findings=[
+            f.text
+            for f in result.findings
+            if f.severity is not Severity.NOTE and not (code == _INTERRUPTED and _CUT_SHORT in f.text)
+        ],
     )
 
 
-def _watch(process: "subprocess.Popen[bytes]", log: Path) -> dict[str, list[Sample]]:
+def _watch(process: "subprocess.Popen[bytes]", log: Path, samples: dict[str, list[Sample]]) -> None:
     """Look at the launcher and its nodes until the run is over."""
-    samples: dict[str, list[Sample]] = {}
     while process.poll() is None:
         told = _PROGRESS.findall(log.read_text(encoding="utf-8", errors="replace"))
         for name, pid in {"launcher": process.pid, **_nodes_of(process.pid)}.items():
@@ -135,7 +147,6 @@ def _watch(process: "subprocess.Popen[bytes]", log: Path) -> dict[str, list[Samp
         if told:
             print(f"{float(told[-1]):.0f} s of simulated time", flush=True)
         sleep(_PERIOD_S)
-    return samples
 
 
 def _nodes_of(launcher: int) -> dict[str, int]:
@@ -205,18 +216,19 @@ def page(result: Soak, command: str) -> str:
     parts = [
         "# Soak",
         f"""\
-`{command}` runs the graph for {result.minutes:g} minutes of simulated time in lock step, with two
+`{command}` runs the graph for {result.asked:g} minutes of simulated time in lock step, with two
 handovers a minute, and records it into files of a minute. It writes this page and exits with 1 if anything
 grows or is lost.""",
         bullets(machine()),
         f"""\
+{"" if result.code == 0 else f"This run was interrupted after {result.minutes:.1f} minutes. "}\
 **Memory is {"flat" if result.flat else "NOT flat"}; {"nothing is lost" if result.whole else "NOT whole"}.**
 {size}: {lost}, by the loss ledger over all files. {found}
 It took {result.wall_s / 60:.0f} minutes ({speed} x real time; the machine had other work too).""",
         f"![Memory of every process over simulated time](images/{FIGURE.name})",
         f"""\
 Own memory is what a process has allocated (anonymous pages): what it shares with others depends on who else
-is there. Flat means: after {result.warm_up_s / 60:g} minutes of warm-up it grows by at most
+is there. Flat means: after {result.warm_up_s / 60:.1f} minutes of warm-up it grows by at most
 {100 * ALLOWED:g} % per minute of simulated time, by the median of the slopes between any two samples (Theil
 and Sen), and the process has no more descriptors and threads in the second half than in the first. What the
 recorder holds rises with the index of the present file and falls when the next is begun.""",

@@ -28,7 +28,7 @@ def samples(own: list[float], descriptors: list[int] | None = None) -> list[Samp
 
 
 def soaked(taken: list[Sample], *, lost: int = 0, code: int = 0, findings: tuple[str, ...] = ()) -> Soak:
-    return Soak(MINUTES, 1.0, code, {"plant": taken}, 30, 1, 1, lost, 0, findings)
+    return Soak(MINUTES, MINUTES, 1.0, code, {"plant": taken}, 30, 1, 1, lost, 0, findings)
 
 
 def sizes(per_minute: float, saw: float = 0.0, noise: float = 0.0) -> list[float]:

@@ -1,6 +1,5 @@
 """A disk that is full, slow, gone or not allowed, at several moments of a run."""
 
-import re
 import shutil
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -12,13 +11,13 @@ from benchmarks.recorder_kill import Witness
 from ..ros.short_handover import short_handover
 from ..system.runs import Ended, Running
 from .fault import Fault
+from .graph_run import domain_of
 from .outcome import NOTHING_LOST, CannotTry, Kept, Loss, require
 from .promises import exit_code, lost_since, one_line, readable, refused, whole
 from .trial import Trial
 
 TITLE = "Disk and folders"
 
-_DOMAIN = re.compile(r"running on ROS domain (\d+),")
 _BOUND_MS = 50.0  # [ms] of simulated time: the plant goes no further ahead of what has been written
 _UNDER_WAY = (200_000, 900_000)  # [byte] of the bag at which a fault comes: within some seconds of a run
 _STALL_S = 3.0  # [s] of wall time for which the disk takes nothing
@@ -36,8 +35,7 @@ def schedule(trial: Trial) -> Path:
 def watched(trial: Trial, output: Path, *more: object) -> tuple[Ended, int]:
     """Run until it ends by itself; return how, and the newest state [ns] that had been published."""
     with trial.start("run", "-o", output, *more) as run:
-        run.until(lambda: _DOMAIN.search(run.text), "the domain of the run")
-        witness = Witness(int(_DOMAIN.findall(run.text)[0]))
+        witness = Witness(domain_of(run))
         try:
             while run.process.poll() is None:
                 witness.newest_ns()  # takes what has come: a reader that keeps all would hold the loop up
