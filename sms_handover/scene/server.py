@@ -12,6 +12,7 @@ from sms_handover.scene.live import LiveScene, Seen
 from sms_handover.scene.page import STREAM, live_html
 
 _HOST = "127.0.0.1"  # a page for this machine alone: nobody is asked who he is
+_NAMES = ("127.0.0.1", "localhost")  # by which a browser here asks, at any port, as one may be forwarded
 _LOOK_S = 1.0  # [s] of wall time after which a silent stream sends a sign of life
 
 FindScene = Callable[[], LiveScene | str]  # the scene, or what is still waited for
@@ -53,8 +54,11 @@ class _Handler(BaseHTTPRequestHandler):
     content: bytes
 
     def do_GET(self) -> None:
-        """Send the page, or frames as they come."""
-        if self.path == "/":
+        """Send the page, or frames as they come; nothing to a page of a site that lets its name lead here."""
+        name, _, _ = self.headers.get("Host", "").rpartition(":")
+        if name not in _NAMES:
+            self.send_error(403, f"ask for {_HOST}")
+        elif self.path == "/":
             self._head("text/html; charset=utf-8")
             self.wfile.write(self.content)
         elif self.path == f"/{STREAM}":

@@ -6,7 +6,7 @@ from dataclasses import replace
 from threading import Thread
 from typing import Any
 from urllib.error import HTTPError
-from urllib.request import urlopen
+from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
@@ -170,6 +170,25 @@ def test_the_page_is_there_and_nothing_else(server: SceneServer) -> None:
         assert b"<title>a live run</title>" in answer.read()
     with pytest.raises(HTTPError, match="404"):
         urlopen(server.address + "etc/passwd", timeout=PATIENCE_S)
+
+
+@pytest.mark.parametrize("path", ["", STREAM])
+@pytest.mark.parametrize("name", ["a.stranger.example", "127.0.0.1.example", ""])
+def test_a_site_whose_name_leads_here_gets_nothing(server: SceneServer, path: str, name: str) -> None:
+    """DNS rebinding: a browser sends the name it asked for, which no page can change."""
+    port = server.address.rstrip("/").rpartition(":")[2]
+    asked = Request(server.address + path, headers={"Host": f"{name}:{port}"})
+    with pytest.raises(HTTPError, match="403"):
+        urlopen(asked, timeout=PATIENCE_S)
+
+
+def test_a_forwarded_port_may_have_another_number(server: SceneServer) -> None:
+    with urlopen(Request(server.address, headers={"Host": "localhost:9000"}), timeout=PATIENCE_S) as answer:
+        assert answer.status == 200
+
+
+def test_it_listens_to_this_machine_alone(server: SceneServer) -> None:
+    assert server.address.startswith("http://127.0.0.1:")
 
 
 def test_as_long_as_there_is_no_scene_it_says_what_is_missing() -> None:
