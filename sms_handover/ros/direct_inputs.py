@@ -80,9 +80,11 @@ class DirectInputs(Inputs):
 
     def spin_once(self, executor: Executor, timeout_s: float, awaited: str = "") -> None:
         """Handle what has come; else sleep until ``awaited`` comes, with turns of the executor between."""
-        found = self.poll()
-        now = monotonic()
+        found, now = self.poll(), monotonic()
         if found:
+            until = min(self._serve_at, now + timeout_s)
+            while self._others and found and now < until:  # nodes of one process that answer each other
+                found, now = self.poll(), monotonic()
             self._hot_until = now + _HOT_S
             self.wakes += self._slept
             self._slept = False
