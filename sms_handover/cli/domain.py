@@ -27,15 +27,19 @@ class Reservation:
 
 
 @contextmanager
-def reservation(asked: int | None) -> Iterator[Reservation]:
+def reservation(asked: int | None, *, shared: bool = False) -> Iterator[Reservation]:
     """Hold a domain for as long as the context lasts; raises ConfigurationError if there is none.
 
     It is held by a port of this machine, one for each domain, so that it holds between all users and
     containers that share the network, and ends with the last process that has it open however that dies.
-    Without an ``asked`` domain the first is taken that no run holds and nobody takes part in.
+    Without an ``asked`` domain the first is taken that no run holds and nobody takes part in. One that is
+    asked for to be ``shared``, by launchers that each start a part of one graph, is not held.
     """
     if asked is not None and not 0 <= asked <= LAST_DOMAIN:
         raise ConfigurationError(f"domain id is {asked}, allowed is 0 to {LAST_DOMAIN}")
+    if asked is not None and shared:
+        yield Reservation(asked, ())
+        return
     with ExitStack() as stack:
         for domain in (asked,) if asked is not None else range(FIRST_DOMAIN, LAST_DOMAIN + 1):
             held = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_STREAM))

@@ -107,7 +107,10 @@ def command(options: Namespace) -> int:
     external = (CONTROLLER,) if own or options.without_controller else ()
     scenario = scenario_of(options, mode, recorded=not options.no_record, external=external)
     check_scenario(scenario)
-    with reservation(options.domain_id) as held, _output_folder(options, scenario) as (output, lock):
+    with (
+        reservation(options.domain_id, shared=bool(elsewhere)) as held,
+        _output_folder(options, scenario) as (output, lock),
+    ):
         plan = LaunchPlan(
             scenario=scenario,
             parameter_files=tuple(path.resolve() for path in options.params_file),

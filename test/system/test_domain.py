@@ -78,6 +78,11 @@ def test_a_domain_that_was_asked_for_is_refused_while_a_run_holds_it() -> None:
         assert again == domain
 
 
+def test_the_parts_of_one_graph_share_a_domain() -> None:
+    with reserved_domain(None) as domain, reservation(domain, shared=True) as one:
+        assert one.domain == domain
+
+
 @pytest.mark.parametrize("asked", [-1, LAST_DOMAIN + 1])
 def test_a_domain_out_of_range_is_refused(asked: int) -> None:
     with pytest.raises(ConfigurationError, match=f"domain id is {asked}, allowed is 0 to 101"):
