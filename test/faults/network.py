@@ -173,12 +173,7 @@ FAULTS = (
         name="real-time-delay",
         injected="3 ms of delay on every cable between controller and plant, in real time",
         promise="exit code 0, the last line tells the ticks that held an old command, the bag is whole",
-        inject=partial(
-            split,
-            ("plant,trajectory,ik", "controller,recorder"),
-            partial(bad, {"delay": 3 * _MS}),
-            ("--real-time",),
-        ),
+        inject=partial(split, _APART, partial(bad, {"delay": 3 * _MS}), ("--real-time",)),
         check=told_and_whole,
         timeout_s=600.0,
     ),
