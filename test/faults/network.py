@@ -97,7 +97,8 @@ def gives_up(trial: Trial, seen: Sequence[Ended]) -> Kept:
     """Require that every command ended with 1 and says why, and that the bag was closed."""
     for ended in seen:
         exit_code(ended, 1)
-        require("Traceback" not in ended.err and "error:" in ended.err, f"no error told: {ended.err[-200:]}")
+        told = "error: no progress" in ended.err or "nothing has come on" in ended.err
+        require(told and "Traceback" not in ended.err, f"no reason told: {ended.err[-200:]}")
     return closed(trial.folder / f"host{len(seen)}" / "bag", seen[-1])
 
 
