@@ -1,7 +1,7 @@
 """Where in the schedule a run is, with phases that are done again or given up."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import nan
 
 from sms_handover.events import GRASP_FAILED, GRASP_MISSED, IK_FAILED, PHASE_RETRIED, RunEvent, Severity
@@ -23,6 +23,25 @@ class Stage:
     start_ns: int
     targets: Mapping[str, ArmTarget]
     begins: bool
+
+
+@dataclass
+class _Issue:
+    """The commands that a phase has given, and what has become known of them."""
+
+    index: int
+    commands: tuple[GraspCommand, ...]
+    answers: dict[GraspCommand, GraspEvent] = field(default_factory=dict)
+
+    @property
+    def answered(self) -> bool:
+        """Tell whether it is known of every command what came of it."""
+        return len(self.answers) == len(self.commands)
+
+    @property
+    def missed(self) -> list[GraspEvent]:
+        """Return what came of those commands that did not succeed."""
+        return [event for event in self.answers.values() if event.status is not GraspStatus.SUCCEEDED]
 
 
 class TaskProgress:
@@ -51,19 +70,21 @@ class TaskProgress:
         self._due = [phase.commands for phase in phases]
         self._begun = [0 for _ in phases]
         self._retries = [0 for _ in phases]
-        self._issued: tuple[GraspCommand, ...] = ()
-        self._answers: dict[GraspCommand, GraspEvent] = {}
+        self._issues: list[_Issue] = []
         self._ik_failures = 0
         self._decisions: list[RunEvent] = []
 
     @property
     def awaits_grasps(self) -> bool:
         """Tell whether a command has been given of which it is not known yet what came of it."""
-        return len(self._answers) < len(self._issued)
+        return any(not issue.answered for issue in self._issues)
 
     def grasped(self, events: Iterable[GraspEvent]) -> None:
-        """Take what came of the commands that were given last."""
-        self._answers.update((event.command, event) for event in events if event.command in self._issued)
+        """Take what came of commands; in real time that may be after the next phase has begun."""
+        for event in events:
+            issue = next((i for i in self._issues if event.command in i.commands and not i.answered), None)
+            if issue is not None:
+                issue.answers[event.command] = event
 
     def solved(self, *, converged: bool) -> None:
         """Take how inverse kinematics ended for the targets that were given last."""
@@ -94,28 +115,31 @@ class TaskProgress:
     def _begin(self, index: int) -> tuple[GraspCommand, ...]:
         """Begin a phase and return its commands that are still due."""
         self._begun[index] += 1
-        self._issued, self._due[index] = self._due[index], ()
-        self._answers = {}
+        commands, self._due[index] = self._due[index], ()
+        if commands:
+            self._issues.append(_Issue(index, commands))
         self._ik_failures = 0
-        return self._issued
+        return commands
 
     def _decide(self, stamp_ns: int) -> None:
         """Decide about grasps that did not succeed, and about targets that cannot be reached."""
         if self._now is None:
             return
         index = self._now[0]
-        if self._issued and not self.awaits_grasps:
-            missed = [e for e in self._answers.values() if e.status is not GraspStatus.SUCCEEDED]
-            if missed:
-                self._on_miss(stamp_ns, index, missed)
-            self._issued, self._answers = (), {}
-        elif 0 < self._most_ik_failures <= self._ik_failures:
+        for issue in [issue for issue in self._issues if issue.answered]:
+            if issue in self._issues and not self._failed:
+                self._issues.remove(issue)
+                self._on_answers(stamp_ns, issue)
+        if not self._failed and 0 < self._most_ik_failures <= self._ik_failures:
             detail = "inverse kinematics has not converged so many times in a row; the joints are held"
             figures = (self._ik_failures, self._most_ik_failures, "reference periods")
             self._fail(stamp_ns, index, IK_FAILED, detail, figures)
 
-    def _on_miss(self, stamp_ns: int, index: int, missed: list[GraspEvent]) -> None:
-        """Do what the phase says about commands that did not succeed."""
+    def _on_answers(self, stamp_ns: int, issue: "_Issue") -> None:
+        """Do what a phase says about its commands that did not succeed, if there are any."""
+        index, missed = issue.index, issue.missed
+        if not missed:
+            return
         phase, what = self._schedule.phases[index], _in_words(missed[0])
         policy, done = phase.on_miss, self._retries[index]
         can_be_mended = any(event.status is GraspStatus.MISSED for event in missed)
@@ -125,6 +149,7 @@ class TaskProgress:
             before = self._schedule.phases[index - 1]
             self._retries[index] += 1
             self._due[index] = tuple(event.command for event in missed)
+            self._take_back()
             self._shift_ns = stamp_ns - before.start_ns
             self._end_ns = self._schedule.end_ns + self._shift_ns
             detail = f"{what}; phase {before.name!r} is done again"
@@ -139,6 +164,13 @@ class TaskProgress:
         else:
             detail = f"{what}; the joints are held"
             self._fail(stamp_ns, index, GRASP_FAILED, detail, (done + 1, policy.retries + 1, "misses"))
+
+    def _take_back(self) -> None:
+        """Have the commands of later phases, begun before it was known that a grasp missed, due again."""
+        for later in self._issues:
+            succeeded = {c for c, e in later.answers.items() if e.status is GraspStatus.SUCCEEDED}
+            self._due[later.index] = tuple(c for c in later.commands if c not in succeeded)
+        self._issues.clear()
 
     def _fail(self, stamp_ns: int, index: int, kind: str, detail: str, figures: Figures) -> None:
         """Give the task up."""

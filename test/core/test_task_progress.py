@@ -206,6 +206,23 @@ def test_an_answer_is_waited_for_and_others_are_no_answer(make_scenario: MakeSce
     assert progress.at(440_000_000).task.state is PhaseState.FAILED
 
 
+def test_an_answer_that_comes_in_the_next_phase_still_counts(make_scenario: MakeScenario) -> None:
+    """In real time on a busy machine: the retry then takes back what the later phase has asked for."""
+    text = SCHEDULE.replace("  - name: carry\n", "  - name: carry\n    on_miss: {retry: 1}\n")
+    scenario = make_scenario(text)
+    progress = TaskProgress(scenario.schedule, scenario.parameters.trajectory)
+    (grasp,), (transfer,) = (phase.commands for phase in scenario.schedule.phases[1:3])
+    for stamp_ns in (0, 400_000_000, 1_000_000_000):
+        progress.at(stamp_ns)
+    progress.grasped([GraspEvent(0, grasp, MISSED, 0.0, 0.0, 0.0, "")])
+    again = progress.at(1_020_000_000)
+    assert (again.task.name, again.task.attempt, again.task.commands) == ("approach", 2, ())
+    assert not progress.awaits_grasps  # of the transfer nothing is waited for any more
+    assert progress.at(1_420_000_000).task.commands == (grasp,)
+    progress.grasped([GraspEvent(0, grasp, SUCCEEDED, 0.0, 0.0, 0.0, "")])
+    assert progress.at(2_020_000_000).task.commands == (transfer,)
+
+
 @pytest.mark.parametrize("most", [1, 4])
 def test_targets_out_of_reach_for_too_long_fail_the_phase(walk: WalkWith, most: int) -> None:
     """From 0.6 s on nothing converges; the n-th failure is known one period after it."""
