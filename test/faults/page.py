@@ -24,7 +24,9 @@ def page(families: Sequence[Family], outcomes: Sequence[Outcome], seed: int) -> 
         "recovered. [`test/faults`](../test/faults/fault.py) tells how a fault is added, "
         "`python test/faults --help` how to try some alone.",
         f"**{len(outcomes)} faults: {count[Status.KEPT]} promises kept, {count[Status.BROKEN]} broken, "
-        f"{count[Status.NOT_TRIED]} could not be tried on this machine.** {_losses(outcomes)}",
+        f"{count[Status.NOT_TRIED]} could not be tried on this machine.**"
+        f"{_not_tried(families, len(outcomes))} "
+        f"{_losses(outcomes)}",
         "\n".join(f"- {line}" for line in (*machine(), f"Seed: {seed}")),
         "*Data lost* is against what had been published: messages, and simulated time in ms; `-` where the "
         "fault has no data to lose, or nobody knows how much was published.",
@@ -54,8 +56,18 @@ def _row(name: str, injected: str, promise: str, outcome: Outcome) -> tuple[str,
 
 
 def _losses(outcomes: Iterable[Outcome]) -> str:
-    """Return the largest loss in a sentence."""
-    kept = [outcome.lost for outcome in outcomes if outcome.status is Status.KEPT]
-    worst_ms = max((loss.ms for loss in kept if loss.ms is not None), default=0.0)
-    nothing = sum(str(loss) == "nothing" for loss in kept)
-    return f"Nothing was lost in {nothing} of them, at most {worst_ms:g} ms of simulated time in the others."
+    """Return the largest losses, and what was left in shared memory, in sentences."""
+    kept = [outcome for outcome in outcomes if outcome.status is Status.KEPT]
+    nothing = sum(str(outcome.lost) == "nothing" for outcome in kept)
+    worst_ms = max((outcome.lost.ms for outcome in kept if outcome.lost.ms is not None), default=0.0)
+    told = f"Nothing was lost in {nothing} of them, at most {worst_ms:g} ms of simulated time in the others"
+    if any(outcome.lost.messages for outcome in kept):
+        told += "; bags that were damaged on purpose lost what the damage had hit"
+    left = max((outcome.shared_memory or 0 for outcome in outcomes), default=0)
+    return f"{told}. At most {left / 2**20:.1f} MiB were left in shared memory, by what was killed."
+
+
+def _not_tried(families: Sequence[Family], tried: int) -> str:
+    """Return how many faults this run has left out, '' if none."""
+    left_out = sum(len(family.faults) for family in families) - tried
+    return f" {left_out} more were left out of this run." if left_out else ""
