@@ -1,0 +1,75 @@
+"""A run that is reset under the launcher: the second run has the same bits, and each run a bag of its own."""
+
+import random
+import re
+from pathlib import Path
+
+import pytest
+import rclpy
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from std_srvs.srv import Trigger
+
+from sms_handover.analysis.equality import before, compare_runs
+from sms_handover.bag.reader import read_run
+from sms_handover.run_data import RunData
+from sms_handover.topics import NODES, PLANT
+
+from .conftest import LAWS, TICKS
+from .runs import running, sms_handover
+
+pytestmark = [pytest.mark.system, pytest.mark.slow]
+
+_DOMAIN = re.compile(r"running on ROS domain (\d+),")
+_SEED = 6
+_SIZE = 30_000  # bytes of a bag that hold some ten ticks at least
+
+
+def reset_agreed(domain: int) -> bool:
+    """Ask for a reset, as `ros2 service call /plant/reset` does, and tell whether the plant has agreed."""
+    rclpy.init(domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = Node("tester", start_parameter_services=False)
+        client = node.create_client(Trigger, f"{PLANT}/reset")
+        assert client.wait_for_service(timeout_sec=60.0)
+        asked = client.call_async(Trigger.Request())
+        rclpy.spin_until_future_complete(node, asked, timeout_sec=60.0)
+        node.destroy_node()
+        return bool(asked.result().success)
+    finally:
+        rclpy.try_shutdown()
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_second_run_has_the_same_bits_and_a_bag_of_its_own(
+    law: str, simulated: dict[str, RunData], schedule: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first run is reset at a random place; no process is started again."""
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    arguments = ("run", "--controller", law, "--schedule", schedule, "-o", "mine")
+    size = random.Random(f"{_SEED} {law}").randrange(_SIZE, 8 * _SIZE)
+    with running(*arguments, cwd=tmp_path) as run:
+        run.until_all_nodes(NODES)
+        processes = dict(run.nodes)
+        run.until_recorded(tmp_path / "mine" / "bag", size)
+        said = _DOMAIN.search(run.text)
+        assert said
+        assert reset_agreed(int(said[1]))
+        assert run.end() == 0, run.text
+        assert run.nodes == processes
+    first, second = (read_run(tmp_path / "mine" / name) for name in ("bag", "bag_2"))
+    end_ns = int(first.tick_ns[-1])
+    assert 10 < first.tick_ns.size < TICKS
+    assert compare_runs(before(first, end_ns), before(simulated[law], end_ns)) == ()
+    assert compare_runs(second, simulated[law]) == ()
+    checked = sms_handover("bag", "check", "mine", cwd=tmp_path)
+    assert checked.code == 0, checked
+    assert checked.out.count(" is complete: ") == 2
+    again = sms_handover("reproduce", "mine", cwd=tmp_path)
+    assert again.code == 0, again
+    assert "where the run was ended" in again.out.splitlines()[0]
+    assert again.out.splitlines()[1].startswith(f"the same bit for bit: {TICKS} states")
+    compared = sms_handover("compare", "mine/bag_2", cwd=tmp_path)
+    assert compared.code == 0 and "mine_2" in compared.out, compared
+    ambiguous = sms_handover("bag", "info", "mine", cwd=tmp_path)
+    assert ambiguous.code and "has the bags of 2 runs" in ambiguous.err
