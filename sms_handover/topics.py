@@ -87,6 +87,8 @@ CLOCK = "/clock"
 DIAGNOSTICS = "/diagnostics"
 TF = "/tf"  # written into the bag by the recorder; tf2_msgs cannot be imported everywhere
 
+REFUSED_TOPIC = "/refused"  # ends the topic of a bag with what others published where one alone is to
+
 SOLVE_IK = "solve_ik"  # service of the ik node
 
 _OURS = "sms_handover_interfaces/msg"

@@ -17,7 +17,7 @@ from sms_handover.bag.provenance import provenance
 from sms_handover.bag.recording import Recording
 from sms_handover.bag.run_recordings import RunRecordings
 from sms_handover.bag.transforms import TF_TYPE, TransformsWire
-from sms_handover.errors import BagError, ConfigurationError, SmsHandoverError
+from sms_handover.errors import BagError, ConfigurationError, GraphError, MessageError, SmsHandoverError
 from sms_handover.frames import BASE, DEPUTY, WORLD
 from sms_handover.model.link_tree import LinkTree
 from sms_handover.ros.convert import time_message
@@ -28,6 +28,7 @@ from sms_handover.ros.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, Stop, run_no
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.peer_parameters import PeerParameters
 from sms_handover.ros.qos import LOSSLESS, profile_of, stored, weakest
+from sms_handover.ros.sender import Sender
 from sms_handover.ros.stamp_sync import StampSync
 from sms_handover.ros.wire import PoseWire, StateWire, arrival_ns, check_stamp, decoded
 from sms_handover.simulation.parameters import LOCKSTEP
@@ -38,6 +39,7 @@ from sms_handover.topics import (
     JOINT_STATES,
     PLANT,
     RECORDER,
+    REFUSED_TOPIC,
     RUN_PUBLISHED,
     RUN_RECORDED,
     SAMPLED_BASE_ODOMETRY,
@@ -236,15 +238,47 @@ class RecorderNode(GraphNode[RecorderParameters]):
             SAMPLED_BASE_ODOMETRY: (partial(self._add_to_tf, topic.name), self._state_wire.odometry.check),
             DEPUTY_POSE: (partial(self._add_to_tf, topic.name), self._pose_wire.check),
         }
-        if topic.name not in uses:
-            return lambda data, sent_ns, number: record(data, sent_ns)
-        use = self.refusals.guarding(topic.name, *uses[topic.name], self.endpoints.sender(topic.name))
+        use = self.refusals.guarding(topic.name, *uses[topic.name]) if topic.name in uses else None
+
+        def receive(data: bytes, sent_ns: int) -> None:
+            record(data, sent_ns)
+            if use is not None:
+                use(data, sent_ns, 0)
+
+        sender = None if topic.name.startswith("/") else self.endpoints.sender(topic.name)
+        if sender is None:
+            return lambda data, sent_ns, number: receive(data, sent_ns)
 
         def deliver(data: bytes, sent_ns: int, number: int) -> None:
-            record(data, sent_ns)
-            use(data, sent_ns, number)
+            if (
+                not number
+                or (number == sender.due and not sender.contested)
+                or self._is_own(topic, sender, number)
+            ):
+                sender.due = number + 1
+                receive(data, sent_ns)
+            else:
+                self._record_refused(topic, data, sent_ns)
 
         return deliver
+
+    def _is_own(self, topic: Topic, sender: Sender, number: int) -> bool:
+        """Tell whether a message of this number is from the topic's own publisher."""
+        try:
+            sender.require(number)
+        except MessageError as error:
+            self.refusals.add(topic.name, error)
+            return False
+        except GraphError:  # those that use the messages end the run
+            return False
+        return True
+
+    def _record_refused(self, topic: Topic, data: bytes, sent_ns: int) -> None:
+        """Record a message of another publisher on a topic of its own, so that it passes for nothing else."""
+        name = self.resolve_topic_name(topic.name) + REFUSED_TOPIC
+        if name not in self._topics:
+            self._open(name, topic.type, profile_of(topic), 0)
+        self._receive_anyway(name, data, sent_ns)
 
     def _open(self, name: str, type_name: str, profile: QoSProfile, period_ns: int) -> None:
         """Open a topic in the bag."""
