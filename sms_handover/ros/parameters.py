@@ -5,10 +5,11 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
-from sms_handover.errors import UnknownNameError
+from sms_handover.errors import ConfigurationError, UnknownNameError
 from sms_handover.parameters import ParameterSpec, build, defaults_of, read_parameter_files, spec_of
 from sms_handover.share import config_file
 
@@ -16,7 +17,8 @@ T = TypeVar("T")
 
 _LARGEST = 1.7976931348623157e308  # [-] stands for "no upper bound" in a range message
 _LARGEST_INT = 2**63 - 1  # [-]
-_ROS_OWN = ("use_sim_time", "start_type_description_service")
+_SIMULATED_TIME = "use_sim_time"
+_ROS_OWN = (_SIMULATED_TIME, "start_type_description_service")
 
 
 def declare(node: Node, cls: type[T], file: str | None, section: str) -> T:
@@ -40,11 +42,22 @@ def declare(node: Node, cls: type[T], file: str | None, section: str) -> T:
 
 
 def refuse_unknown(node: Node, *groups: type[object]) -> None:
-    """Raise UnknownNameError if the node was given a parameter that none of its groups has."""
+    """Raise UnknownNameError on a parameter that no group has; refuse changes from now on."""
     known = [item.name for cls in groups for item in fields(cls)]  # type: ignore[arg-type]
     for name in node.get_parameters_by_prefix(""):
         if name not in known and not name.startswith((*_ROS_OWN, "qos_overrides.")):
             raise UnknownNameError("parameter", name, known, node.get_name())
+    if node.has_parameter(_SIMULATED_TIME) and node.get_parameter(_SIMULATED_TIME).value:
+        raise ConfigurationError(
+            f"{node.get_name()}: parameter {_SIMULATED_TIME!r} is true, allowed is false: it has no clock"
+        )
+    node.add_on_set_parameters_callback(_refuse_change)
+
+
+def _refuse_change(parameters: list[Parameter]) -> SetParametersResult:
+    """Refuse to change a parameter of a node that runs: a run is made with what its bag says."""
+    names = ", ".join(parameter.name for parameter in parameters)
+    return SetParametersResult(successful=False, reason=f"{names}: set it when the node is started")
 
 
 def as_arguments(values: Mapping[str, object], node: str = "") -> list[str]:

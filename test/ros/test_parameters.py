@@ -227,3 +227,19 @@ def test_arguments_arrive_as_they_were(bench: Bench, name: str, value: object) -
 
 def test_paths_are_written_as_text() -> None:
     assert as_arguments({"folder": Path("/a b/it's"), "x": 1}) == ["-p", "folder:='/a b/it''s'", "-p", "x:=1"]
+
+
+def test_nothing_changes_while_a_node_runs(bench: Bench) -> None:
+    """Not the parameter of ROS itself either, which would stop the timers."""
+    controller(bench)
+    (node,) = bench._nodes
+    refuse_unknown(node, ControllerParameters)
+    for change in (Parameter("use_sim_time", value=True), Parameter("law", value="pid")):
+        (result,) = node.set_parameters([change])
+        assert not result.successful and change.name in result.reason
+
+
+def test_simulated_time_is_refused(bench: Bench) -> None:
+    bench.start({CONTROLLER: {"use_sim_time": True}})
+    with pytest.raises(ConfigurationError, match="'use_sim_time' is true, allowed is false"):
+        refuse_unknown(node_of(bench))
