@@ -25,8 +25,8 @@ from sms_handover.topics import (
 
 from ..system.runs import Ended
 from .fault import Fault
+from .graph_run import domain_of, under_way
 from .outcome import Kept, require
-from .processes import domain_of, under_way
 from .promises import refused, whole
 from .trial import Trial
 
