@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
@@ -51,13 +52,13 @@ def refuse_unknown(node: Node, *groups: type[object]) -> None:
         raise ConfigurationError(
             f"{node.get_name()}: parameter {_SIMULATED_TIME!r} is true, allowed is false: it has no clock"
         )
-    node.add_on_set_parameters_callback(_refuse_change)
+    node.add_on_set_parameters_callback(partial(_refuse_change, node))
 
 
-def _refuse_change(parameters: list[Parameter]) -> SetParametersResult:
-    """Refuse to change a parameter of a node that runs: a run is made with what its bag says."""
-    names = ", ".join(parameter.name for parameter in parameters)
-    return SetParametersResult(successful=False, reason=f"{names}: set it when the node is started")
+def _refuse_change(node: Node, parameters: list[Parameter]) -> SetParametersResult:
+    """Refuse to change a parameter that a node has: a run is made with what its bag says."""
+    names = ", ".join(parameter.name for parameter in parameters if node.has_parameter(parameter.name))
+    return SetParametersResult(successful=not names, reason=f"{names}: set it when the node is started")
 
 
 def as_arguments(values: Mapping[str, object], node: str = "") -> list[str]:

@@ -14,7 +14,8 @@ from .bag_damage import chunks_of, write_file
 from .test_bag_check import write_finished
 
 # three topics each tick, eleven each reference period, and what comes once in a run
-MESSAGES = 3 * 201 + 11 * 11 + len(("description", "state", "grasp", "transfer", *LOOP_NODES))
+ONCE = ("description", "state", "grasp", "transfer", "decision", "another decision", *LOOP_NODES)
+MESSAGES = 3 * 201 + 11 * 11 + len(ONCE)
 
 
 @pytest.fixture
