@@ -64,10 +64,12 @@ def _refuse_change(node: Node, parameters: list[Parameter]) -> SetParametersResu
 def as_arguments(values: Mapping[str, object], node: str = "") -> list[str]:
     """Return command-line arguments that set parameters: ``-p name:=value`` of every node of a process.
 
-    With ``node`` they are those of one node of the process: ``-p node:name:=value``.
+    With ``node`` they are those of one node of the process: ``-p node:name:=value``. A list without
+    entries is left out: ROS cannot read one, and every list of this package is empty unless it is given.
     """
     of = f"{node}:" if node else ""
-    return [part for name, value in values.items() for part in ("-p", f"{of}{name}:={_yaml(value)}")]
+    said = {name: value for name, value in values.items() if value not in ([], ())}
+    return [part for name, value in said.items() for part in ("-p", f"{of}{name}:={_yaml(value)}")]
 
 
 def _yaml(value: object) -> str:

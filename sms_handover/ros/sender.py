@@ -7,6 +7,9 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from sms_handover.errors import GraphError, MessageError, Reason
 
+# The name that a publisher has as long as discovery has not told its node; its messages may be here by then.
+_NAMELESS = "_NODE_NAME_UNKNOWN_"
+
 
 class Sender:
     """The one publisher whose messages on a topic count.
@@ -50,7 +53,8 @@ class Sender:
         if others:
             self._others = ", ".join(repr(_name(endpoint)) for endpoint in others)
             self._refuse(number)
-        known, self._own = self._own, tuple(own[0].endpoint_gid) if own else self._own
+        named = [endpoint for endpoint in own if endpoint.node_name != _NAMELESS]
+        known, self._own = self._own, tuple(named[0].endpoint_gid) if named else self._own
         if number < self.due and known == self._own:
             self._others = "that is gone again"
             self._refuse(number)
@@ -70,6 +74,7 @@ class Sender:
         there = self._node.get_publishers_info_by_topic(self._topic)
         own = [endpoint for endpoint in there if tuple(endpoint.endpoint_gid) == self._own]
         own = own or [endpoint for endpoint in there if endpoint.node_name in self._peers]
+        own = own or [endpoint for endpoint in there if endpoint.node_name == _NAMELESS]
         return own[:1], [endpoint for endpoint in there if endpoint not in own[:1]]
 
 

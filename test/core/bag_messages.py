@@ -126,9 +126,9 @@ def task_phase(phase: TaskPhase) -> Any:
         index=phase.index,
         name=phase.name,
         commands=[grasp_command(command) for command in phase.commands],
-        state=0,
-        attempt=1,
-        end=TYPES.make("builtin_interfaces/msg/Time", sec=60, nanosec=0),
+        state=int(phase.failed),
+        attempt=phase.attempt,
+        end=header(phase.end_ns).stamp,
     )
 
 

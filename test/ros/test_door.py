@@ -184,6 +184,13 @@ def test_a_publisher_made_anew_is_taken() -> None:
     assert topic.refusals.counts == {}
 
 
+def test_messages_may_come_before_the_name_of_their_publisher() -> None:
+    topic = Topic(_NODE_NAME_UNKNOWN_=1)
+    assert topic.come(1, 2) == [1, 2]
+    topic.graph.publishers = {"controller": 1, "intruder": 2}
+    assert topic.come(3, 1, 4) == [3, 4]
+
+
 def test_nobody_is_taken_before_it_is_clear_who_counts() -> None:
     topic = Topic(controller=1, intruder=2)
     assert topic.come(1, 2) == []
