@@ -2,8 +2,8 @@
 /* One run in the picture: its solids, frames and traces, placed at any time from the recorded poses. */
 
 const COLOURS = { // [-] of arms in order, of the deputy, of edges; chosen apart for colour-blind eyes too
-  light: { arms: [0xd2601a, 0x1c74b8, 0x8a5a9e, 0x4b8b3b], deputy: 0x0f9d6b, edge: 0x1d2530, start: 0x69788c },
-  dark: { arms: [0xff9a4d, 0x58b4ff, 0xc79be0, 0x93d07f], deputy: 0x2fe0a0, edge: 0x05080f, start: 0x8ea2bd },
+  light: { arms: [0x1c74b8, 0xd2601a, 0x8a5a9e, 0x4b8b3b], deputy: 0x0f9d6b, edge: 0x1d2530, start: 0x69788c },
+  dark: { arms: [0x58b4ff, 0xff9a4d, 0xc79be0, 0x93d07f], deputy: 0x2fe0a0, edge: 0x05080f, start: 0x8ea2bd },
 };
 const GHOST_OPACITY = 0.3;
 const EDGE_ANGLE = 30; // degrees between two faces from which on their common edge is drawn
