@@ -61,10 +61,13 @@ class Tool:
         """Prepare to ask the node of a name."""
         self._bench, self._name = bench, name
         self._node = bench.plain(f"tool_of_{name}")
+        self._clients: dict[str, Any] = {}  # each is found once, which takes the middleware a while
 
     def call(self, service: str, kind: Any, **values: Any) -> Any:
         """Return the answer of one of its services."""
-        client = self._node.create_client(kind, f"{self._name}/{service}")
+        if service not in self._clients:
+            self._clients[service] = self._node.create_client(kind, f"{self._name}/{service}")
+        client = self._clients[service]
         self._bench.until(client.service_is_ready, f"{service} of {self._name}")
         return self._bench.result(client.call_async(kind.Request(**values)), f"{service} of {self._name}")
 
