@@ -57,8 +57,8 @@ def add_parser(parser: ArgumentParser) -> None:
     group.add_argument(
         "--compose",
         action="store_true",
-        help="run nodes that wait for each other in one process, which is several times as fast: in lock "
-        "step plant, trajectory, ik and controller, in real time plant and controller",
+        help="run nodes that wait for each other in one process, which is two to three times as fast: in "
+        "lock step plant, trajectory, ik and controller, in real time plant and controller",
     )
     controller = group.add_mutually_exclusive_group()
     controller.add_argument(
