@@ -1,7 +1,9 @@
 """A run that is reset under the launcher: the second run has the same bits, and each run a bag of its own."""
 
+import os
 import random
 import re
+import signal
 from pathlib import Path
 
 import pytest
@@ -13,10 +15,10 @@ from std_srvs.srv import Trigger
 from sms_handover.analysis.equality import before, compare_runs
 from sms_handover.bag.reader import read_run
 from sms_handover.run_data import RunData
-from sms_handover.topics import NODES, PLANT
+from sms_handover.topics import CONTROLLER, NODES, PLANT
 
 from .conftest import LAWS, TICKS
-from .runs import running, sms_handover
+from .runs import DEADLINE_S, Running, running, sms_handover
 
 pytestmark = [pytest.mark.system, pytest.mark.slow]
 
@@ -25,15 +27,22 @@ _SEED = 6
 _SIZE = 30_000  # bytes of a bag that hold some ten ticks at least
 
 
-def reset_agreed(domain: int) -> bool:
-    """Ask for a reset, as `ros2 service call /plant/reset` does, and tell whether the plant has agreed."""
-    rclpy.init(domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+def reset_agreed(run: Running) -> bool:
+    """Ask for a reset, as `ros2 service call /plant/reset` does, and tell whether the plant has agreed.
+
+    Until the plant has been found, which can take longer than the run, the run is held by its controller.
+    """
+    said = _DOMAIN.search(run.text)
+    assert said
+    os.kill(run.nodes[CONTROLLER], signal.SIGSTOP)
+    rclpy.init(domain_id=int(said[1]), signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = Node("tester", start_parameter_services=False)
         client = node.create_client(Trigger, f"{PLANT}/reset")
-        assert client.wait_for_service(timeout_sec=60.0)
+        assert client.wait_for_service(timeout_sec=DEADLINE_S)
+        os.kill(run.nodes[CONTROLLER], signal.SIGCONT)
         asked = client.call_async(Trigger.Request())
-        rclpy.spin_until_future_complete(node, asked, timeout_sec=60.0)
+        rclpy.spin_until_future_complete(node, asked, timeout_sec=DEADLINE_S)
         node.destroy_node()
         return bool(asked.result().success)
     finally:
@@ -52,9 +61,7 @@ def test_a_second_run_has_the_same_bits_and_a_bag_of_its_own(
         run.until_all_nodes(NODES)
         processes = dict(run.nodes)
         run.until_recorded(tmp_path / "mine" / "bag", size)
-        said = _DOMAIN.search(run.text)
-        assert said
-        assert reset_agreed(int(said[1]))
+        assert reset_agreed(run)
         assert run.end() == 0, run.text
         assert run.nodes == processes
     first, second = (read_run(tmp_path / "mine" / name) for name in ("bag", "bag_2"))
