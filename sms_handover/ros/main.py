@@ -17,6 +17,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from sms_handover.errors import ConfigurationError, SmsHandoverError
+from sms_handover.ros.launcher_watch import LauncherWatch
 from sms_handover.ros.parent import LAUNCHER_PID, launcher_of_this_process, wake_when_parent_ends
 from sms_handover.ros.reach import settle_reach
 from sms_handover.ros.transports import avoid_full_shared_memory
@@ -28,7 +29,7 @@ EXIT_STOPPED = 130  # the recorder: the bag is whole, but the run was not over w
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 WAIT_S = 0.2  # [s] longest wait for an event, so that a signal is noticed
 
-_TEARDOWN_S = 15.0  # [s] of wall time for the middleware to let go; less than a launcher waits
+_TEARDOWN_S = 15  # [s] of wall time for the middleware to let go; less than a launcher waits
 _STANDARD_ERROR = 2  # file descriptor, whatever stands in for the stream
 
 
@@ -38,9 +39,10 @@ class Stop:
     def __init__(self) -> None:
         """Install the handlers; a hang-up that is ignored, as under nohup(1), stays ignored."""
         self._signalled = False
-        self._launcher = launcher_of_this_process()
-        if self._launcher:
+        self._watch = None
+        if launcher := launcher_of_this_process():
             wake_when_parent_ends()
+            self._watch = LauncherWatch(launcher)
         for number in _SIGNALS:
             if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, self._on_signal)
@@ -48,7 +50,7 @@ class Stop:
     @property
     def asked(self) -> bool:
         """Tell whether this process is to end."""
-        return self._signalled or (self._launcher != 0 and os.getppid() != self._launcher)
+        return self._signalled or (self._watch is not None and self._watch.launcher_is_gone)
 
     def _on_signal(self, number: int, frame: object) -> None:
         self._signalled = True
@@ -98,7 +100,7 @@ def run_nodes(makes: Sequence[Callable[[], RunnableNode]], arguments: list[str],
     the wheels of rclpy 7.1.
     """
     stop = Stop()
-    atexit.register(_ignore_signals)
+    atexit.register(_leave)
     nodes: list[RunnableNode] = []
     executor = None
     try:
@@ -147,10 +149,15 @@ def _tell(name: str, error: SmsHandoverError) -> None:
     print(f"{name}: error: {str(error).removeprefix(f'{name}: ')}", file=sys.stderr)
 
 
-def _ignore_signals() -> None:
-    """Keep the exit code: a second signal while the interpreter ends would otherwise kill the process."""
+def _leave() -> None:
+    """Keep the exit code and come to an end: what the interpreter calls last.
+
+    A second signal while the interpreter ends would otherwise kill the process, and the middleware,
+    which takes down the rest of itself after Python, can hang there: then SIGALRM ends the process.
+    """
     for number in _SIGNALS:
         signal.signal(number, signal.SIG_IGN)
+    signal.alarm(_TEARDOWN_S)
 
 
 def _init(args: list[str]) -> None:

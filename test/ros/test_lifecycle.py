@@ -68,8 +68,10 @@ class Tool:
         if service not in self._clients:
             self._clients[service] = self._node.create_client(kind, f"{self._name}/{service}")
         client = self._clients[service]
-        self._bench.until(client.service_is_ready, f"{service} of {self._name}")
-        return self._bench.result(client.call_async(kind.Request(**values)), f"{service} of {self._name}")
+        self._bench.until(client.service_is_ready, f"the service {self._name}/{service}")
+        return self._bench.result(
+            client.call_async(kind.Request(**values)), f"an answer of {self._name}/{service}"
+        )
 
     def change(self, transition: int) -> bool:
         """Ask for a transition and tell whether it was made."""

@@ -16,6 +16,7 @@ from sms_handover.nodes import controller, ik, plant, recorder, trajectory
 from sms_handover.ros.main import EXIT_FAILED, EXIT_OK, EXIT_USAGE, RunnableNode, Stop, run_node
 from sms_handover.ros.parent import LAUNCHER_PID
 
+from ..system.runs import DEADLINE_S
 from .bench import Bench
 
 pytestmark = pytest.mark.ros
@@ -211,6 +212,46 @@ def test_a_node_that_hangs_at_its_end_tells_where_and_ends() -> None:
     done = subprocess.run([sys.executable, "-c", HANGING], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "in destroy_node" in done.stderr
+
+
+HANGING_LATER = """
+import atexit, ctypes, sys
+
+hang = lambda: ctypes.PyDLL(None).sleep(1000)  # s; it keeps the lock of the interpreter
+if "exit" in sys.argv:
+    atexit.register(hang)  # before ours, so it is called after it
+
+from sms_handover.ros import launcher_watch, main
+from sms_handover.ros.main import RunnableNode, run_node
+
+class Worker(RunnableNode):
+    def run(self, executor, stop):
+        if "run" in sys.argv:
+            while not stop.asked:
+                executor.spin_once(timeout_sec=0.01)
+            hang()
+        return 0
+
+launcher_watch._PATIENCE_S = 0.2
+main._TEARDOWN_S = 1
+raise SystemExit(run_node(lambda: Worker("worker"), ["worker"]))
+"""
+
+
+def test_a_node_that_hangs_in_the_exit_of_the_interpreter_is_ended() -> None:
+    done = subprocess.run([sys.executable, "-c", HANGING_LATER, "exit"], timeout=DEADLINE_S, check=False)
+    assert done.returncode == -signal.SIGALRM
+
+
+def test_a_node_that_hangs_when_its_launcher_is_gone_tells_where_and_ends(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where the thread of Python's that would notice it is never let on."""
+    monkeypatch.setenv(LAUNCHER_PID, "1")  # not the parent of this process
+    command = [sys.executable, "-c", HANGING_LATER, "run"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S, check=False)
+    assert done.returncode == 1
+    assert "in run" in done.stderr
 
 
 @pytest.mark.parametrize("name", list(MAINS))
