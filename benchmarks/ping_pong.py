@@ -20,6 +20,7 @@ from sms_handover.cli.domain import reserved_domain
 from sms_handover.frames import BASE, WORLD
 from sms_handover.ros.direct_inputs import DirectInputs
 from sms_handover.ros.endpoints import Endpoints
+from sms_handover.ros.inputs import Deliver
 from sms_handover.ros.reach import settle_reach
 from sms_handover.ros.wire import JointStateWire, OdometryWire
 from sms_handover.topics import BASE_ODOMETRY, CONTROLLER, JOINT_COMMAND, JOINT_STATES, PLANT, graph_topics
@@ -73,10 +74,10 @@ class Side:
         while min(self._came.values()) < stamp:
             self._inputs.spin_once(self._executor, _WAIT_S, self._last)
 
-    def _taker(self, topic: str) -> Callable[[bytes, int, int], None]:
+    def _taker(self, topic: str) -> Deliver:
         """Return what notes the stamp of a message."""
 
-        def take(data: bytes, sent_ns: int, number: int) -> None:
+        def take(data: bytes, sent_ns: int, publisher: bytes) -> None:
             self._came[topic] = stamp_ns(data)
 
         return take

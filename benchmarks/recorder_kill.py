@@ -76,7 +76,7 @@ class Witness:
         self._inputs.subscribe(kind, _STATES, LOSSLESS, self._take)
         self._heard: list[tuple[int, int]] = []  # [ns] sent on the wall clock, stamp
 
-    def _take(self, data: bytes, sent_ns: int, number: int) -> None:
+    def _take(self, data: bytes, sent_ns: int, publisher: bytes) -> None:
         """Note one state."""
         self._heard.append((sent_ns, stamp_ns(data)))
 

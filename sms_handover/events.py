@@ -16,6 +16,7 @@ REFERENCE_LOST, REFERENCE_BACK = "reference_lost", "reference_back"
 NO_ANSWER = "no_answer"
 GRASP_MISSED, PHASE_RETRIED, GRASP_FAILED = "grasp_missed", "phase_retried", "grasp_failed"
 IK_FAILED = "ik_failed"
+MESSAGE_REFUSED = "refused"
 
 
 class Severity(Enum):

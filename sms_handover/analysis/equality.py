@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from sms_handover.events import MESSAGE_REFUSED
 from sms_handover.run_data import RunData
 from sms_handover.topics import TRAJECTORY
 
@@ -36,7 +37,7 @@ def compare_runs(a: RunData, b: RunData) -> tuple[Difference, ...]:
     """Return the fields in which two runs differ; none means that every bit is the same (NaN equals NaN).
 
     Of what the nodes have decided only the trajectory's count: they follow from the numbers, those of
-    the others from wall time too.
+    the others from wall time too. That somebody has refused a message follows from what a stranger sent.
     """
     return tuple(_differences(a, b))
 
@@ -77,7 +78,8 @@ def _differences(a: RunData, b: RunData) -> Iterator[Difference]:
 def _compared(run: RunData, name: str) -> Any:
     """Return what of a field another run has to have too."""
     if name == "run_events":
-        return tuple(event for event in run.run_events if event.node == TRAJECTORY)
+        own = (event for event in run.run_events if event.node == TRAJECTORY)
+        return tuple(event for event in own if event.kind != MESSAGE_REFUSED)
     return getattr(run, name)
 
 

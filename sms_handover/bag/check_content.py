@@ -92,7 +92,8 @@ class ContentCheck:
                 tell = findings.damaged if source.encoding == "cdr" else findings.note
                 tell(f"{source.topic} cannot be decoded: {types}")
         for source in self._undecoded:
-            findings.damaged(f"{source.topic} cannot be decoded: its messages do not fit its schema")
+            if not self._is_refused(source.topic):  # what strangers send is kept as it came
+                findings.damaged(f"{source.topic} cannot be decoded: its messages do not fit its schema")
         if self._recovery is not None:
             self._tell_recovery(self._recovery, findings)
         if not self.is_ours:
@@ -123,6 +124,9 @@ class ContentCheck:
 
     def _close_topic(self, topic: TopicLedger, findings: Findings) -> None:
         """Tell what one topic lacks."""
+        if self._is_refused(topic.name):
+            findings.note(f"{topic.name}: {topic.received} messages of others than the topic's own publisher")
+            return
         gap = f"the largest gap is {topic.largest_gap_ns / _NS_PER_MS:g} ms"
         if topic.missing:
             whole = topic.received + topic.missing
@@ -157,6 +161,10 @@ class ContentCheck:
             tell(f"{text} and {lost} messages known of were lost")
         except (ValueError, LookupError, AttributeError):
             findings.damaged("the record of its recovery is not readable")
+
+    def _is_refused(self, topic: str) -> bool:
+        """Tell whether a topic holds what others published where a node of ours alone was to."""
+        return self.is_ours and topic.endswith(topics.REFUSED_TOPIC)
 
     def _decode(self, message: ScannedMessage) -> Any:
         """Return a decoded message, None if that cannot be."""

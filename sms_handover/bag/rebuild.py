@@ -56,7 +56,10 @@ class LedgerRebuild:
             return
         self._keeper.receive_unstamped(name)
         if name in self._reports:
-            report = self._reports[name].decode(message.data)
+            try:
+                report = self._reports[name].decode(message.data)
+            except BagError:
+                return  # it is in the bag, but counts nothing
             for topic, count in zip(report.topics, report.counts, strict=False):
                 self._keeper.report_published(report.node, topic, int(count))
 

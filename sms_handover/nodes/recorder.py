@@ -17,7 +17,7 @@ from sms_handover.bag.provenance import provenance
 from sms_handover.bag.recording import Recording
 from sms_handover.bag.run_recordings import RunRecordings
 from sms_handover.bag.transforms import TF_TYPE, TransformsWire
-from sms_handover.errors import BagError, ConfigurationError, GraphError, MessageError, SmsHandoverError
+from sms_handover.errors import BagError, ConfigurationError, MessageError, SmsHandoverError
 from sms_handover.frames import BASE, DEPUTY, WORLD
 from sms_handover.model.link_tree import LinkTree
 from sms_handover.ros.convert import time_message
@@ -243,33 +243,26 @@ class RecorderNode(GraphNode[RecorderParameters]):
         def receive(data: bytes, sent_ns: int) -> None:
             record(data, sent_ns)
             if use is not None:
-                use(data, sent_ns, 0)
+                use(data, sent_ns, b"")
 
         sender = None if topic.name.startswith("/") else self.endpoints.sender(topic.name)
         if sender is None:
-            return lambda data, sent_ns, number: receive(data, sent_ns)
+            return lambda data, sent_ns, publisher: receive(data, sent_ns)
 
-        def deliver(data: bytes, sent_ns: int, number: int) -> None:
-            if (
-                not number
-                or (number == sender.due and not sender.contested)
-                or self._is_own(topic, sender, number)
-            ):
-                sender.due = number + 1
+        def deliver(data: bytes, sent_ns: int, publisher: bytes) -> None:
+            if publisher == sender.own or self._is_own(topic, sender, publisher):
                 receive(data, sent_ns)
             else:
                 self._record_refused(topic, data, sent_ns)
 
         return deliver
 
-    def _is_own(self, topic: Topic, sender: Sender, number: int) -> bool:
-        """Tell whether a message of this number is from the topic's own publisher."""
+    def _is_own(self, topic: Topic, sender: Sender, publisher: bytes) -> bool:
+        """Tell whether a message of this publisher is from the topic's own."""
         try:
-            sender.require(number)
+            sender.require(publisher)
         except MessageError as error:
             self.refusals.add(topic.name, error)
-            return False
-        except GraphError:  # those that use the messages end the run
             return False
         return True
 

@@ -94,7 +94,7 @@ class TopicRecorderNode(RunnableNode):
                 continue
             self._inputs.subscribe(kind, name, weakest(offers), partial(self._receive, name))
 
-    def _receive(self, name: str, data: bytes, sent_ns: int, number: int) -> None:
+    def _receive(self, name: str, data: bytes, sent_ns: int, publisher: bytes) -> None:
         """Record one message that was sent at a wall-clock time."""
         self._writer.write(name, data, sent_ns, sent_ns)
 

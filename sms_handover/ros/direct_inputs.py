@@ -2,9 +2,9 @@
 
 An executor wakes Python for each message by itself. Here the node sleeps on the one message that it
 cannot go on without, and then takes all there are. This file alone uses names that rclpy keeps for its
-own executors: the lists of a node's entities, ``WaitSet``, ``take_message``, ``take_response``,
-``send_request``, ``service_take_request`` and ``service_send_response``. Where they change, the
-parameter ``transport`` offers the public way.
+own executors: the lists of a node's entities, ``WaitSet``, ``take_response``, ``send_request``,
+``service_take_request`` and ``service_send_response``. Where they change, the parameter ``transport``
+offers the public way.
 """
 
 from abc import ABC, abstractmethod
@@ -19,10 +19,9 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from sms_handover.ros.inputs import Answer, Asker, Deliver, Inputs
+from sms_handover.ros.taking import IDENTIFIES, Taker
 from sms_handover.units import NS_PER_S
 
-_SENT = "source_timestamp"  # [ns] of wall time, when the message was published
-_NUMBER = "publication_sequence_number"  # from 1 on for each publisher
 _BATCH = 4096  # taken of one input at most before another has its turn
 _SERVE_S = 0.02  # [s] of wall time at most between two turns of the executor while the loop runs
 _HOT_S = 0.1  # [s] of wall time without anything for the loop after which the executor does the waiting
@@ -31,6 +30,8 @@ _IDLE_S = 0.005  # [s] of wall time between two looks for the loop then
 
 class DirectInputs(Inputs):
     """Takes messages, requests and answers of one node; the node must not be with an executor yet."""
+
+    identifies = IDENTIFIES
 
     def __init__(self, node: Node) -> None:
         """Serve a node."""
@@ -145,8 +146,8 @@ class _Messages(_Source):
     def __init__(self, node: Node, subscription: Subscription, deliver: Deliver) -> None:
         """Take over a raw subscription."""
         super().__init__(node, subscription, (1, 0, 0))
-        self._take = subscription.handle.take_message
-        self._kind = subscription.msg_type
+        self._taker = Taker(subscription)
+        self._take = self._taker.take
         self._deliver = deliver
 
     def _watch(self) -> None:
@@ -155,11 +156,11 @@ class _Messages(_Source):
     def take_all(self) -> int:
         """Hand over what has come."""
         for taken in range(_BATCH):
-            message = self._take(self._kind, True)
+            message = self._take()
             if message is None:
                 return taken
-            info = message[1]
-            self._deliver(message[0], info.get(_SENT) or time_ns(), info.get(_NUMBER) or 0)
+            data, sent_ns, publisher = message
+            self._deliver(data, sent_ns or time_ns(), publisher)
         return _BATCH
 
     def take_closed(self, *, drop: bool) -> int:
@@ -169,6 +170,11 @@ class _Messages(_Source):
             self.take_all()
             self._deliver = deliver
         return 0
+
+    def destroy(self) -> None:
+        """Give everything back to the middleware."""
+        self._taker.close()
+        super().destroy()
 
 
 class _Answers(_Source, Asker):

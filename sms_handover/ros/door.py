@@ -62,12 +62,10 @@ class Refusals:
         ``receive`` may refuse a message too by a MessageError, as long as it has not used it.
         """
 
-        def take(data: bytes, sent_ns: int, number: int) -> None:
+        def take(data: bytes, sent_ns: int, publisher: bytes) -> None:
             try:
-                if number and sender is not None:
-                    if number != sender.due or sender.contested:
-                        sender.require(number)
-                    sender.due = number + 1
+                if sender is not None and publisher != sender.own:
+                    sender.require(publisher)
                 check(data)
                 receive(data, sent_ns)
             except MessageError as error:

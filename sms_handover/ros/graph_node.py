@@ -10,7 +10,7 @@ from sms_handover_interfaces.msg import PublishedCounts, RunState
 from std_msgs.msg import String
 
 from sms_handover.errors import ConfigurationError, MessageError, Reason
-from sms_handover.events import Severity
+from sms_handover.events import MESSAGE_REFUSED, Severity
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.parameters import EVERY_NODE
 from sms_handover.ros.convert import time_message
@@ -189,7 +189,7 @@ class GraphNode(ManagedNode, Generic[P]):
     def _on_refusal(self, topic: str, error: MessageError) -> None:
         """Tell everybody of the first message of a topic that is refused for a reason."""
         detail = f"{topic}: {error.reason.value}: {error}"
-        self.events.tell("refused", Severity.WARNING, detail, self.diagnostic_stamp_ns())
+        self.events.tell(MESSAGE_REFUSED, Severity.WARNING, detail, self.diagnostic_stamp_ns())
 
     def _look_for_peers(self) -> None:
         """Go on once this node is active and every endpoint has matched."""
@@ -222,7 +222,7 @@ class GraphNode(ManagedNode, Generic[P]):
         their messages apart.
         """
         self.refusals.tell()
-        if self.common.transport == EXECUTOR and self._matching.is_canceled() and self.endpoints.intruders:
+        if not self.inputs.identifies and self._matching.is_canceled() and self.endpoints.intruders:
             text = f"waiting in vain for {self.endpoints.intruders[0]}; only with transport {DIRECT!r}"
             raise MessageError(Reason.SENDER, f"{text} its messages can be told apart")
         waiting = self.endpoints.unmatched if not self._matching.is_canceled() else []

@@ -17,7 +17,7 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 Receive = Callable[[bytes, int], None]  # CDR bytes; wall time in ns of their sending, else of their coming
-Deliver = Callable[[bytes, int, int], None]  # and the number of the message at its publisher, 0 if not known
+Deliver = Callable[[bytes, int, bytes], None]  # and the global identifier of its publisher, b"" if not known
 Answer = Callable[[Any, Any], Any]  # request and empty response to response
 
 
@@ -37,10 +37,11 @@ class Inputs(ABC):
     """The messages, requests and answers that the loop of one node waits for.
 
     ``wakes`` counts how often something awaited has ended a sleep: a loop that is woken more than once
-    per tick loses time.
+    per tick loses time. ``identifies`` tells whether it is known who a message is from.
     """
 
     wakes: int = 0
+    identifies: bool = False
     closed: bool = False
     drops: bool = False
 
@@ -113,9 +114,9 @@ class ExecutorInputs(Inputs):
         def callback(data: bytes) -> None:
             now_ns = time_ns()  # EventsExecutor fails on callbacks that ask for the time of sending
             if not self.closed:
-                deliver(data, now_ns, 0)
+                deliver(data, now_ns, b"")
             elif not self.drops:
-                self._waiting.append(lambda: deliver(data, now_ns, 0))
+                self._waiting.append(lambda: deliver(data, now_ns, b""))
 
         return self._node.create_subscription(kind, topic, callback, profile, raw=True)
 

@@ -96,7 +96,7 @@ class RunMonitor:
             history=QoSHistoryPolicy.KEEP_LAST, depth=depth, reliability=QoSReliabilityPolicy.BEST_EFFORT
         )  # a display must never hold the loop back
 
-        def receive(data: bytes, sent_ns: int, number: int) -> None:
+        def receive(data: bytes, sent_ns: int, publisher: bytes) -> None:
             with suppress(MessageError):  # a broken one is for the nodes to count
                 show(decoded(data, kind))
 

@@ -5,7 +5,8 @@ from collections.abc import Collection
 from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from sms_handover.errors import GraphError, MessageError, Reason
+from sms_handover.errors import MessageError, Reason
+from sms_handover.ros.taking import IDENTITY
 
 # The name that a publisher has as long as discovery has not told its node; its messages may be here by then.
 _NAMELESS = "_NODE_NAME_UNKNOWN_"
@@ -14,68 +15,65 @@ _NAMELESS = "_NODE_NAME_UNKNOWN_"
 class Sender:
     """The one publisher whose messages on a topic count.
 
-    The middleware numbers the messages of each publisher from 1 on, but rclpy does not tell which
-    publisher a message is from. So a message is taken for one of the publisher's own while the numbers
-    go on one by one; where they do not, it is looked at who else publishes, and from then on the
-    numbers of the others are followed too. Should they meet those of the publisher the messages
-    cannot be told apart any more. Against one that forges numbers only DDS-Security helps.
+    It is the first that discovery gives to one of the nodes of the run, for as long as it is there.
+    Against one that forges identifiers only DDS-Security helps.
     """
 
     def __init__(self, node: Node, topic: str, peers: Collection[str]) -> None:
         """Expect the messages of a topic, by its full name, from one of the nodes ``peers``."""
-        self.due = 0  # number of the next message of the publisher, 0 before the first
+        self.own = b""  # global identifier of the publisher once it is known
         self._node = node
         self._topic = topic
         self._peers = frozenset(peers)
-        self._own: tuple[int, ...] | None = None  # global identifier of the publisher once it is known
-        self._others_due: set[int] = set()  # numbers of the next messages of others
-        self._others = ""  # who they are
+        self._strangers: dict[bytes, str] = {}  # names by global identifier
 
     @property
     def others(self) -> list[str]:
         """Return the names of the nodes that publish on the topic but are not to."""
         return [_name(endpoint) for endpoint in self._split()[1]]
 
-    def require(self, number: int) -> None:
-        """Take a message of this number, which is not the one due or may be another's; else raise.
+    def require(self, publisher: bytes) -> None:
+        """Take a message of a publisher that is not known as the own, b"" where that is not told.
 
-        Raises MessageError if it is another's, and GraphError if it cannot be told whose it is.
+        Raises MessageError if it is another's.
         """
-        if number in self._others_due:
-            if number == self.due:
-                text = f"cannot be told apart any more from those of node {self._others}, which publishes too"
-                raise GraphError(f"the messages on {self._topic} {text}; end that node and run again")
-            self._others_due.remove(number)
-            self._refuse(number)
-        if number == self.due:
+        if not publisher:
             return
-        own, others = self._split()
-        if others:
-            self._others = ", ".join(repr(_name(endpoint)) for endpoint in others)
-            self._refuse(number)
-        named = [endpoint for endpoint in own if endpoint.node_name != _NAMELESS]
-        known, self._own = self._own, tuple(named[0].endpoint_gid) if named else self._own
-        if number < self.due and known == self._own:
-            self._others = "that is gone again"
-            self._refuse(number)
+        name = self._strangers.get(publisher)
+        if name is None:
+            own, others = self._split()
+            if own is not None and _identity(own) == publisher:
+                if own.node_name != _NAMELESS:
+                    self.own = publisher
+                return
+            if not (self.own or own or others):
+                return  # its messages are here before discovery tells of it
+            name = self._name_of(publisher, others)
+        raise MessageError(Reason.SENDER, f"node {name} publishes too, whose messages do not count")
 
-    @property
-    def contested(self) -> bool:
-        """Tell whether somebody else has published on the topic: then every message is to be looked at."""
-        return bool(self._others_due)
+    def _name_of(self, publisher: bytes, others: list[TopicEndpointInfo]) -> str:
+        """Return who publishes in words, and keep in mind who is a stranger for good."""
+        for endpoint in others:
+            if _identity(endpoint) == publisher:
+                name = repr(_name(endpoint))
+                if endpoint.node_name not in self._peers and endpoint.node_name != _NAMELESS:
+                    self._strangers[publisher] = name
+                return name
+        return "that is gone again"
 
-    def _refuse(self, number: int) -> None:
-        """Follow the numbers of another publisher; raises MessageError."""
-        self._others_due.add(number + 1)
-        raise MessageError(Reason.SENDER, f"node {self._others} publishes too, whose messages do not count")
-
-    def _split(self) -> tuple[list[TopicEndpointInfo], list[TopicEndpointInfo]]:
+    def _split(self) -> tuple[TopicEndpointInfo | None, list[TopicEndpointInfo]]:
         """Return the publisher that counts, if it is there, and all others."""
         there = self._node.get_publishers_info_by_topic(self._topic)
-        own = [endpoint for endpoint in there if tuple(endpoint.endpoint_gid) == self._own]
-        own = own or [endpoint for endpoint in there if endpoint.node_name in self._peers]
-        own = own or [endpoint for endpoint in there if endpoint.node_name == _NAMELESS]
-        return own[:1], [endpoint for endpoint in there if endpoint not in own[:1]]
+        candidates = [endpoint for endpoint in there if _identity(endpoint) == self.own]
+        candidates = candidates or [endpoint for endpoint in there if endpoint.node_name in self._peers]
+        candidates = candidates or [endpoint for endpoint in there if endpoint.node_name == _NAMELESS]
+        own = candidates[0] if candidates else None
+        return own, [endpoint for endpoint in there if endpoint is not own]
+
+
+def _identity(endpoint: TopicEndpointInfo) -> bytes:
+    """Return the global identifier of an endpoint."""
+    return bytes(endpoint.endpoint_gid[:IDENTITY])
 
 
 def _name(endpoint: TopicEndpointInfo) -> str:

@@ -1,6 +1,7 @@
 """A check says what is wrong with a bag, and nothing is wrong with a good one."""
 
 import shutil
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 from sms_handover.bag.check import check
 from sms_handover.bag.findings import CheckResult, Severity
 from sms_handover.bag.recording import Recording
+from sms_handover.bag.recover import recover
 from sms_handover.errors import BagError
 from sms_handover.topics import LOOP_NODES
 
@@ -32,9 +34,18 @@ TICKS = 201
 
 
 def write_finished(
-    folder: Path, *, finished: bool = True, failed: bool = False, skipped: int = 0, published: int = TICKS
+    folder: Path,
+    *,
+    finished: bool = True,
+    failed: bool = False,
+    skipped: int = 0,
+    published: int = TICKS,
+    refused: Sequence[tuple[str, str, bytes]] = (),
 ) -> Path:
-    """Write a bag of a run that has ended, of which the recorder has missed some states."""
+    """Write a bag of a run that has ended, of which the recorder has missed some states.
+
+    ``refused`` are messages of strangers: topic, type and bytes.
+    """
     run = made_up_run(TICKS)
     run = replace(run, ik_status=np.zeros_like(run.ik_status))  # a message each reference period
     with Recording(folder, types=TYPES) as recording:
@@ -49,6 +60,10 @@ def write_finished(
 
         recording.receive = lossy  # type: ignore[method-assign]
         record_run(recording, run)
+        for topic in {topic: kind for topic, kind, _ in refused}.items():
+            recording.add_topic(*topic)
+        for topic_name, _, data in refused:
+            receive(topic_name, data, 0)
         if finished:
             state = TYPES.make(
                 f"{OURS}/RunState",
@@ -81,6 +96,34 @@ def test_a_run_that_has_failed_is_complete_too(tmp_path: Path) -> None:
     result = check(write_finished(tmp_path / "bag", failed=True))
     assert result.complete, result.findings
     assert "the run failed at 0.2 s: done" in texts(result, Severity.NOTE)
+
+
+def test_what_strangers_sent_makes_no_bag_incomplete(tmp_path: Path) -> None:
+    """It is in a topic of its own, in whatever state and order, and counted."""
+    joints, kind = TYPES.serialize(joint_state(5)), "sensor_msgs/msg/JointState"
+    bad = [joints[: len(joints) // 2], joints, TYPES.serialize(joint_state(3)), joints + bytes(100_000), b""]
+    refused = [("/joint_command/refused", kind, data) for data in bad]
+    bag = write_finished(tmp_path / "bag", refused=refused)
+    result = check(bag)
+    assert result.complete, result.findings
+    note = "/joint_command/refused: 5 messages of others than the topic's own publisher"
+    assert note in texts(result, Severity.NOTE)
+    assert recover(bag, tmp_path / "again") and check(tmp_path / "again").complete
+
+
+def test_a_message_of_ours_that_cannot_be_decoded_is_damage(tmp_path: Path) -> None:
+    """The name alone makes no topic one of refused messages: a run of ours must have it."""
+    kind = "sensor_msgs/msg/JointState"
+    result = check(write_finished(tmp_path / "bag", refused=[("/joint_command/other", kind, b"\0\1\0\0")]))
+    assert texts(result, Severity.DAMAGED) == [
+        "/joint_command/other cannot be decoded: its messages do not fit its schema"
+    ]
+
+
+def test_counts_that_cannot_be_decoded_count_nothing(tmp_path: Path) -> None:
+    kind = f"{OURS}/PublishedCounts"
+    result = check(write_finished(tmp_path / "bag", refused=[("/strange/published", kind, b"\0\1\0\0\1")]))
+    assert result.damaged and not texts(result, Severity.MISSING)
 
 
 def test_an_unfinished_run_is_not(tmp_path: Path) -> None:

@@ -118,6 +118,8 @@ def test_of_decisions_those_count_that_follow_from_the_numbers(run: RunData) -> 
     assert compare_runs(run, replace(run, run_events=(*run.run_events, late))) == ()
     (difference,) = compare_runs(run, replace(run, run_events=(replace(late, node="trajectory"),)))
     assert difference.field == "run_events"
+    stranger = replace(late, node="trajectory", kind="refused")
+    assert compare_runs(run, replace(run, run_events=(*run.run_events, stranger))) == ()
 
 
 def test_events_without_errors_are_the_same_as_themselves(run: RunData) -> None:

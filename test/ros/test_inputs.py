@@ -54,7 +54,7 @@ def loop(request: pytest.FixtureRequest, bench: Bench) -> Iterator[Loop]:
 
 def test_every_message_is_handed_over_in_order(loop: Loop) -> None:
     publisher = loop.bench.loose("speaker").create_publisher(String, "topic", LOSSLESS)
-    taken: list[tuple[bytes, int, int]] = []
+    taken: list[tuple[bytes, int, bytes]] = []
     subscription = loop.inputs.subscribe(String, "topic", LOSSLESS, lambda *message: taken.append(message))
     loop.until(lambda: publisher.get_subscription_count() == 1 == subscription.get_publisher_count())
     assert loop.inputs.poll() == 0
@@ -66,8 +66,9 @@ def test_every_message_is_handed_over_in_order(loop: Loop) -> None:
     assert [data for data, _, _ in taken] == sent
     assert loop.inputs.poll() == 0
     times = [sent_ns for _, sent_ns, _ in taken]
-    numbered = isinstance(loop.inputs, DirectInputs)
-    assert [number for _, _, number in taken] == (list(range(1, COUNT + 1)) if numbered else [0] * COUNT)
+    (endpoint,) = loop.node.get_publishers_info_by_topic("topic")
+    known = isinstance(loop.inputs, DirectInputs)
+    assert {publisher for _, _, publisher in taken} == {bytes(endpoint.endpoint_gid) if known else b""}
     assert begin_ns <= times[0] and times == sorted(times) and times[-1] <= time_ns()
 
 
@@ -77,7 +78,7 @@ def test_several_topics_come_at_once(loop: Loop) -> None:
     for name, messages in heard.items():
         speaker.create_publisher(String, name, LATCHED).publish(String(data=name))
 
-        def keep(data: bytes, sent_ns: int, number: int, into: list[bytes] = messages) -> None:
+        def keep(data: bytes, sent_ns: int, publisher: bytes, into: list[bytes] = messages) -> None:
             into.append(data)
 
         loop.inputs.subscribe(String, name, LATCHED, keep)
@@ -144,7 +145,7 @@ def test_the_executor_gets_its_turn_while_the_loop_runs(bench: Bench) -> None:
     taken: list[bytes] = []
     fired: list[int] = []
 
-    def again(data: bytes, sent_ns: int, number: int) -> None:
+    def again(data: bytes, sent_ns: int, sender: bytes) -> None:
         taken.append(data)
         publisher.publish(String(data=str(len(taken))))
 
@@ -160,7 +161,7 @@ def test_the_executor_gets_its_turn_while_the_loop_runs(bench: Bench) -> None:
 def test_what_is_given_back_is_gone(bench: Bench) -> None:
     loop = Loop(bench, DirectInputs)
     publisher = bench.plain("speaker").create_publisher(String, "topic", LOSSLESS)
-    loop.inputs.subscribe(String, "topic", LOSSLESS, lambda data, sent_ns, number: None)
+    loop.inputs.subscribe(String, "topic", LOSSLESS, lambda data, sent_ns, publisher: None)
     bench.until(lambda: publisher.get_subscription_count() == 1, "the subscription")
     loop.inputs.destroy()
     bench.until(lambda: publisher.get_subscription_count() == 0, "the end of the subscription")
