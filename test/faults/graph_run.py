@@ -1,6 +1,10 @@
 """The runs that faults are injected into."""
 
+import os
 import re
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from ..ros.short_handover import short_handover
@@ -27,6 +31,17 @@ def domain_of(run: Running) -> int:
     said = DOMAIN.search(run.text)
     assert said
     return int(said[1])
+
+
+@contextmanager
+def held(run: Running, node: str) -> Iterator[None]:
+    """Hold a run in lock step by stopping a node of its loop."""
+    pid = run.nodes[node]
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(pid, signal.SIGCONT)
 
 
 def bag_of(trial: Trial) -> Path:

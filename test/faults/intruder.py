@@ -1,6 +1,7 @@
 """A node that does not belong to a run and talks into it: ``python intruder.py TOPIC KIND``.
 
-It publishes bad messages until it is ended. It prints a line once it has found a reader and sent some.
+Once it gets a line it publishes bad messages until it is ended; until then it is there, and says and
+offers nothing. It prints a line once it has found a reader and sent some.
 """
 
 import sys
@@ -89,6 +90,7 @@ def main() -> None:
     name, kind = sys.argv[1:]
     rclpy.init()
     node = Node("intruder", start_parameter_services=False, enable_rosout=False)
+    sys.stdin.readline()
     act = _set(node, kind) if name == "parameters" else _talk(node, name, kind)
     for count in range(10**9):
         act()

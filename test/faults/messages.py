@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from sms_handover.topics import (
     BASE_ODOMETRY,
     DEPUTY_POSE,
     GRASP_EVENT,
+    IK,
     JOINT_COMMAND,
     JOINT_REFERENCE,
     JOINT_STATES,
@@ -25,7 +27,7 @@ from sms_handover.topics import (
 
 from ..system.runs import Ended
 from .fault import Fault
-from .graph_run import domain_of, under_way
+from .graph_run import domain_of, held, under_way
 from .outcome import Kept, require
 from .promises import refused, whole
 from .trial import Trial
@@ -40,11 +42,13 @@ _REAL_TIME_S = 6.0  # s of simulated time
 
 
 def intrude(words: tuple[str, ...], trial: Trial, *, real_time: bool = False) -> Ended:
-    """Let a stranger, a Python command, talk into a run from a random moment to its end."""
+    """Let a stranger, a Python command, talk into a run from a random moment to its end.
+
+    It is there from the start on, and a run in lock step is held until it has been heard.
+    """
     options = ["--real-time", "--duration", _REAL_TIME_S] if real_time else ["--duration", _DURATION_S]
     with trial.start("run", "-o", "run", *options) as run:
         domain = domain_of(run)
-        run.until_recorded(trial.folder / "run" / "bag", under_way(trial) // 8)
         environment = trial.environment(
             {
                 "ROS_DOMAIN_ID": str(domain),
@@ -54,12 +58,30 @@ def intrude(words: tuple[str, ...], trial: Trial, *, real_time: bool = False) ->
         )
         with (trial.folder / "stranger.txt").open("w", encoding="utf-8") as said:
             command = [sys.executable, *words]
-            stranger = subprocess.Popen(command, env=environment, stdout=said, stderr=said)
+            stranger = subprocess.Popen(
+                command, env=environment, stdin=subprocess.PIPE, stdout=said, stderr=said, text=True
+            )
             try:
+                run.until_recorded(trial.folder / "run" / "bag", under_way(trial) // 8)
+                with nullcontext() if real_time else held(run, IK):
+                    _tell(stranger, "talk\n")
+                    run.until(lambda: "talked" in _said(trial), "the stranger has been heard")
                 return trial.ended(run)
             finally:
                 stranger.kill()
                 stranger.wait()
+
+
+def _tell(process: "subprocess.Popen[str]", line: str) -> None:
+    """Give a process a line to read."""
+    assert process.stdin
+    process.stdin.write(line)
+    process.stdin.flush()
+
+
+def _said(trial: Trial) -> str:
+    """Return what the stranger has said of itself."""
+    return (trial.folder / "stranger.txt").read_text(encoding="utf-8")
 
 
 def nothing_changed(topic: str, trial: Trial, ended: Ended) -> Kept:
@@ -76,8 +98,7 @@ def refused_and_whole(topic: str, trial: Trial, ended: Ended) -> Kept:
     kept = whole(bag, ended)
     topics = read_info(bag).topics
     apart = topics.get(f"/{topic}{REFUSED_TOPIC}")
-    if apart is None or not apart.message_count:
-        return Kept(kept.exit_code, kept.lost, "the run was over before the stranger was heard")
+    require(apart is not None and apart.message_count, "nothing of the stranger is in the bag")
     log = "".join(path.read_text(encoding="utf-8") for path in (trial.folder / "run" / "log").glob("*.log"))
     require(Reason.SENDER.value in log, "no node says that it has refused something")
     return kept
@@ -85,8 +106,8 @@ def refused_and_whole(topic: str, trial: Trial, ended: Ended) -> Kept:
 
 def parameter_kept(trial: Trial, ended: Ended) -> Kept:
     """Require a whole run, and that the change was refused with a reason."""
-    said = (trial.folder / "stranger.txt").read_text(encoding="utf-8")
-    require("True" not in said, f"the parameter was changed: {said[:200]}")
+    said = _said(trial)
+    require("False" in said and "True" not in said, f"the parameter was changed: {said[:200]}")
     return whole(trial.folder / "run" / "bag", ended)
 
 
