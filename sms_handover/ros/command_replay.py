@@ -1,7 +1,9 @@
 """Stands in for controller and trajectory: answers the plant with the commands of a recorded run."""
 
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
 
 import numpy as np
 from rclpy.node import Node
@@ -9,14 +11,15 @@ from sms_handover_interfaces.msg import RunState, TaskPhase
 from std_msgs.msg import String
 
 from sms_handover.analysis.deviation import LargestDeviation, state_deviation
-from sms_handover.bag.stamp import stamp_ns
 from sms_handover.bag.ticks import RecordedTick
 from sms_handover.frames import BASE, WORLD
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.ros.convert import header
-from sms_handover.ros.endpoints import Endpoints
+from sms_handover.ros.door import Refusals
+from sms_handover.ros.endpoints import CountedPublisher, Endpoints
+from sms_handover.ros.inputs import Deliver
 from sms_handover.ros.stamp_sync import StampSync
-from sms_handover.ros.wire import JointStateWire, StateWire
+from sms_handover.ros.wire import JointStateWire, StateWire, arrival_ns, check_stamp, decoded
 from sms_handover.topics import (
     BASE_ODOMETRY,
     CONTROLLER,
@@ -65,9 +68,12 @@ class CommandReplay:
         self._command = self._endpoints.publisher(JOINT_COMMAND)
         self._phase = self._endpoints.publisher(TASK_PHASE)
         self._ready = self._endpoints.publisher(RUN_READY)
-        for name in _STATE:
-            self._endpoints.subscribe(name, self._taker(name), raw=True)
-        self._endpoints.subscribe(RUN_STATE, self._on_run_state)
+        self._answers: list[tuple[CountedPublisher, Any]] = []  # to the last state
+        self.refusals = Refusals(node.get_logger().warning, lambda topic, error: None)
+        checks = dict(zip(_STATE, (self._wire.joints.check, self._wire.odometry.check), strict=True))
+        for name, check in checks.items():
+            self._listen(name, self.refusals.guarding(name, partial(self._take, name), check))
+        self._listen(RUN_STATE, self.refusals.guarding(RUN_STATE, self._on_run_state, check_stamp))
         self._matching = node.create_timer(_MATCHING_PERIOD_S, self._look_for_plant)
 
     @property
@@ -81,21 +87,27 @@ class CommandReplay:
             self._matching.cancel()
             self._ready.publish(String(data=CONTROLLER))
 
-    def _on_run_state(self, message: RunState) -> None:
+    def _listen(self, name: str, deliver: Deliver) -> None:
+        """Hand every message of a topic to ``deliver``."""
+        self._endpoints.subscribe(name, lambda data: deliver(data, 0, b""), raw=True)
+
+    def _on_run_state(self, data: bytes, sent_ns: int) -> None:
         """Take notice of the end of the run."""
-        self.done = self.done or message.state in (RunState.FINISHED, RunState.FAILED)
+        state = decoded(data, RunState).state
+        self.done = self.done or state in (RunState.FINISHED, RunState.FAILED)
 
-    def _taker(self, name: str) -> Callable[[bytes], None]:
-        """Return the callback of one part of the state."""
-
-        def take(data: bytes) -> None:
-            stamp = stamp_ns(data)
-            self._inputs.add(stamp, name, data)
-            state = self._inputs.take(stamp, _STATE)
-            if state is not None and not self.done:
-                self._tick(stamp, state[JOINT_STATES], state[BASE_ODOMETRY])
-
-        return take
+    def _take(self, name: str, data: bytes, sent_ns: int) -> None:
+        """Take one part of a state; one that has been answered is answered again, as the plant asks again."""
+        stamp = arrival_ns(data)
+        if stamp == self.stamp_ns:
+            if name == JOINT_STATES:
+                for publisher, message in self._answers:
+                    publisher.publish(message)
+            return
+        self._inputs.add(stamp, name, data)
+        state = self._inputs.take(stamp, _STATE)
+        if state is not None and not self.done:
+            self._tick(stamp, state[JOINT_STATES], state[BASE_ODOMETRY])
 
     def _tick(self, stamp: int, joints: bytes, odometry: bytes) -> None:
         """Answer one state, then compare it."""
@@ -106,11 +118,12 @@ class CommandReplay:
             self.done = True
             return
         tick = self._next if self._next.stamp_ns == stamp else RecordedTick(stamp, None, None, None, None)
+        self._answers.clear()
         if tick.task_phase is not None:
-            self._phase.publish(tick.task_phase)
+            self._answer(self._phase, tick.task_phase)
         elif stamp % self._reference_ns == 0:
-            self._phase.publish(TaskPhase(header=header(stamp)))
-        self._answer(stamp, tick.joint_command)
+            self._answer(self._phase, TaskPhase(header=header(stamp)))
+        self._answer(self._command, self._command_for(stamp, tick.joint_command))
         if tick.joint_states is None or tick.base_odometry is None:
             return
         if (joints, odometry) == (tick.joint_states, tick.base_odometry):
@@ -119,13 +132,18 @@ class CommandReplay:
             recorded = self._wire.read(tick.joint_states, tick.base_odometry)
             self.deviation.add(state_deviation(recorded, self._wire.read(joints, odometry)))
 
-    def _answer(self, stamp: int, command: bytes | None) -> None:
-        """Publish the recorded command, or hold the last one where none was recorded."""
+    def _command_for(self, stamp: int, command: bytes | None) -> bytes:
+        """Return the recorded command, or hold the last one where none was recorded."""
         if command is None:
             self.held += 1
             command = _restamped(self._last_command, stamp)
         self._last_command = command
-        self._command.publish(command)
+        return command
+
+    def _answer(self, publisher: CountedPublisher, message: Any) -> None:
+        """Publish an answer to this state, and keep it in case the plant asks again."""
+        publisher.publish(message)
+        self._answers.append((publisher, message))
 
 
 def _restamped(data: bytes, stamp: int) -> bytes:

@@ -3,9 +3,11 @@
 import signal
 import sys
 
+from sms_handover.topics import CONTROLLER
+
 from ..system.runs import Ended, command_of
 from .fault import Fault
-from .graph_run import DOMAIN, EARLIEST, bag_of, same_as_ever, short_run
+from .graph_run import DOMAIN, EARLIEST, bag_of, held, same_as_ever, short_run
 from .outcome import CannotTry, Kept, require
 from .promises import refused, whole
 from .trial import Trial
@@ -78,10 +80,11 @@ def next_at_once(trial: Trial) -> Ended:
 
 
 def overwrite(trial: Trial) -> tuple[Ended, Ended]:
-    """Let a run be overwritten by another while it goes on."""
+    """Let a run be overwritten by another while it goes on; it is held, as the other takes time to begin."""
     with trial.start(*short_run(trial)) as run:
         run.until_recorded(bag_of(trial), EARLIEST)
-        other = trial.sms_handover(*short_run(trial), "--overwrite")
+        with held(run, CONTROLLER):
+            other = trial.sms_handover(*short_run(trial), "--overwrite")
         return other, trial.ended(run)
 
 

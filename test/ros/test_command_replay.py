@@ -88,6 +88,14 @@ class FakePlant:
         self._publish[JOINT_STATES].publish(joints)
         self._bench.until(lambda: self.replay.stamp_ns == tick * TICK_NS, f"tick {tick}")
 
+    def again(self, joints: bytes) -> None:
+        """Publish a joint state, good or bad, and wait until it has been seen or refused."""
+        before = len(self.commands) + sum(self.replay.refusals.counts.values())
+        self._publish[JOINT_STATES].publish(joints)
+        self._bench.until(
+            lambda: len(self.commands) + sum(self.replay.refusals.counts.values()) > before, "what came of it"
+        )
+
     def end(self) -> None:
         """Say that the run is over."""
         self._publish[RUN_STATE].publish(RunState(state=RunState.FINISHED))
@@ -111,6 +119,31 @@ def test_every_state_is_answered_with_what_was_recorded(bench: Bench) -> None:
     plant.end()
     deviation = plant.replay.deviation
     assert (deviation.compared, deviation.first, plant.replay.held) == (4, None, 0)
+
+
+def test_a_state_that_comes_again_is_answered_again(bench: Bench) -> None:
+    plant = FakePlant(bench, recorded(range(4)))
+    plant.tick(0)
+    plant.efforts(1)
+    plant.again(state(0)[0])
+    plant.tick(1)
+    assert plant.efforts(3) == [(0, 0.0), (0, 0.0), (1, 1.0)]
+    bench.until(lambda: len(plant.phases) == 2, "the phase again")
+    assert [phase.name for phase in plant.phases] == ["phase 0", "phase 0"]
+    assert plant.replay.deviation.compared == 2
+
+
+def test_bad_states_are_refused_and_counted(bench: Bench) -> None:
+    plant = FakePlant(bench, recorded(range(4)))
+    for tick in range(3):
+        plant.tick(tick)
+    plant.efforts(3)
+    for bad in (state(1)[0], state(3)[0][:40], state(3, np.nan)[0]):
+        plant.again(bad)
+    plant.tick(3)
+    assert plant.efforts(4)[3] == (3, 3.0)
+    reasons = ("stamp out of order", "malformed", "not finite")
+    assert plant.replay.refusals.counts == {f"joint_states: {reason}": 1 for reason in reasons}
 
 
 def test_a_missing_command_is_held_with_the_stamp_of_the_state(bench: Bench) -> None:
