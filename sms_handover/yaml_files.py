@@ -15,7 +15,6 @@ import yaml
 from yaml.constructor import ConstructorError
 
 LARGEST_FILE = 2**18  # [byte], some thirty times the schedule of the paper
-_LARGEST = 2**19  # characters and nodes, with every alias written out
 _DEEPEST = 32  # mappings and lists inside one another
 
 
@@ -30,6 +29,8 @@ class Mapping(dict[str | float, Any]):
 
 class YamlLoader(yaml.SafeLoader):
     """Loads plain data; raises yaml.YAMLError with the line where something else stands."""
+
+    largest = 2**19  # characters and nodes, with every alias written out
 
     def __init__(self, stream: str) -> None:
         """Read a text."""
@@ -55,7 +56,7 @@ class YamlLoader(yaml.SafeLoader):
         else:
             self._size += 1 + (len(node.value) if isinstance(node, yaml.ScalarNode) else 0)
             self._sizes[id(node)] = self._size - before
-        if self._size > _LARGEST:
+        if self._size > self.largest:
             raise ConstructorError(None, None, "with its aliases written out it is too large", mark)
         return node
 
@@ -104,9 +105,9 @@ def read_text(path: Path, largest: int = LARGEST_FILE) -> str:
     return content.decode("utf-8")
 
 
-def load(text: str) -> Any:
+def load(text: str, loader: type[YamlLoader] = YamlLoader) -> Any:
     """Return what a YAML text holds, mappings as :class:`Mapping`; raises yaml.YAMLError."""
-    return yaml.load(text, YamlLoader)
+    return yaml.load(text, loader)
 
 
 def compose(text: str) -> yaml.Node | None:

@@ -1,8 +1,8 @@
 """The clock of a playback: bag time as a function of wall time."""
 
-from math import isfinite
-
 from sms_handover.errors import ConfigurationError
+
+_SLOWEST, _FASTEST = 1e-6, 1e6  # [-] beyond them wall time has no nanoseconds to count by
 
 
 class PlaybackClock:
@@ -12,7 +12,7 @@ class PlaybackClock:
     """
 
     def __init__(self, bag_ns: int, now_ns: int, *, rate: float = 1.0, paused: bool = False) -> None:
-        """Begin at a bag time; raises ConfigurationError on a rate that is not positive."""
+        """Begin at a bag time; raises ConfigurationError on a rate that is too low or too high."""
         self._rate = _checked(rate)
         self._paused = paused
         self._bag_ns, self._at_ns = bag_ns, now_ns  # bag time at a wall time
@@ -56,7 +56,7 @@ class PlaybackClock:
         self._paused = False
 
     def set_rate(self, rate: float, now_ns: int) -> None:
-        """Run at another rate from now on; raises ConfigurationError if it is not positive."""
+        """Run at another rate from now on; raises ConfigurationError if that is too low or too high."""
         checked = _checked(rate)
         self.jump(self.bag_ns(now_ns), now_ns)
         self._rate = checked
@@ -69,6 +69,6 @@ class PlaybackClock:
 
 def _checked(rate: float) -> float:
     """Return a rate that can be played at."""
-    if not (isfinite(rate) and rate > 0.0):
-        raise ConfigurationError(f"the rate is {rate:g}, allowed is a finite number above 0")
+    if not _SLOWEST <= rate <= _FASTEST:
+        raise ConfigurationError(f"the rate is {rate:g}, allowed is from {_SLOWEST:g} to {_FASTEST:g}")
     return rate

@@ -10,6 +10,7 @@ from sms_handover.errors import BagError
 from sms_handover.model.validation import positive_vector
 from sms_handover.scene.scene import FRAME_RATE, Scene, make_scene
 from sms_handover.types import Array, read_only
+from sms_handover.yaml_files import load
 
 
 def read_scene(path: Path, frame_rate: float = FRAME_RATE) -> Scene:
@@ -27,7 +28,7 @@ def read_scene(path: Path, frame_rate: float = FRAME_RATE) -> Scene:
 def deputy_size_in(info: BagInfo) -> Array:
     """Return the edges (3,) m of the deputy that the schedule in a bag describes; raises BagError."""
     try:
-        size = yaml.safe_load(info.schedule_text or "")["deputy"]["size"]
+        size = load(info.schedule_text or "")["deputy"]["size"]
         return read_only(positive_vector(size, 3, "deputy: size", "m"))
     except (yaml.YAMLError, KeyError, TypeError, ValueError) as error:
         raise BagError(

@@ -12,10 +12,19 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from sms_handover.bag.check import check
 from sms_handover.bag.findings import CheckResult, Severity
+from sms_handover.bag.metadata import (
+    LARGEST_METADATA,
+    ROSBAG2_KEY,
+    FileSpan,
+    bag_information,
+    metadata_of,
+    to_yaml,
+)
 from sms_handover.bag.recording import Recording
 from sms_handover.bag.recover import recover
 from sms_handover.errors import BagError
 from sms_handover.topics import LOOP_NODES
+from sms_handover.yaml_files import LARGEST_FILE
 
 from .bag_damage import STRING, chunks_of, write_file
 from .bag_messages import (
@@ -193,6 +202,38 @@ def test_a_metadata_file_that_is_none_is_told(tmp_path: Path) -> None:
     folder = write_finished(tmp_path / "bag")
     (folder / "metadata.yaml").write_text("[1, 2")
     assert any("metadata.yaml is not readable" in line for line in texts(check(folder), Severity.DAMAGED))
+
+
+def bomb(key: str) -> str:
+    """Return a metadata file in which a list is as long as a thousand million words, written out."""
+    levels = [f"  k{n}: &k{n} [{', '.join([f'*k{n - 1}'] * 10)}]\n" for n in range(1, 10)]
+    return f"rosbag2_bagfile_information:\n  k0: &k0 lol\n{''.join(levels)}  {key}: *k9\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("#" * (LARGEST_METADATA + 1), f"it has more than {LARGEST_METADATA} bytes"),
+        (bomb("relative_file_paths"), "written out it is too large"),
+        ("a: " + "[" * 100_000, "more than 32 levels"),
+    ],
+    ids=["too much", "a bomb of aliases", "levels"],
+)
+def test_a_metadata_file_without_bounds_is_not_read(tmp_path: Path, text: str, told: str) -> None:
+    folder = write_finished(tmp_path / "bag")
+    (folder / "metadata.yaml").write_text(text)
+    (damage,) = [line for line in texts(check(folder), Severity.DAMAGED) if "metadata.yaml" in line]
+    assert told in damage and len(damage) < 500
+
+
+def test_the_metadata_of_a_large_bag_is_read(tmp_path: Path) -> None:
+    """A bag of 3000 files, whose description is longer than a file of a user may be."""
+    spans = [FileSpan(f"bag_{number}.mcap", 0, 1, 1) for number in range(3000)]
+    text = to_yaml({ROSBAG2_KEY: bag_information(spans, [])})
+    assert len(text) > LARGEST_FILE
+    (tmp_path / "metadata.yaml").write_text(text)
+    read = metadata_of(tmp_path)
+    assert read and len(read["files"]) == 3000
 
 
 def patched(file: Path, old: bytes, new: bytes, *, last: bool = True) -> None:

@@ -58,11 +58,19 @@ def test_a_paused_clock_waits_for_ever_but_not_for_what_has_been() -> None:
     assert clock.wait_ns(5, 0) == 0
 
 
-@pytest.mark.parametrize("rate", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_rate_is_finite_and_positive(rate: float) -> None:
+@pytest.mark.parametrize("rate", [0.0, -1.0, 1e-7, 1e7, 5e-324, 1e308, float("nan"), float("inf")])
+def test_a_rate_is_one_that_nanoseconds_can_be_counted_by(rate: float) -> None:
     clock = PlaybackClock(0, 0)
-    with pytest.raises(ConfigurationError, match="allowed is a finite number above 0"):
+    with pytest.raises(ConfigurationError, match="allowed is from 1e-06 to 1e\\+06"):
         clock.set_rate(rate, 1)
     assert clock.rate == 1.0
     with pytest.raises(ConfigurationError, match="rate"):
         PlaybackClock(0, 0, rate=rate)
+
+
+@pytest.mark.parametrize("rate", [1e-6, 1e6])
+def test_at_the_slowest_and_the_fastest_rate_a_century_can_be_counted(rate: float) -> None:
+    century_ns = 100 * 365 * 86400 * 10**9
+    clock = PlaybackClock(0, 0, rate=rate)
+    assert clock.wait_ns(century_ns, 0) == pytest.approx(century_ns / rate, rel=1e-9)
+    assert clock.bag_ns(century_ns) == pytest.approx(century_ns * rate, rel=1e-9)

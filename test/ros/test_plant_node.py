@@ -247,8 +247,10 @@ def test_steps_end_with_the_run(graph: Graph) -> None:
     graph.ear.get_ready(graph.bench)
     wait_for_tick(graph, 20)
     pause(graph, True)
-    answer = graph.call("step", StepTicks, ticks=10**6)
-    assert stamp_ns_of(answer.stamp) == END_NS
+    answer = graph.call("step", StepTicks, ticks=2**32 - 1)
+    assert answer.success and stamp_ns_of(answer.stamp) == END_NS
+    answer = graph.call("step", StepTicks, ticks=1)
+    assert not answer.success and "the last tick has been reached" in answer.message
     graph.bench.until(lambda: graph.plant.diagnostic_stamp_ns() == END_NS, "the last tick")
     pause(graph, False)
     graph.wait_for_end()
