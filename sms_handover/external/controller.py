@@ -3,23 +3,23 @@
 import inspect
 import sys
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from rcl_interfaces.msg import ParameterDescriptor
 
-from sms_handover.bag.stamp import stamp_ns
 from sms_handover.control.protocol import CheckedController, Controller, Guidance
 from sms_handover.frames import WORLD
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.nodes.controller import Answering, AnsweringNode
-from sms_handover.ros.door import Check
+from sms_handover.ros.door import Read
 from sms_handover.ros.graph_node import P
 from sms_handover.ros.help import own_parameters_help
 from sms_handover.ros.main import EXIT_OK, run_node
-from sms_handover.ros.wire import PoseWire
+from sms_handover.ros.wire import PoseWire, Stamped
 from sms_handover.topics import CONTROLLER, target_pose
 from sms_handover.trajectory.schedule import Schedule
-from sms_handover.types import JointCommand, JointReference, Pose, RobotState, TaskPhase
+from sms_handover.types import Array, JointReference, Pose, TaskPhase
 
 Make = Callable[[RobotModel, P], Controller]  # a controller for a robot, from its parameters
 
@@ -54,9 +54,9 @@ class OwnControllerNode(AnsweringNode[P]):
         """Return the name of the law."""
         return self._law
 
-    def guidance(self) -> dict[str, Check]:
+    def guidance(self) -> dict[str, Read[Stamped[Any]]]:
         """Return also the targets of the tools."""
-        return {**super().guidance(), **dict.fromkeys(self._arms, self._pose_wire.check)}
+        return {**super().guidance(), **dict.fromkeys(self._arms, self._pose_wire.checked)}
 
     def make_controller(self, schedule: Schedule) -> Answering:
         """Return the controller, guided as in one process."""
@@ -67,12 +67,12 @@ class OwnControllerNode(AnsweringNode[P]):
         self._guided = GuidedController(controller, robot)
         return self._guided
 
-    def use(self, topic: str, data: bytes) -> None:
+    def use(self, topic: str, stamp: int, content: Any) -> None:
         """Give phase, reference or target to the controller."""
         if topic in self._arms:
-            self._guided.aim(stamp_ns(data), self._arms[topic], self._pose_wire.read_pose(data))
+            self._guided.aim(stamp, self._arms[topic], content)
         else:
-            super().use(topic, data)
+            super().use(topic, stamp, content)
 
 
 class GuidedController:
@@ -109,11 +109,11 @@ class GuidedController:
         self._targets[arm] = stamp_ns, tool_in_world
         self._guide()
 
-    def step(self, state: RobotState) -> JointCommand:
-        """Return the command that answers a state."""
+    def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
+        """Return the efforts (n,) that answer a state."""
         if self._guided_ns < 0:
-            return JointCommand(state.stamp_ns, np.zeros(self._robot.n_joints))
-        return JointCommand(state.stamp_ns, self._controller.effort(state.stamp_ns, state.q, state.v))
+            return np.zeros(self._robot.n_joints)
+        return self._controller.effort(stamp_ns, q, v)
 
     def _guide(self) -> None:
         """Guide the controller once every part is of the same instant."""

@@ -2,19 +2,17 @@
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
-from sms_handover.bag.stamp import stamp_ns
 from sms_handover.control.parameters import ControllerParameters
 from sms_handover.control.reference_watch import ReferenceWatch
 from sms_handover.frames import BASE, WORLD
-from sms_handover.ros.door import Check
+from sms_handover.ros.door import Read, Receive
 from sms_handover.ros.graph_node import GraphNode, P
-from sms_handover.ros.inputs import Receive
 from sms_handover.ros.main import run_node
 from sms_handover.ros.phase_wire import PhaseWire
 from sms_handover.ros.stamp_sync import StampOrder, StampSync
-from sms_handover.ros.wire import JointStateWire, StateWire, arrival_ns
+from sms_handover.ros.wire import JointStateWire, Stamped, StateWire, coordinates
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import load_task
 from sms_handover.simulation.wiring import longest_reference_ns, make_controller
@@ -27,7 +25,7 @@ from sms_handover.topics import (
     TASK_PHASE,
 )
 from sms_handover.trajectory.schedule import Schedule
-from sms_handover.types import JointCommand, JointReference, RobotState, TaskPhase
+from sms_handover.types import Array, JointReference, TaskPhase
 from sms_handover.units import NS_PER_S
 
 _STATE = (JOINT_STATES, BASE_ODOMETRY)
@@ -45,8 +43,8 @@ class Answering(Protocol):
     def track(self, reference: JointReference) -> None:
         """Take the next joint reference."""
 
-    def step(self, state: RobotState) -> JointCommand:
-        """Return the command that answers a state."""
+    def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
+        """Return the joint efforts (n,) that answer a state: configuration (7 + n,), velocity (6 + n,)."""
 
 
 class AnsweringNode(GraphNode[P]):
@@ -71,23 +69,23 @@ class AnsweringNode(GraphNode[P]):
         self._command_wire = JointStateWire(self.robot.joint_names, ("effort",))
         self._phase_wire = PhaseWire(self.robot.arms, schedule.deputy.grasp_frames)
         guidance = self.guidance()
-        checks = {
-            JOINT_STATES: self._state_wire.joints.check,
-            BASE_ODOMETRY: self._state_wire.odometry.check,
+        state: dict[str, Read[Stamped[Any]]] = {
+            JOINT_STATES: self._state_wire.joints.checked,
+            BASE_ODOMETRY: self._state_wire.odometry.checked,
         }
         self._everything = (*_STATE, *guidance)
         ahead_ns = self._reference_ns if self._lockstep else NS_PER_S
-        self._inputs: StampSync[bytes] = StampSync(ahead_ns=ahead_ns, paced=not self._lockstep)
+        self._inputs: StampSync[Any] = StampSync(ahead_ns=ahead_ns, paced=not self._lockstep)
         self._orders = {topic: StampOrder(ahead_ns) for topic in guidance}
         self._answered_ns = 0
         self._answer_bytes = b""
-        for topic, check in {**guidance, **checks}.items():
-            self.receive(topic, self._taker(topic), check)
+        for topic, read in {**guidance, **state}.items():
+            self.receive(topic, self._taker(topic), read)
         self._command = self.endpoints.publisher(JOINT_COMMAND)  # last: then all of an external node is there
 
-    def guidance(self) -> dict[str, Check]:
-        """Return the topics that come each reference period, with what checks their messages."""
-        return {TASK_PHASE: self._phase_wire.check, JOINT_REFERENCE: self._reference_wire.check}
+    def guidance(self) -> dict[str, Read[Stamped[Any]]]:
+        """Return the topics that come each reference period, with what reads and checks their messages."""
+        return {TASK_PHASE: self._phase_wire.checked, JOINT_REFERENCE: self._reference_wire.checked}
 
     @property
     @abstractmethod
@@ -134,11 +132,11 @@ class AnsweringNode(GraphNode[P]):
         """Return the inputs that belong to a stamp, the last one to come last."""
         return self._everything if self._lockstep and stamp % self._reference_ns == 0 else _STATE
 
-    def _taker(self, topic: str) -> Receive:
-        """Return the callback of a topic of raw messages."""
-        return lambda data, sent_ns: self._take(topic, arrival_ns(data), data)
+    def _taker(self, topic: str) -> Receive[Stamped[Any]]:
+        """Return the callback of a topic."""
+        return lambda content, sent_ns: self._take(topic, *content)
 
-    def _take(self, topic: str, stamp: int, data: bytes) -> None:
+    def _take(self, topic: str, stamp: int, content: Any) -> None:
         """Take one input; a state of time zero behind an answered one begins the run anew."""
         if self._inputs.begins_anew(stamp):
             self._inputs.reset()
@@ -148,11 +146,11 @@ class AnsweringNode(GraphNode[P]):
         if not self._lockstep and topic in self._orders:
             if self._inputs.admits(stamp, topic):
                 self._orders[topic].take(stamp, self._answered_ns)
-                self.use(topic, data)
+                self.use(topic, stamp, content)
             return
         if topic == BASE_ODOMETRY and stamp == self._answered_ns and self._lockstep and self._answer_bytes:
             self._command.publish(self._answer_bytes)  # the plant asks again: it has missed the answer
-        self._inputs.add(stamp, topic, data)
+        self._inputs.add(stamp, topic, content)
         self._answer(stamp)
 
     def _answer(self, stamp: int) -> None:
@@ -163,22 +161,19 @@ class AnsweringNode(GraphNode[P]):
             return
         if needed is self._everything:
             for topic in self._orders:
-                self.use(topic, inputs[topic])
-        state = self._state_wire.read(inputs[JOINT_STATES], inputs[BASE_ODOMETRY])
-        command = self._controller.step(state)
-        self._answer_bytes = self._command_wire.pack(stamp, effort=command.effort)
+                self.use(topic, stamp, inputs[topic])
+        q, v = coordinates(inputs[JOINT_STATES], inputs[BASE_ODOMETRY])
+        self._answer_bytes = self._command_wire.pack(stamp, effort=self._controller.effort(stamp, q, v))
         self._command.publish(self._answer_bytes)
         self._answered_ns = stamp
         self.on_answered(stamp)
 
-    def use(self, topic: str, data: bytes) -> None:
+    def use(self, topic: str, stamp: int, content: Any) -> None:
         """Give a phase or a reference to the controller."""
         if topic == TASK_PHASE:
-            self._controller.enter(self._phase_wire.read(data))
+            self._controller.enter(content)
         else:
-            blocks = self._reference_wire.read(data)
-            reference = JointReference(stamp_ns(data), blocks["position"], blocks["velocity"])
-            self._controller.track(reference)
+            self._controller.track(JointReference(stamp, *content))
 
 
 class ControllerNode(AnsweringNode[ControllerParameters]):

@@ -3,13 +3,13 @@
 import gc
 from collections.abc import Sequence
 from time import monotonic
+from typing import Any
 
 import numpy as np
 from rclpy.executors import Executor
 from sms_handover_interfaces.msg import RunState
 from std_msgs.msg import String
 
-from sms_handover.bag.stamp import stamp_ns
 from sms_handover.errors import MessageError, Reason
 from sms_handover.plant.answer_watch import AnswerWatch
 from sms_handover.plant.command_watch import CommandWatch
@@ -23,7 +23,7 @@ from sms_handover.ros.phase_wire import PhaseWire
 from sms_handover.ros.plant_outputs import PlantOutputs
 from sms_handover.ros.run_control import RunControl
 from sms_handover.ros.stamp_sync import StampOrder, StampSync
-from sms_handover.ros.wire import JointStateWire, arrival_ns, check_stamp
+from sms_handover.ros.wire import JointStateWire, Stamped, stamped
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import load_task
 from sms_handover.simulation.wiring import make_plant
@@ -40,7 +40,7 @@ from sms_handover.topics import (
     RUN_STATE,
     TASK_PHASE,
 )
-from sms_handover.types import JointCommand
+from sms_handover.types import Array, JointCommand, TaskPhase
 
 _COMMAND = (JOINT_COMMAND,)
 _PHASE_AND_COMMAND = (TASK_PHASE, JOINT_COMMAND)
@@ -73,7 +73,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self._is_recorded = RECORDER in self.common.peers
         self._command_wire = JointStateWire(self.robot.joint_names, ("effort",))
         self._phase_wire = PhaseWire(self.robot.arms, tuple(schedule.deputy.grasp_frames))
-        self._inputs: StampSync[bytes] = StampSync(ahead_ns=self._tick_ns)
+        self._inputs: StampSync[Any] = StampSync(ahead_ns=self._tick_ns)
         self._orders = {topic: StampOrder(0) for topic in _PHASE_AND_COMMAND}
         self._loop_clock = LoopClock(self.common.tick_ns, paced=not self.lockstep)
         self._command_watch = CommandWatch(self.parameters)
@@ -173,9 +173,9 @@ class PlantNode(GraphNode[PlantParameters]):
         names = [GRASP_EVENT, ROBOT_DESCRIPTION, DEPUTY_MARKER, RUN_STATE, LOOP_TIMING]
         self._publish = {name: self.endpoints.publisher(name) for name in names}
         self._outputs = PlantOutputs(self.robot, self.endpoints.publisher)
-        self.receive(TASK_PHASE, self._on_phase, self._phase_wire.check)
-        self.receive(JOINT_COMMAND, self._on_command, self._command_wire.check)
-        self.receive(RUN_RECORDED, self._on_recorded, check_stamp)
+        self.receive(TASK_PHASE, self._on_phase, self._phase_wire.checked)
+        self.receive(JOINT_COMMAND, self._on_command, self._command_wire.checked)
+        self.receive(RUN_RECORDED, self._on_recorded, stamped)
         self.endpoints.subscribe(RUN_READY, self._on_ready)
         self._control = RunControl(self, self)
 
@@ -245,35 +245,35 @@ class PlantNode(GraphNode[PlantParameters]):
             self.events.publish(event)
             self.finish(event.detail, RunState.FAILED)
 
-    def _on_command(self, data: bytes, sent_ns: int) -> None:
+    def _on_command(self, command: Stamped[tuple[Array, ...]], sent_ns: int) -> None:
         """Take a command; in lock step it may complete the tick."""
-        stamp = arrival_ns(data)
+        stamp, (effort,) = command
         if self.lockstep:
-            self._inputs.add(stamp, JOINT_COMMAND, data)
+            self._inputs.add(stamp, JOINT_COMMAND, effort)
             if stamp == self._plant.stamp_ns:
                 self._loop_clock.answered()
             self.advance()
         elif self._inputs.admits(stamp, JOINT_COMMAND):
             self._orders[JOINT_COMMAND].take(stamp, self._plant.stamp_ns)
-            self._command = self._read_command(data)
-            if self._command.stamp_ns == self._plant.stamp_ns:
+            self._command = JointCommand(stamp, effort)
+            if stamp == self._plant.stamp_ns:
                 self._loop_clock.answered()
 
-    def _on_phase(self, data: bytes, sent_ns: int) -> None:
+    def _on_phase(self, phase: Stamped[TaskPhase], sent_ns: int) -> None:
         """Take the phase of the task; in lock step it may complete the tick."""
-        stamp = arrival_ns(data)
+        stamp, task = phase
         if self.lockstep:
-            self._inputs.add(stamp, TASK_PHASE, data)
+            self._inputs.add(stamp, TASK_PHASE, task)
             self.advance()
         elif self._inputs.admits(stamp, TASK_PHASE):
             self._orders[TASK_PHASE].take(stamp, self._plant.stamp_ns)
-            self._execute(data)
+            self._execute(task)
 
-    def _on_recorded(self, data: bytes, sent_ns: int) -> None:
+    def _on_recorded(self, recorded: Stamped[bytes], sent_ns: int) -> None:
         """Note up to where the recorder has come; in lock step the plant may have waited for it."""
         if self.run_state == RunState.WAITING:
             return  # it is of the run before
-        stamp = arrival_ns(data)
+        stamp, _ = recorded
         if not self._recorded_ns <= stamp <= self._plant.stamp_ns:
             reason = Reason.OLD if stamp < self._recorded_ns else Reason.FUTURE
             allowed = f"allowed is {self._recorded_ns} to {self._plant.stamp_ns} ns"
@@ -294,7 +294,7 @@ class PlantNode(GraphNode[PlantParameters]):
         if self._plant.tick >= self._last_tick:
             self._end_task()
             return
-        self._plant.step(self._read_command(inputs[JOINT_COMMAND]))
+        self._plant.apply(inputs[JOINT_COMMAND])
         self._loop_clock.ticked()
         if self._control.steps_left:
             self._control.stepped()
@@ -311,13 +311,8 @@ class PlantNode(GraphNode[PlantParameters]):
         if self._plant.tick >= self._last_tick:
             self._end_task()
 
-    def _read_command(self, data: bytes) -> JointCommand:
-        """Return the command in a message."""
-        return JointCommand(stamp_ns(data), self._command_wire.read(data)["effort"])
-
-    def _execute(self, phase: bytes) -> None:
+    def _execute(self, task: TaskPhase) -> None:
         """Carry out the grasp commands of a phase, tell what came of them, and note when the task ends."""
-        task = self._phase_wire.read(phase)
         self._failed_phase = task.name if task.failed else ""
         if task.end_ns:
             self._last_tick = self.common.last_tick(task.end_ns, failed=task.failed)

@@ -5,6 +5,7 @@ from datetime import datetime
 from functools import partial
 from pathlib import Path
 from time import monotonic, time_ns
+from typing import Any
 
 from rclpy.executors import Executor
 from rclpy.qos import QoSProfile
@@ -21,16 +22,16 @@ from sms_handover.errors import BagError, ConfigurationError, MessageError, SmsH
 from sms_handover.frames import BASE, DEPUTY, WORLD
 from sms_handover.model.link_tree import LinkTree
 from sms_handover.ros.convert import time_message
-from sms_handover.ros.door import Check
+from sms_handover.ros.door import Read, Receive
 from sms_handover.ros.graph_node import GraphNode
-from sms_handover.ros.inputs import Deliver, Receive
+from sms_handover.ros.inputs import Deliver
 from sms_handover.ros.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, Stop, run_node
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.peer_parameters import PeerParameters
 from sms_handover.ros.qos import LOSSLESS, profile_of, stored, weakest
 from sms_handover.ros.sender import Sender
 from sms_handover.ros.stamp_sync import StampSync
-from sms_handover.ros.wire import PoseWire, StateWire, arrival_ns, check_stamp, decoded
+from sms_handover.ros.wire import PoseWire, Stamped, StateWire, decoded, stamped, state_of
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import load_task
 from sms_handover.topics import (
@@ -83,7 +84,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
         self._peer_parameters = PeerParameters(self, self.common.peers)
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
         self._pose_wire = PoseWire(WORLD)
-        self._tf: StampSync[bytes] = StampSync(_BEHIND)
+        self._tf: StampSync[Any] = StampSync(_BEHIND)
         self._links = LinkTree(self.robot)
         frames = [*self._links.frames, (WORLD, DEPUTY)]
         self._tf_wire = TransformsWire(self._recordings.types, frames)
@@ -229,14 +230,15 @@ class RecorderNode(GraphNode[RecorderParameters]):
         receive = self._receive_anyway if topic.rate is Rate.WALL else self._receive
         self.endpoints.receive(topic.name, self.inputs, self._then(topic, partial(receive, name)))
 
-    def _then(self, topic: Topic, record: Receive) -> Deliver:
+    def _then(self, topic: Topic, record: Receive[bytes]) -> Deliver:
         """Return what records every message, good or bad, and then uses the good ones for what needs them."""
-        uses: dict[str, tuple[Receive, Check]] = {
-            JOINT_STATES: (self._follow, check_stamp),
-            RUN_PUBLISHED: (self._note_counts, lambda data: None),
-            SAMPLED_JOINT_STATES: (partial(self._add_to_tf, topic.name), self._state_wire.joints.check),
-            SAMPLED_BASE_ODOMETRY: (partial(self._add_to_tf, topic.name), self._state_wire.odometry.check),
-            DEPUTY_POSE: (partial(self._add_to_tf, topic.name), self._pose_wire.check),
+        add_to_tf = partial(self._add_to_tf, topic.name)
+        uses: dict[str, tuple[Receive[Any], Read[Any]]] = {
+            JOINT_STATES: (self._follow, stamped),
+            RUN_PUBLISHED: (self._note_counts, lambda data: decoded(data, PublishedCounts)),
+            SAMPLED_JOINT_STATES: (add_to_tf, self._state_wire.joints.checked),
+            SAMPLED_BASE_ODOMETRY: (add_to_tf, self._state_wire.odometry.checked),
+            DEPUTY_POSE: (add_to_tf, self._pose_wire.checked),
         }
         use = self.refusals.guarding(topic.name, *uses[topic.name]) if topic.name in uses else None
 
@@ -283,9 +285,9 @@ class RecorderNode(GraphNode[RecorderParameters]):
         self._last_message = monotonic()
         self._recording.receive(name, data, sent_ns)
 
-    def _follow(self, data: bytes, sent_ns: int) -> None:
+    def _follow(self, state: Stamped[bytes], sent_ns: int) -> None:
         """Note from a state how far the run has come."""
-        self._state_ns = arrival_ns(data)
+        self._state_ns, _ = state
 
     def _receive_anyway(self, name: str, data: bytes, sent_ns: int) -> None:
         """Record one message of a topic that goes on after the run, which is no sign that more is to come."""
@@ -295,22 +297,22 @@ class RecorderNode(GraphNode[RecorderParameters]):
         """Record one message of a topic beyond the graph, which comes by the executor."""
         self._receive_anyway(name, data, time_ns())
 
-    def _note_counts(self, data: bytes, sent_ns: int) -> None:
+    def _note_counts(self, message: PublishedCounts, sent_ns: int) -> None:
         """Note that a node has told what it has published in all."""
-        self._reported.add(decoded(data, PublishedCounts).node)
+        self._reported.add(message.node)
 
-    def _add_to_tf(self, topic: str, data: bytes, sent_ns: int) -> None:
+    def _add_to_tf(self, topic: str, message: Stamped[Any], sent_ns: int) -> None:
         """Keep a message, and when its companions are there too record the transforms that follow."""
-        stamp = arrival_ns(data)
+        stamp, content = message
         if self._tf.begins_anew(stamp):
             self._tf.reset()
-        self._tf.add(stamp, topic, data)
+        self._tf.add(stamp, topic, content)
         inputs = self._tf.take(stamp, _TF_INPUTS)
         if inputs is None:
             return
-        state = self._state_wire.read(inputs[SAMPLED_JOINT_STATES], inputs[SAMPLED_BASE_ODOMETRY])
+        state = state_of(stamp, inputs[SAMPLED_JOINT_STATES], inputs[SAMPLED_BASE_ODOMETRY])
         poses = self._links.poses(state.base_in_world, state.joint_position)
-        poses.append(self._pose_wire.read_pose(inputs[DEPUTY_POSE]))
+        poses.append(inputs[DEPUTY_POSE])
         self._recording.receive_at(TF, self._tf_wire.pack(stamp, poses), stamp, sent_ns)
 
     def _look_for_topics(self) -> None:

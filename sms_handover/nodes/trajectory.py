@@ -18,13 +18,21 @@ from sms_handover.ros.convert import (
     pose_message,
     stamp_ns_of,
 )
+from sms_handover.ros.door import Receive
 from sms_handover.ros.endpoints import CountedPublisher
 from sms_handover.ros.graph_node import GraphNode
-from sms_handover.ros.inputs import Receive
 from sms_handover.ros.main import run_node
 from sms_handover.ros.phase_wire import PhaseWire
 from sms_handover.ros.stamp_sync import StampSync
-from sms_handover.ros.wire import JointStateWire, PoseWire, StateWire, arrival_ns, check_stamp, decoded
+from sms_handover.ros.wire import (
+    JointStateWire,
+    PoseWire,
+    Stamped,
+    StateWire,
+    decoded,
+    stamped,
+    state_of,
+)
 from sms_handover.simulation.feasibility import check_feasibility
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import ParameterSet, Scenario, load_parameters, load_task
@@ -63,12 +71,11 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         schedule = load_task(self.common, self.robot)
         check_feasibility(Scenario(_for_any_plant(load_parameters()), self.robot, schedule))
         self._generator = TrajectoryGenerator(self.robot, schedule, self.parameters)
-        self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
         self._reference_wire = JointStateWire(self.robot.joint_names, ("position", "velocity"))
         self._pose_wire, self._phase_wire = PoseWire(WORLD), PhaseWire()
         self._lockstep = self.common.mode == LOCKSTEP
         ahead_ns = self.common.reference_ns if self._lockstep else NS_PER_S
-        self._inputs: StampSync[bytes] = StampSync(ahead_ns=ahead_ns, paced=not self._lockstep)
+        self._inputs: StampSync[Any] = StampSync(ahead_ns=ahead_ns, paced=not self._lockstep)
         self._stamp_ns = self._newest_ns = 0
         self._answer: list[tuple[CountedPublisher, bytes]] = []
         self._failures = self._overdue = 0
@@ -78,10 +85,11 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._ik_status = self.endpoints.publisher(IK_STATUS)
         self._reference = self.endpoints.publisher(JOINT_REFERENCE)
         self._targets = {arm: self.endpoints.publisher(target_pose(arm)) for arm in self.robot.arms}
-        checks = (self._state_wire.joints.check, self._state_wire.odometry.check, self._pose_wire.check)
-        self.receive(GRASP_EVENT, self._on_grasp, check_stamp)
-        for topic, check in zip(_INPUTS, checks, strict=True):
-            self.receive(topic, self._taker(topic), check)
+        self.receive(GRASP_EVENT, self._on_grasp, stamped)
+        state = StateWire(self.robot.joint_names, WORLD, BASE)
+        self.receive(SAMPLED_JOINT_STATES, self._taker(SAMPLED_JOINT_STATES), state.joints.checked)
+        self.receive(SAMPLED_BASE_ODOMETRY, self._taker(SAMPLED_BASE_ODOMETRY), state.odometry.checked)
+        self.receive(DEPUTY_POSE, self._taker(DEPUTY_POSE), self._pose_wire.checked)
 
     def prepared(self) -> bool:
         """Tell whether the IK service is there."""
@@ -114,18 +122,18 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         stamp = self._inputs.oldest_ns
         return (self._inputs.missing(stamp, _INPUTS) if stamp is not None else "") or DEPUTY_POSE
 
-    def _taker(self, topic: str) -> Receive:
+    def _taker(self, topic: str) -> Receive[Stamped[Any]]:
         """Return the callback of a topic."""
-        return lambda data, sent_ns: self._take(topic, arrival_ns(data), data)
+        return lambda content, sent_ns: self._take(topic, *content)
 
-    def _take(self, topic: str, stamp: int, data: bytes) -> None:
+    def _take(self, topic: str, stamp: int, content: Any) -> None:
         """Take one input; time zero behind a later time begins the run anew."""
         if self._inputs.begins_anew(stamp):
             self._inputs.reset()
             self._generator.reset()
         if topic == DEPUTY_POSE and stamp == self._stamp_ns and self._asked is None:
             self._publish_again()
-        self._inputs.add(stamp, topic, data)
+        self._inputs.add(stamp, topic, content)
         self._newest_ns = stamp
         if self._asked is None:
             self._proceed(stamp)
@@ -135,10 +143,10 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         """Tell whether it has to be known what came of a grasp before the task goes on (lock step)."""
         return self._lockstep and self._generator.awaits_grasps
 
-    def _on_grasp(self, data: bytes, sent_ns: int) -> None:
+    def _on_grasp(self, message: Stamped[bytes], sent_ns: int) -> None:
         """Take what came of a grasp; the next state may have come before it."""
         try:
-            event = grasp_event(decoded(data, GraspEvent))
+            event = grasp_event(decoded(message[1], GraspEvent))
         except IndexError as error:
             text = "a grasp event has no known action or status"
             raise MessageError(Reason.NAMES, text) from error
@@ -154,8 +162,8 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         if inputs is None:
             return
         self._stamp_ns = stamp
-        state = self._state_wire.read(inputs[SAMPLED_JOINT_STATES], inputs[SAMPLED_BASE_ODOMETRY])
-        phase, targets = self._generator.targets(state, self._pose_wire.read_pose(inputs[DEPUTY_POSE]))
+        state = state_of(stamp, inputs[SAMPLED_JOINT_STATES], inputs[SAMPLED_BASE_ODOMETRY])
+        phase, targets = self._generator.targets(state, inputs[DEPUTY_POSE])
         for event in self._generator.take_decisions():
             self.events.publish(event)
         if targets.tool_in_world:

@@ -3,12 +3,15 @@
 from collections import Counter
 from collections.abc import Callable
 from time import monotonic
+from typing import TypeVar
 
 from sms_handover.errors import MessageError, Reason
-from sms_handover.ros.inputs import Deliver, Receive
+from sms_handover.ros.inputs import Deliver
 from sms_handover.ros.sender import Sender
 
-Check = Callable[[bytes], None]  # raises MessageError
+T = TypeVar("T")
+Read = Callable[[bytes], T]  # CDR bytes to what is in a good message; raises MessageError on others
+Receive = Callable[[T, int], None]  # what is in a message; wall time in ns of its sending
 First = Callable[[str, MessageError], None]  # topic and error of the first refusal of its kind
 
 REFUSED = "refused "  # begins the keys in the diagnostics of a node that count its refusals
@@ -56,8 +59,10 @@ class Refusals:
             self._tell(self._newest + more)
             self._untold, self._told_at = 0, now
 
-    def guarding(self, topic: str, receive: Receive, check: Check, sender: Sender | None = None) -> Deliver:
-        """Return what hands on the messages that pass the checks, and counts the others.
+    def guarding(
+        self, topic: str, receive: Receive[T], read: Read[T], sender: Sender | None = None
+    ) -> Deliver:
+        """Return what hands on what is in the messages that are good, and counts the others.
 
         ``receive`` may refuse a message too by a MessageError, as long as it has not used it.
         """
@@ -66,8 +71,7 @@ class Refusals:
             try:
                 if sender is not None and publisher != sender.own:
                     sender.require(publisher)
-                check(data)
-                receive(data, sent_ns)
+                receive(read(data), sent_ns)
             except MessageError as error:
                 self.add(topic, error)
 

@@ -15,10 +15,10 @@ from sms_handover.model.robot_model import RobotModel
 from sms_handover.parameters import EVERY_NODE
 from sms_handover.ros.convert import time_message
 from sms_handover.ros.direct_inputs import DirectInputs
-from sms_handover.ros.door import REFUSED, Check, Refusals
+from sms_handover.ros.door import REFUSED, Read, Receive, Refusals
 from sms_handover.ros.endpoints import Endpoints
 from sms_handover.ros.event_publisher import EventPublisher
-from sms_handover.ros.inputs import ExecutorInputs, Inputs, Receive
+from sms_handover.ros.inputs import ExecutorInputs, Inputs
 from sms_handover.ros.main import EXIT_OK, WAIT_S, RunnableNode, Stop
 from sms_handover.ros.managed_node import ManagedNode
 from sms_handover.ros.parameters import declare, refuse_unknown
@@ -36,6 +36,7 @@ from sms_handover.topics import (
 )
 
 P = TypeVar("P")
+T = TypeVar("T")
 
 INPUTS: dict[str, Callable[[Node], Inputs]] = {DIRECT: DirectInputs, EXECUTOR: ExecutorInputs}
 
@@ -139,10 +140,10 @@ class GraphNode(ManagedNode, Generic[P]):
         self.inputs.destroy()
         super().destroy_node()
 
-    def receive(self, name: str, receive: Receive, check: Check) -> None:
-        """Hand to ``receive`` the messages of a topic that its own publisher has sent and that are good."""
+    def receive(self, name: str, receive: Receive[T], read: Read[T]) -> None:
+        """Hand to ``receive`` what ``read`` finds in the good messages of a topic's own publisher."""
         sender = self.endpoints.sender(name)
-        self.endpoints.receive(name, self.inputs, self.refusals.guarding(name, receive, check, sender))
+        self.endpoints.receive(name, self.inputs, self.refusals.guarding(name, receive, read, sender))
 
     def settle(self) -> None:
         """Set up the process as the parameters ask; raises ConfigurationError. A node may override this."""

@@ -12,7 +12,7 @@ from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.errors import MessageError, Reason
 from sms_handover.ros.convert import phase_message
-from sms_handover.ros.wire import decoded
+from sms_handover.ros.wire import Stamped, arrival_ns, decoded
 from sms_handover.types import GraspAction, TaskPhase
 from sms_handover.units import NS_PER_S
 
@@ -26,7 +26,7 @@ class PhaseWire:
     """Packs and reads TaskPhase messages; all but the stamp is worked out once per phase."""
 
     def __init__(self, arms: Collection[str] = (), grasp_frames: Collection[str] = ()) -> None:
-        """Know the type of the message, and for :meth:`check` of which robot and deputy it may speak."""
+        """Know the type of the message, and for :meth:`checked` of which robot and deputy it may speak."""
         self._arms, self._grasp_frames = frozenset(arms), frozenset(grasp_frames)
         self._types = MessageTypes()
         self._packed: tuple[TaskPhase, bytes] | None = None
@@ -51,9 +51,13 @@ class PhaseWire:
                 raise MessageError(Reason.NAMES, text) from error
         return replace(self._read[1], stamp_ns=stamp_ns(data))
 
-    def check(self, data: bytes) -> None:
-        """Raise MessageError unless the grasp commands of a message are for the robot and the deputy."""
-        for command in self.read(data).commands:
+    def checked(self, data: bytes) -> Stamped[TaskPhase]:
+        """Return stamp and phase of a message.
+
+        Raises MessageError unless its grasp commands are for the robot and the deputy.
+        """
+        phase = self.read(data)
+        for command in phase.commands:
             arms = {command.arm, command.from_arm} - {""}
             frames = {command.grasp_frame} - {""}
             unknown = (arms - self._arms) | (frames - self._grasp_frames)
@@ -61,6 +65,7 @@ class PhaseWire:
                 named = f"arm {command.arm!r} and grasp frame {command.grasp_frame!r}"
                 text = f"a phase asks to {command.action.value} with {named}, which are not all known"
                 raise MessageError(Reason.NAMES, text)
+        return arrival_ns(data), phase
 
     def _serialize(self, phase: TaskPhase) -> bytes:
         """Return what follows the stamp in the bytes of a message.

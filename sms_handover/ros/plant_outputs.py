@@ -48,7 +48,7 @@ class PlantOutputs:
         At a reference period what the trajectory waits for goes first, because more has to be done with it.
         """
         publish = self._publish
-        joints, odometry = self._state_wire.pack(plant.state)
+        joints, odometry = self._state_wire.pack_arrays(plant.stamp_ns, plant.q, plant.v, plant.joint_effort)
         if with_reference:
             deputy = pose_row(plant.deputy.deputy_in_world)
             publish[SAMPLED_JOINT_STATES](joints)

@@ -122,14 +122,20 @@ class StampSync(Generic[V]):
 
     def missing(self, stamp_ns: int, names: tuple[str, ...]) -> str:
         """Return the last of the names of which nothing is there for a stamp, "" if there is none."""
-        inputs = self._waiting.get(stamp_ns, {})
-        return next((name for name in reversed(names) if name not in inputs), "")
+        inputs = self._waiting.get(stamp_ns, ())
+        for name in reversed(names):
+            if name not in inputs:
+                return name
+        return ""
 
     def take(self, stamp_ns: int, names: tuple[str, ...]) -> dict[str, V] | None:
         """Return the inputs of a stamp if all the named ones are there, else None."""
         inputs = self._waiting.get(stamp_ns)
-        if inputs is None or not inputs.keys() >= set(names):
+        if inputs is None or len(inputs) < len(names):
             return None
+        for name in names:
+            if name not in inputs:
+                return None
         self._taken_ns = stamp_ns
         if self._paced:
             self._taken_at_ns = monotonic_ns()

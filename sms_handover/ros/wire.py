@@ -1,13 +1,11 @@
 """The three messages of the hot path as CDR bytes, packed and read by a template.
 
-A JointState or Odometry of the loop has the same names every time, so its layout is fixed: the
-bytes of one message serve as a template in which only stamp and numbers are exchanged. A message
-of another layout (other names, other order, another sender's padding) is read the general way, by name.
+A JointState or Odometry of the loop has the same names every time, so its layout is fixed. A message of
+another layout (other names, other order, another sender's padding) is read the general way, by name.
 """
 
-import struct
-from collections.abc import Callable, Collection, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
@@ -22,16 +20,19 @@ from sms_handover.checks import check_finite, check_unit
 from sms_handover.errors import BagError, GraphError, MessageError, Reason
 from sms_handover.model.poses import pose_row
 from sms_handover.ros.convert import joints_in_order, pose_of_message
+from sms_handover.ros.template import Template
 from sms_handover.types import BASE_NQ, BASE_NV, Array, Pose, RobotState, frozen
-from sms_handover.units import NS_PER_S, ns_to_seconds
+from sms_handover.units import ns_to_seconds
 
 _RmwError = rclpy_implementation.RMWError
 
-_STAMP = struct.Struct("<iI")  # seconds, nanoseconds
-_STAMP_AT = 4  # [byte] behind the encapsulation header
-_BODY_AT = _STAMP_AT + _STAMP.size
-_DOUBLE = 8  # [byte]
-_LITTLE_ENDIAN = b"\x00\x01"  # encapsulation of plain CDR
+T = TypeVar("T")
+Stamped = tuple[int, T]  # stamp of a message in ns, and what is in it
+
+_BLOCKS = ("position", "velocity", "effort")  # of a JointState, as they stand in it
+_COVARIANCE = 36  # numbers of an Odometry behind its pose, and behind its twist
+_POSE = slice(BASE_NQ)
+_TWIST = slice(BASE_NQ + _COVARIANCE, BASE_NQ + _COVARIANCE + BASE_NV)
 _LARGEST = 65536  # [byte] of a message of another layout
 
 
@@ -41,52 +42,42 @@ class JointStateWire:
     def __init__(self, names: Sequence[str], blocks: Sequence[str]) -> None:
         """Fix the joint names and which of position, velocity and effort are filled."""
         self._names = tuple(names)
-        self._blocks = tuple(blocks)
+        self._blocks = tuple(block for block in _BLOCKS if block in blocks)
         n = len(self._names)
         marked = {block: np.full(n, float(i + 1)) for i, block in enumerate(self._blocks)}
-        self._template = _joint_state(self._names, marked)
-        self._at = {block: _find(self._template, values) for block, values in marked.items()}
-        self._fixed = _around(self._template, self._at.values(), n * _DOUBLE)
-        self._buffer = bytearray(self._template)
-        self._numbers = {block: np.frombuffer(self._buffer, "<f8", n, at) for block, at in self._at.items()}
-        self._first_at = min(self._at.values())
-        self._count = (max(self._at.values()) - self._first_at) // _DOUBLE + n  # of numbers, lengths included
+        self._template = Template(_joint_state(self._names, marked), tuple(marked.values()))
+        self._parts = self._template.parts
 
     def pack(self, stamp_ns: int, **blocks: Array) -> bytes:
         """Return the bytes of a message with a stamp and the arrays (n,) of every block."""
-        _STAMP.pack_into(self._buffer, _STAMP_AT, stamp_ns // NS_PER_S, stamp_ns % NS_PER_S)
-        for block, numbers in self._numbers.items():
-            numbers[:] = blocks[block]
-        return bytes(self._buffer)
+        return self._template.pack(stamp_ns, *[blocks[block] for block in self._blocks])
 
     def read(self, data: bytes) -> dict[str, Array]:
         """Return the arrays (n,) of every block in the order of the joints; raises MessageError."""
-        if len(data) == len(self._template) and self._same_layout(data):
-            n = len(self._names)
-            return {block: np.frombuffer(data, "<f8", n, at) for block, at in self._at.items()}
+        if self._template.stamp_of(data) is None:
+            return self._read_anyway(data)
+        numbers = self._template.numbers(data)
+        return {block: numbers[part] for block, part in zip(self._blocks, self._parts, strict=True)}
+
+    def checked(self, data: bytes) -> Stamped[tuple[Array, ...]]:
+        """Return the stamp and the arrays (n,) of every block of a good message, read-only.
+
+        Raises MessageError unless it has every joint with finite numbers.
+        """
+        stamp = self._template.stamp_of(data)
+        if stamp is None:
+            blocks = self._read_anyway(data)
+            for block, values in blocks.items():
+                check_finite(values, f"{block} in a joint message")
+            return arrival_ns(data), tuple(map(frozen, blocks.values()))
+        numbers = self._template.numbers(data)
+        check_finite(numbers, "a joint message")
+        return stamp, tuple([numbers[part] for part in self._parts])
+
+    def _read_anyway(self, data: bytes) -> dict[str, Array]:
+        """Return the arrays of every block of a message of any layout; raises MessageError."""
         message = decoded(data, JointState)
         return {b: joints_in_order(self._names, message.name, getattr(message, b)) for b in self._blocks}
-
-    def check(self, data: bytes) -> None:
-        """Raise MessageError unless the message has every joint with finite numbers.
-
-        What stands between the blocks of the template is their length, which is finite too if it is
-        taken for a number, so one look is enough for all of them.
-        """
-        if len(data) == len(self._template) and self._same_layout(data):
-            check_finite(np.frombuffer(data, "<f8", self._count, self._first_at), "a joint message")
-            return
-        for block, values in self.read(data).items():
-            check_finite(values, f"{block} in a joint message")
-
-    def _same_layout(self, data: bytes) -> bool:
-        """Tell whether the bytes are little endian and have names and lengths where the template has them."""
-        if not data.startswith(_LITTLE_ENDIAN):
-            return False
-        for at, part in self._fixed:  # noqa: SIM110  all() with a generator takes three times as long
-            if not data.startswith(part, at):
-                return False
-        return True
 
 
 class OdometryWire:
@@ -95,30 +86,43 @@ class OdometryWire:
     def __init__(self, frame: str, child_frame: str) -> None:
         """Fix the names of the frames."""
         self._frames = (frame, child_frame)
-        pose, twist = np.arange(1.0, 8.0), np.arange(11.0, 17.0)
-        self._template = _odometry(frame, child_frame, pose, twist)
-        self._pose_at = _find(self._template, pose)
-        self._twist_at = _find(self._template, twist)
-        self._fixed = self._template[_BODY_AT : self._pose_at]
-        self._buffer = bytearray(self._template)
-        self._pose = np.frombuffer(self._buffer, "<f8", BASE_NQ, self._pose_at)
-        self._twist = np.frombuffer(self._buffer, "<f8", BASE_NV, self._twist_at)
+        numbers = np.arange(1.0, 1.0 + 2 * _COVARIANCE + BASE_NQ + BASE_NV)
+        self._template = Template(_odometry(frame, child_frame, numbers), (numbers,))
+        self._numbers = np.zeros_like(numbers)
 
     def pack(self, stamp_ns: int, pose: Array, twist: Array) -> bytes:
         """Return the bytes of a message with a stamp.
 
         ``pose`` (7,) is position and quaternion x y z w, ``twist`` (6,) the linear, then the angular part.
         """
-        _STAMP.pack_into(self._buffer, _STAMP_AT, stamp_ns // NS_PER_S, stamp_ns % NS_PER_S)
-        self._pose[:] = pose
-        self._twist[:] = twist
-        return bytes(self._buffer)
+        self._numbers[_POSE], self._numbers[_TWIST] = pose, twist
+        return self._template.pack(stamp_ns, self._numbers)
 
     def read(self, data: bytes) -> tuple[Array, Array]:
         """Return pose (7,) and twist (6,) as they are packed; raises MessageError on others."""
-        if len(data) >= len(self._template) and self._same_layout(data):
-            pose = np.frombuffer(data, "<f8", BASE_NQ, self._pose_at)
-            return pose, np.frombuffer(data, "<f8", BASE_NV, self._twist_at)
+        if self._template.stamp_of(data) is None:
+            return self._read_anyway(data)
+        numbers = self._template.numbers(data)
+        return numbers[_POSE], numbers[_TWIST]
+
+    def checked(self, data: bytes) -> Stamped[tuple[Array, Array]]:
+        """Return the stamp, and pose (7,) and twist (6,), of a good message, read-only.
+
+        Raises MessageError unless frames, rotation and numbers are good.
+        """
+        stamp = self._template.stamp_of(data)
+        if stamp is None:
+            pose, twist = map(frozen, self._read_anyway(data))
+        else:
+            numbers = self._template.numbers(data)
+            pose, twist = numbers[_POSE], numbers[_TWIST]
+        check_finite(pose, "the pose of an odometry message")
+        check_finite(twist, "the twist of an odometry message")
+        check_unit(pose[3:], "an odometry message")
+        return arrival_ns(data) if stamp is None else stamp, (pose, twist)
+
+    def _read_anyway(self, data: bytes) -> tuple[Array, Array]:
+        """Return pose and twist of a message of any layout; raises MessageError."""
         message = decoded(data, Odometry)
         frames = (message.header.frame_id, message.child_frame_id)
         if frames != self._frames:
@@ -128,47 +132,24 @@ class OdometryWire:
         twist = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
         return pose_row(pose_of_message(message.pose.pose)), np.array(twist)
 
-    def check(self, data: bytes) -> None:
-        """Raise MessageError unless frames, rotation and numbers are good."""
-        pose, twist = self.read(data)
-        check_finite(pose, "the pose of an odometry message")
-        check_finite(twist, "the twist of an odometry message")
-        check_unit(pose[3:], "an odometry message")
-
-    def _same_layout(self, data: bytes) -> bool:
-        """Tell whether the bytes are little endian and have the frames of the template."""
-        return data.startswith(_LITTLE_ENDIAN) and data.startswith(self._fixed, _BODY_AT)
-
 
 class StampedWire:
     """Packs messages that are a header and then a fixed count of doubles, such as PoseStamped."""
 
     def __init__(
-        self, type_name: str, frame: str, fields: Callable[[MessageTypes, Array], dict[str, Any]]
+        self, type_name: str, frame: str, count: int, fields: Callable[[MessageTypes, Array], dict[str, Any]]
     ) -> None:
-        """Fix type and frame; ``fields`` makes the fields beside the header from some numbers."""
+        """Fix type and frame; ``fields`` makes the fields beside the header from ``count`` numbers."""
         types = MessageTypes()
-        numbers = np.arange(1.0, 16.0)
-        message = types.make(type_name, header=_header(types, frame), **fields(types, numbers))
-        self._template = types.serialize(message)
-        self._at = self._template.index(numbers[:1].tobytes())
-
-    def read(self, data: bytes) -> Array | None:
-        """Return the numbers in the bytes of a message, or None if it is of another layout."""
-        if len(data) != len(self._template) or not data.startswith(_LITTLE_ENDIAN):
-            return None
-        if not data.startswith(self._template[_BODY_AT : self._at], _BODY_AT):
-            return None
-        return np.frombuffer(data, "<f8", offset=self._at)
+        self._example = np.arange(1.0, 1.0 + count)
+        message = types.make(type_name, header=_header(types, frame), **fields(types, self._example))
+        self._template = Template(types.serialize(message), (self._example,))
 
     def pack(self, stamp_ns: int, numbers: Array) -> bytes:
         """Return the bytes of a message with a stamp and all its numbers in the order of the fields."""
-        buffer = bytearray(self._template)
-        _STAMP.pack_into(buffer, _STAMP_AT, stamp_ns // NS_PER_S, stamp_ns % NS_PER_S)
-        if numbers.nbytes != len(buffer) - self._at:
+        if numbers.size != self._example.size:
             raise GraphError(f"{numbers.size} numbers do not fill a message of this layout")
-        buffer[self._at :] = numbers.tobytes()
-        return bytes(buffer)
+        return self._template.pack(stamp_ns, numbers)
 
 
 class PoseWire(StampedWire):
@@ -176,13 +157,15 @@ class PoseWire(StampedWire):
 
     def __init__(self, frame: str) -> None:
         """Fix the frame."""
-        super().__init__("geometry_msgs/msg/PoseStamped", frame, lambda types, n: {"pose": _pose(types, n)})
+        super().__init__(
+            "geometry_msgs/msg/PoseStamped", frame, BASE_NQ, lambda types, n: {"pose": _pose(types, n)}
+        )
         self._frame = frame
 
     def read_pose(self, data: bytes) -> Pose:
         """Return the pose in the bytes of a message of any layout; raises MessageError."""
-        numbers = self.read(data)
-        if numbers is not None:
+        if self._template.stamp_of(data) is not None:
+            numbers = self._template.numbers(data)
             return Pose(numbers[:3], numbers[3:])
         message = decoded(data, PoseStamped)
         if message.header.frame_id != self._frame:
@@ -190,23 +173,24 @@ class PoseWire(StampedWire):
             raise MessageError(Reason.FRAME, text)
         return pose_of_message(message.pose)
 
-    def check(self, data: bytes) -> None:
-        """Raise MessageError unless frame, rotation and numbers are good."""
-        pose = pose_row(self.read_pose(data))
-        check_finite(pose, "a pose")
-        check_unit(pose[3:], "a pose")
+    def checked(self, data: bytes) -> Stamped[Pose]:
+        """Return stamp and pose of a message; raises MessageError unless frame and numbers are good."""
+        pose = self.read_pose(data)
+        check_finite(pose_row(pose), "a pose")
+        check_unit(pose.quaternion_xyzw, "a pose")
+        return arrival_ns(data), pose
 
 
 def vector_wire(frame: str) -> StampedWire:
     """Return what packs Vector3Stamped."""
     name = "geometry_msgs/msg/Vector3Stamped"
-    return StampedWire(name, frame, lambda types, n: {"vector": _geometry(types, "Vector3", n[:3])})
+    return StampedWire(name, frame, 3, lambda types, n: {"vector": _geometry(types, "Vector3", n)})
 
 
 def energy_wire(frame: str) -> StampedWire:
     """Return what packs EnergyStamped: kinetic energy, then work."""
     name = "sms_handover_interfaces/msg/EnergyStamped"
-    return StampedWire(name, frame, lambda types, n: {"kinetic": float(n[0]), "work": float(n[1])})
+    return StampedWire(name, frame, 2, lambda types, n: {"kinetic": float(n[0]), "work": float(n[1])})
 
 
 class StateWire:
@@ -214,27 +198,36 @@ class StateWire:
 
     def __init__(self, joint_names: Sequence[str], world: str, base: str) -> None:
         """Fix joint and frame names."""
-        self.joints = JointStateWire(joint_names, ("position", "velocity", "effort"))
+        self.joints = JointStateWire(joint_names, _BLOCKS)
         self.odometry = OdometryWire(world, base)
 
     def pack(self, state: RobotState) -> tuple[bytes, bytes]:
         """Return the bytes of the JointState and the Odometry of a state."""
-        joints = self.joints.pack(
-            state.stamp_ns,
-            position=state.joint_position,
-            velocity=state.joint_velocity,
-            effort=state.joint_effort,
-        )
-        odometry = self.odometry.pack(state.stamp_ns, state.q[:BASE_NQ], state.v[:BASE_NV])
-        return joints, odometry
+        return self.pack_arrays(state.stamp_ns, state.q, state.v, state.joint_effort)
+
+    def pack_arrays(self, stamp_ns: int, q: Array, v: Array, joint_effort: Array) -> tuple[bytes, bytes]:
+        """Return the same for a state as bare arrays."""
+        position, velocity = q[BASE_NQ:], v[BASE_NV:]
+        joints = self.joints.pack(stamp_ns, position=position, velocity=velocity, effort=joint_effort)
+        return joints, self.odometry.pack(stamp_ns, q[:BASE_NQ], v[:BASE_NV])
 
     def read(self, joints: bytes, odometry: bytes) -> RobotState:
         """Return the state that two messages of equal stamp carry."""
-        blocks = self.joints.read(joints)
-        base_in_world, twist_base_in_base = self.odometry.read(odometry)
-        q = frozen(np.concatenate([base_in_world, blocks["position"]]))
-        v = frozen(np.concatenate([twist_base_in_base, blocks["velocity"]]))
-        return RobotState(stamp_ns(joints), q, v, blocks["effort"])
+        blocks = tuple(self.joints.read(joints).values())
+        return state_of(stamp_ns(joints), blocks, self.odometry.read(odometry))
+
+
+def state_of(stamp_ns: int, joints: tuple[Array, ...], odometry: tuple[Array, Array]) -> RobotState:
+    """Return the state that two messages carry, from what :class:`StateWire` has read in them."""
+    return RobotState(stamp_ns, *coordinates(joints, odometry), joints[2])
+
+
+def coordinates(joints: tuple[Array, ...], odometry: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Return q (7 + n,) and v (6 + n,) of that state, read-only."""
+    position, velocity, _ = joints
+    base_in_world, twist_base_in_base = odometry
+    q = np.concatenate((base_in_world, position))
+    return frozen(q), frozen(np.concatenate((twist_base_in_base, velocity)))
 
 
 def decoded(data: bytes, kind: Any) -> Any:
@@ -259,31 +252,35 @@ def arrival_ns(data: bytes) -> int:
     return stamp
 
 
-def check_stamp(data: bytes) -> None:
-    """Raise MessageError unless a message begins with a stamp, of which there is nothing else to check."""
-    arrival_ns(data)
+def stamped(data: bytes) -> Stamped[bytes]:
+    """Return the stamp of a message, of which there is nothing else to check, and its bytes.
+
+    Raises MessageError unless it begins with one.
+    """
+    return arrival_ns(data), data
 
 
 def _joint_state(names: tuple[str, ...], blocks: dict[str, Array]) -> bytes:
     """Return the bytes of a JointState with stamp zero; blocks that are not given are empty."""
     types = MessageTypes()
-    arrays = {block: blocks.get(block, np.zeros(0)) for block in ("position", "velocity", "effort")}
+    arrays = {block: blocks.get(block, np.zeros(0)) for block in _BLOCKS}
     message = types.make("sensor_msgs/msg/JointState", header=_header(types, ""), name=list(names), **arrays)
     return types.serialize(message)
 
 
-def _odometry(frame: str, child_frame: str, pose: Array, twist: Array) -> bytes:
-    """Return the bytes of an Odometry with stamp zero and zero covariances."""
+def _odometry(frame: str, child_frame: str, numbers: Array) -> bytes:
+    """Return the bytes of an Odometry with stamp zero: pose, its covariance, twist, its covariance."""
     types = MessageTypes()
+    pose, twist = numbers[_POSE], numbers[_TWIST]
     linear, angular = (_geometry(types, "Vector3", part) for part in (twist[:3], twist[3:]))
     motion = types.make("geometry_msgs/msg/Twist", linear=linear, angular=angular)
-    covariance = {"covariance": np.zeros(36)}
+    of_pose, of_twist = numbers[_POSE.stop : _TWIST.start], numbers[_TWIST.stop :]
     message = types.make(
         "nav_msgs/msg/Odometry",
         header=_header(types, frame),
         child_frame_id=child_frame,
-        pose=types.make("geometry_msgs/msg/PoseWithCovariance", pose=_pose(types, pose), **covariance),
-        twist=types.make("geometry_msgs/msg/TwistWithCovariance", twist=motion, **covariance),
+        pose=types.make("geometry_msgs/msg/PoseWithCovariance", pose=_pose(types, pose), covariance=of_pose),
+        twist=types.make("geometry_msgs/msg/TwistWithCovariance", twist=motion, covariance=of_twist),
     )
     return types.serialize(message)
 
@@ -305,18 +302,3 @@ def _header(types: MessageTypes, frame: str) -> Any:
     """Return a header with stamp zero."""
     time = types.make("builtin_interfaces/msg/Time", sec=0, nanosec=0)
     return types.make("std_msgs/msg/Header", stamp=time, frame_id=frame)
-
-
-def _around(template: bytes, starts: Collection[int], size: int) -> tuple[tuple[int, bytes], ...]:
-    """Return the bytes behind the stamp that every message of a layout has, each part with its place.
-
-    They are what is left when ``size`` bytes of numbers are taken out at each of ``starts``.
-    """
-    begins = [_BODY_AT, *(start + size for start in starts)]
-    ends = [*starts, len(template)]
-    return tuple((begin, template[begin:end]) for begin, end in zip(begins, ends, strict=True))
-
-
-def _find(raw: bytes, values: Array) -> int:
-    """Return where the doubles of an array stand in the bytes of a message."""
-    return raw.index(values.tobytes())

@@ -96,10 +96,10 @@ def _wires() -> tuple[Callable[[bytes], object], ...]:
     names, arms = _robot().joint_names, _robot().arms
     state, odometry = JointStateWire(names, ("position", "velocity", "effort")), OdometryWire(WORLD, BASE)
     command, pose, phase = JointStateWire(names, ("effort",)), PoseWire(WORLD), PhaseWire(arms, ("end_a",))
-    checks = (state.check, odometry.check, command.check, pose.check, phase.check, arrival_ns)
+    checked = (state.checked, odometry.checked, command.checked, pose.checked, phase.checked, arrival_ns)
     types = MessageTypes()
     decoders = tuple(_decoder(types, name) for name in _BASE_OF_TYPES)
-    return (*checks, state.read, odometry.read, pose.read_pose, phase.read, *decoders)
+    return (*checked, state.read, odometry.read, pose.read_pose, phase.read, *decoders)
 
 
 def _decoder(types: MessageTypes, name: str) -> Callable[[bytes], object]:

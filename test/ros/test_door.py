@@ -91,11 +91,12 @@ def test_nothing_refused_is_not_told(log: Log) -> None:
 def test_a_message_that_fails_a_check_is_not_handed_on(log: Log) -> None:
     taken: list[bytes] = []
 
-    def check(data: bytes) -> None:
+    def checked(data: bytes) -> bytes:
         if data == b"bad":
             raise BAD
+        return data
 
-    deliver = log.refusals.guarding("a", lambda data, sent_ns: taken.append(data), check)
+    deliver = log.refusals.guarding("a", lambda data, sent_ns: taken.append(data), checked)
     for data in (b"one", b"bad", b"two"):
         deliver(data, 0, b"")
     assert taken == [b"one", b"two"]
@@ -107,7 +108,7 @@ def test_other_errors_are_not_swallowed(log: Log) -> None:
         raise RuntimeError("broken")
 
     with pytest.raises(RuntimeError):
-        log.refusals.guarding("a", fail, lambda data: None)(b"", 0, b"")
+        log.refusals.guarding("a", fail, bytes)(b"", 0, b"")
 
 
 # Who a message is from

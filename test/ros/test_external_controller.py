@@ -62,7 +62,7 @@ def test_guidance_is_given_once_when_all_of_one_instant_is_there(scenario: Scena
     """In each of the 24 orders, and never of two instants together."""
     kept = Kept()
     guided = GuidedController(kept, scenario.robot)
-    assert not np.any(guided.step(_STATE).effort)
+    assert not np.any(guided.effort(0, _STATE.q, _STATE.v))
     for number, order in enumerate(permutations(range(4))):
         for place, part in enumerate(order):
             assert len(kept.guidance) == number, place
@@ -73,9 +73,9 @@ def test_guidance_is_given_once_when_all_of_one_instant_is_there(scenario: Scena
         assert len(kept.guidance) == number + 1
         assert (last.phase.stamp_ns, last.reference.stamp_ns) == (number, number)
         assert list(last.tool_in_world) == ["arm_a", "arm_b"]
-    assert guided.step(_STATE).effort.tolist() == [24.0] * 14
+    assert guided.effort(0, _STATE.q, _STATE.v).tolist() == [24.0] * 14
     guided.reset()
-    assert kept.guidance == [] and not np.any(guided.step(_STATE).effort)
+    assert kept.guidance == [] and not np.any(guided.effort(0, _STATE.q, _STATE.v))
 
 
 def test_its_parameters_are_ros_parameters_with_unit_and_range(bench: Bench) -> None:

@@ -54,8 +54,10 @@ class Loop:
     def answer(self, tick: int) -> None:
         """Answer the state of a tick."""
         if tick % PER_PERIOD == 0:
-            self.plant._on_phase(self._phase.pack(TaskPhase(tick * TICK_NS, 0, "approach")), 0)
-        self.plant._on_command(self._command.pack(tick * TICK_NS, effort=np.zeros(14)), 0)
+            phase = self._phase.pack(TaskPhase(tick * TICK_NS, 0, "approach"))
+            self.plant._on_phase(self._phase.checked(phase), 0)
+        command = self._command.pack(tick * TICK_NS, effort=np.zeros(14))
+        self.plant._on_command(self._command.checked(command), 0)
         assert self.plant.diagnostic_stamp_ns() == (tick + 1) * TICK_NS
 
 
