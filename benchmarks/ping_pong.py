@@ -40,7 +40,7 @@ class Side:
         node = Node(name, start_parameter_services=False, enable_rosout=False)
         endpoints = self._endpoints = Endpoints(node, graph_topics(_ARMS), (PLANT, CONTROLLER))
         self._inputs = DirectInputs(node)
-        self._last = takes[-1]
+        self._inputs.awaited = lambda: takes[-1]
         self._came = dict.fromkeys(takes, -_TICK_NS)
         self._publish = [endpoints.publisher(topic).publish for topic in sends]
         for topic in takes:
@@ -72,7 +72,7 @@ class Side:
     def wait(self, stamp: int) -> None:
         """Sleep until every message of a stamp has come."""
         while min(self._came.values()) < stamp:
-            self._inputs.spin_once(self._executor, _WAIT_S, self._last)
+            self._inputs.spin_once(self._executor, _WAIT_S)
 
     def _taker(self, topic: str) -> Deliver:
         """Return what notes the stamp of a message."""

@@ -139,7 +139,7 @@ class PlantNode(GraphNode[PlantParameters]):
         clock = self._loop_clock
         left_s = clock.wait_s() - self.parameters.busy_wait
         if left_s > 0.0:
-            self.inputs.spin_once(executor, left_s, self.awaited)
+            self.inputs.spin_once(executor, left_s)
             return
         self.inputs.poll()
         if clock.due():
@@ -161,12 +161,12 @@ class PlantNode(GraphNode[PlantParameters]):
     @property
     def _needed(self) -> tuple[str, ...]:
         """Return the inputs that complete this tick, the last one to come last."""
-        return _PHASE_AND_COMMAND if self._at_reference else _COMMAND
+        return _COMMAND if self._plant.tick % self._per_reference else _PHASE_AND_COMMAND
 
     @property
     def _at_reference(self) -> bool:
         """Tell whether a reference period begins with this tick."""
-        return self._plant.tick % self._per_reference == 0
+        return self._needed is _PHASE_AND_COMMAND
 
     def _make_endpoints(self) -> None:
         """Make publishers, subscriptions and services."""

@@ -37,7 +37,7 @@ class DirectInputs(Inputs):
         """Serve a node."""
         self._node = node
         self._sources: dict[str, _Source] = {}
-        self._others: tuple[Inputs, ...] = ()
+        self._company: tuple[DirectInputs, ...] = ()
         self._serve_at = self._hot_until = 0.0
         self._slept = False
 
@@ -63,7 +63,7 @@ class DirectInputs(Inputs):
 
     def accompany(self, others: Sequence[Inputs]) -> None:
         """Serve those of other nodes of the same process and thread too, in this order."""
-        self._others = tuple(others)
+        self._company = (self, *(other for other in others if isinstance(other, DirectInputs)))
 
     def poll(self) -> int:
         """Hand over everything that has come, in the order in which the inputs were made.
@@ -75,29 +75,45 @@ class DirectInputs(Inputs):
             found = sum([source.take_closed(drop=self.drops) for source in self._sources.values()])
         else:
             found = sum([source.take_all() for source in self._sources.values()])
-        for other in self._others:
+        for other in self._company[1:]:
             found = found or other.poll()
         return found
 
-    def spin_once(self, executor: Executor, timeout_s: float, awaited: str = "") -> None:
-        """Handle what has come; else sleep until ``awaited`` comes, with turns of the executor between."""
+    def spin_once(self, executor: Executor, timeout_s: float) -> None:
+        """Handle what has come; else sleep until what is awaited comes, with turns of the executor between."""
         found, now = self.poll(), monotonic()
         if found:
             until = min(self._serve_at, now + timeout_s)
-            while self._others and found and now < until:  # nodes of one process that answer each other
-                found, now = self.poll(), monotonic()
+            while self._company and found and now < until:  # nodes of one process that answer each other
+                found, now = self._answer_each_other() or self.poll(), monotonic()
             self._hot_until = now + _HOT_S
             self.wakes += self._slept
             self._slept = False
-        elif self.closed or now > self._hot_until or awaited not in self._sources:
+        elif self.closed or now > self._hot_until or (awaited := self._sources.get(self.awaited())) is None:
             executor.spin_once(timeout_sec=min(timeout_s, _IDLE_S))
             return
         else:
             self._slept = True
-            self._sources[awaited].wait(min(timeout_s, _SERVE_S))
+            awaited.wait(min(timeout_s, _SERVE_S))
         if now >= self._serve_at:
             self._serve_at = now + _SERVE_S
             executor.spin_once(timeout_sec=0.0)
+
+    def _answer_each_other(self) -> bool:
+        """Hand over one message that a node cannot go on without, and tell whether there was one.
+
+        Among nodes of one process it is there as soon as the other has published it, so this is nearly
+        always enough; to look for the others each time would take longer than to publish them.
+        """
+        for inputs in self._company:  # noqa: SIM110  any() with a generator takes longer
+            if inputs._take_awaited():
+                return True
+        return False
+
+    def _take_awaited(self) -> bool:
+        """Hand over the next message that is awaited, and tell whether there was one."""
+        source = None if self.closed else self._sources.get(self.awaited())
+        return source is not None and source.take_one()
 
     def destroy(self) -> None:
         """Give everything back to the middleware."""
@@ -122,8 +138,15 @@ class _Source(ABC):
         """Put the entity into the wait set."""
 
     @abstractmethod
+    def take_one(self) -> bool:
+        """Hand over the next of what has come, and tell whether there was one."""
+
     def take_all(self) -> int:
         """Hand over what has come, ``_BATCH`` at most, and return how many there were."""
+        for taken in range(_BATCH):
+            if not self.take_one():
+                return taken
+        return _BATCH
 
     def take_closed(self, *, drop: bool) -> int:
         """Do what is due while the inputs are closed, and return how many there were: by default, wait."""
@@ -153,15 +176,14 @@ class _Messages(_Source):
     def _watch(self) -> None:
         self._wait_set.add_subscription(self._entity.handle)
 
-    def take_all(self) -> int:
-        """Hand over what has come."""
-        for taken in range(_BATCH):
-            message = self._take()
-            if message is None:
-                return taken
-            data, sent_ns, publisher = message
-            self._deliver(data, sent_ns or time_ns(), publisher)
-        return _BATCH
+    def take_one(self) -> bool:
+        """Hand over the next message."""
+        message = self._take()
+        if message is None:
+            return False
+        data, sent_ns, publisher = message
+        self._deliver(data, sent_ns or time_ns(), publisher)
+        return True
 
     def take_closed(self, *, drop: bool) -> int:
         """Lose what has come, if that is wanted."""
@@ -197,14 +219,13 @@ class _Answers(_Source, Asker):
     def _watch(self) -> None:
         self._wait_set.add_client(self._entity.handle)
 
-    def take_all(self) -> int:
-        """Hand over what has come."""
-        for taken in range(_BATCH):
-            header, response = self._entity.handle.take_response(self._response)
-            if header is None:
-                return taken
-            self._receive(response)
-        return _BATCH
+    def take_one(self) -> bool:
+        """Hand over the next answer."""
+        header, response = self._entity.handle.take_response(self._response)
+        if header is None:
+            return False
+        self._receive(response)
+        return True
 
 
 class _Requests(_Source):
@@ -219,15 +240,14 @@ class _Requests(_Source):
     def _watch(self) -> None:
         self._wait_set.add_service(self._entity.handle)
 
-    def take_all(self) -> int:
-        """Answer what has come."""
-        for taken in range(_BATCH):
-            request, header = self._entity.handle.service_take_request(self._kind.Request)
-            if header is None:
-                return taken
-            response = self._answer(request, self._kind.Response())
-            self._entity.send_response(response, header)
-        return _BATCH
+    def take_one(self) -> bool:
+        """Answer the next request."""
+        request, header = self._entity.handle.service_take_request(self._kind.Request)
+        if header is None:
+            return False
+        response = self._answer(request, self._kind.Response())
+        self._entity.send_response(response, header)
+        return True
 
     def take_closed(self, *, drop: bool) -> int:
         """Answer all the same."""

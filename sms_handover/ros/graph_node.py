@@ -65,6 +65,7 @@ class GraphNode(ManagedNode, Generic[P]):
             self.parameters: P = declare(self, group, f"{name}.yaml" if shipped else None, name)
             refuse_unknown(self, CommonParameters, group)
             self.inputs = INPUTS[self.common.transport](self)
+            self.inputs.awaited = lambda: self.awaited
         except ConfigurationError as error:
             self._refusal = error
         self.inputs.close(drop=False)
@@ -122,7 +123,7 @@ class GraphNode(ManagedNode, Generic[P]):
 
     def turn(self, executor: Executor) -> None:
         """Handle what has come, or wait a little for something to come; a node may override this."""
-        self.inputs.spin_once(executor, WAIT_S, self.awaited if self.active else "")
+        self.inputs.spin_once(executor, WAIT_S)
 
     def accompany(self, others: Sequence[RunnableNode]) -> None:
         """Serve the inputs of other nodes of the same process in the loop of this one."""

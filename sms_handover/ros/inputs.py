@@ -38,10 +38,12 @@ class Inputs(ABC):
     """The messages, requests and answers that the loop of one node waits for.
 
     ``wakes`` counts how often something awaited has ended a sleep: a loop that is woken more than once
-    per tick loses time. ``identifies`` tells whether it is known who a message is from.
+    per tick loses time. ``awaited`` names the topic or service without which the loop cannot go on, "" if
+    there is none; the node sets it. ``identifies`` tells whether it is known who a message is from.
     """
 
     wakes: int = 0
+    awaited: Callable[[], str] = str
     identifies: bool = False
     closed: bool = False
     drops: bool = False
@@ -82,11 +84,10 @@ class Inputs(ABC):
         """Hand over everything that has come and that no executor will, and return how many there were."""
 
     @abstractmethod
-    def spin_once(self, executor: Executor, timeout_s: float, awaited: str = "") -> None:
+    def spin_once(self, executor: Executor, timeout_s: float) -> None:
         """Handle what has come, of the loop and of the executor; sleep at most ``timeout_s`` if nothing has.
 
-        ``awaited`` names the topic or service without which the loop cannot go on: its arrival ends
-        the sleep, while that of others need not.
+        The arrival of what is ``awaited`` ends the sleep, while that of others need not.
         """
 
 
@@ -140,7 +141,7 @@ class ExecutorInputs(Inputs):
         """Return 0: the executor hands over everything."""
         return 0
 
-    def spin_once(self, executor: Executor, timeout_s: float, awaited: str = "") -> None:
+    def spin_once(self, executor: Executor, timeout_s: float) -> None:
         """Let the executor handle what comes."""
         executor.spin_once(timeout_sec=timeout_s)
 

@@ -39,10 +39,11 @@ class Loop:
         if not self._added:
             self._executor.add_node(self.node)
             self._added = True
+        self.inputs.awaited = lambda: awaited
         deadline = monotonic() + DEADLINE_S
         while not condition():
             assert monotonic() < deadline
-            self.inputs.spin_once(self._executor, 0.05, awaited)
+            self.inputs.spin_once(self._executor, 0.05)
 
 
 @pytest.fixture(params=[DirectInputs, ExecutorInputs])
