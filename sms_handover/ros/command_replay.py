@@ -15,11 +15,11 @@ from sms_handover.bag.ticks import RecordedTick
 from sms_handover.frames import BASE, WORLD
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.ros.convert import header
-from sms_handover.ros.door import Refusals
+from sms_handover.ros.door import Read, Refusals
 from sms_handover.ros.endpoints import CountedPublisher, Endpoints
 from sms_handover.ros.inputs import Deliver
 from sms_handover.ros.stamp_sync import StampSync
-from sms_handover.ros.wire import JointStateWire, StateWire, arrival_ns, check_stamp, decoded
+from sms_handover.ros.wire import JointStateWire, Stamped, StateWire, decoded
 from sms_handover.topics import (
     BASE_ODOMETRY,
     CONTROLLER,
@@ -70,10 +70,10 @@ class CommandReplay:
         self._ready = self._endpoints.publisher(RUN_READY)
         self._answers: list[tuple[CountedPublisher, Any]] = []  # to the last state
         self.refusals = Refusals(node.get_logger().warning, lambda topic, error: None)
-        checks = dict(zip(_STATE, (self._wire.joints.check, self._wire.odometry.check), strict=True))
-        for name, check in checks.items():
-            self._listen(name, self.refusals.guarding(name, partial(self._take, name), check))
-        self._listen(RUN_STATE, self.refusals.guarding(RUN_STATE, self._on_run_state, check_stamp))
+        reads = dict(zip(_STATE, (self._wire.joints.checked, self._wire.odometry.checked), strict=True))
+        for name, read in reads.items():
+            self._listen(name, self.refusals.guarding(name, partial(self._take, name), _as_it_came(read)))
+        self._listen(RUN_STATE, self.refusals.guarding(RUN_STATE, self._on_run_state, _run_state))
         self._matching = node.create_timer(_MATCHING_PERIOD_S, self._look_for_plant)
 
     @property
@@ -91,14 +91,13 @@ class CommandReplay:
         """Hand every message of a topic to ``deliver``."""
         self._endpoints.subscribe(name, lambda data: deliver(data, 0, b""), raw=True)
 
-    def _on_run_state(self, data: bytes, sent_ns: int) -> None:
+    def _on_run_state(self, message: RunState, sent_ns: int) -> None:
         """Take notice of the end of the run."""
-        state = decoded(data, RunState).state
-        self.done = self.done or state in (RunState.FINISHED, RunState.FAILED)
+        self.done = self.done or message.state in (RunState.FINISHED, RunState.FAILED)
 
-    def _take(self, name: str, data: bytes, sent_ns: int) -> None:
+    def _take(self, name: str, part: Stamped[bytes], sent_ns: int) -> None:
         """Take one part of a state; one that has been answered is answered again, as the plant asks again."""
-        stamp = arrival_ns(data)
+        stamp, data = part
         if stamp == self.stamp_ns:
             if name == JOINT_STATES:
                 for publisher, message in self._answers:
@@ -144,6 +143,16 @@ class CommandReplay:
         """Publish an answer to this state, and keep it in case the plant asks again."""
         publisher.publish(message)
         self._answers.append((publisher, message))
+
+
+def _as_it_came(read: Read[Stamped[Any]]) -> Read[Stamped[bytes]]:
+    """Return what reads messages, and returns the stamp and the bytes of good ones."""
+    return lambda data: (read(data)[0], data)
+
+
+def _run_state(data: bytes) -> RunState:
+    """Return the state of the run in a message; raises MessageError."""
+    return decoded(data, RunState)
 
 
 def _restamped(data: bytes, stamp: int) -> bytes:

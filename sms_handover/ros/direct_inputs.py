@@ -80,7 +80,7 @@ class DirectInputs(Inputs):
         return found
 
     def spin_once(self, executor: Executor, timeout_s: float) -> None:
-        """Handle what has come; else sleep until what is awaited comes, with turns of the executor between."""
+        """Handle what has come; else sleep until what is awaited comes, with turns of the executor."""
         found, now = self.poll(), monotonic()
         if found:
             until = min(self._serve_at, now + timeout_s)

@@ -16,8 +16,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
-# CDR bytes; wall time in ns of their sending, else of their coming; global identifier of their publisher, b"" if
-# not known
+# CDR bytes; wall time in ns of their sending, else of their coming; global identifier of their publisher,
+# b"" if not known
 Deliver = Callable[[bytes, int, bytes], None]
 Answer = Callable[[Any, Any], Any]  # request and empty response to response
 
