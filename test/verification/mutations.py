@@ -26,7 +26,10 @@ else:
     from mutations_list import BREAKS, Break
 
 ROOT = Path(__file__).resolve().parents[2]
-COPIED = ("sms_handover", "config", "launch", "test", "pyproject.toml", "package.xml", "setup.py")
+COPIED = (
+    *("sms_handover", "benchmarks", "config", "docs", "examples", "launch", "test"),
+    *("pyproject.toml", "package.xml", "setup.py"),
+)
 # The fast tests, in the order in which they are asked when the likely one has not noticed.
 FAST = (
     "test/core",
@@ -153,10 +156,13 @@ def main() -> int:
     parser.add_argument("--output", type=Path, help="write the results to this JSON file")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="breaks tried at a time")
     parser.add_argument("--only", default="", metavar="TEXT", help="only breaks whose name holds this text")
+    parser.add_argument("--dry-run", action="store_true", help="only look whether every break has its place")
     options = parser.parse_args()
     wrong = misplaced(BREAKS, ROOT)
     if wrong:
         raise SystemExit("\n".join(wrong))
+    if options.dry_run:
+        return 0
     begin = monotonic()
     results = run([item for item in BREAKS if options.only in item.name], ROOT, options.workers)
     survivors = [result.name for result in results if result.survived]

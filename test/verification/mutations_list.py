@@ -194,8 +194,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "joint damping of 0.04 N m s/rad",
         "plant/free_floating",
-        "q, v, self._generalized, _IN_JOINTS",
-        "q, v, self._generalized - 0.04 * np.r_[np.zeros(BASE_NV), v[BASE_NV:]], _IN_JOINTS",
+        "q, v, self._generalized, _IN_WORLD",
+        "q, v, self._generalized - 0.04 * np.r_[np.zeros(BASE_NV), v[BASE_NV:]], _IN_WORLD",
         "plant",
     ),
     _core(
@@ -257,8 +257,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "forward dynamics worked out once more than a step needs",
         "plant/integrators",
-        "rows[1] = acceleration(q, v)",
-        "rows[1] = 0.5 * (acceleration(q, v) + acceleration(q, v))",
+        "rows[1] = acceleration(start, v)",
+        "rows[1] = 0.5 * (acceleration(start, v) + acceleration(start, v))",
         "work_counts",
     ),
     _core(
@@ -483,9 +483,9 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "grasp commands repeated every period",
-        "trajectory/generator",
-        "phase.commands if entered else ()",
-        "phase.commands",
+        "trajectory/task_progress",
+        "self._begin(index) if begins and not self._failed else ()",
+        "(self._begin(index) if begins and not self._failed else ()) or phase.commands",
         "generator",
     ),
     _core(
