@@ -5,11 +5,9 @@ from dataclasses import replace
 from math import inf
 from typing import Any
 
-from sms_handover_interfaces.msg import GraspEvent
 from sms_handover_interfaces.srv import SolveIK
 
-from sms_handover.bag.decode import grasp_event
-from sms_handover.errors import GraphError, MessageError, Reason
+from sms_handover.errors import GraphError
 from sms_handover.frames import BASE, WORLD
 from sms_handover.model.poses import pose_row
 from sms_handover.ros.convert import (
@@ -20,6 +18,7 @@ from sms_handover.ros.convert import (
 )
 from sms_handover.ros.door import Receive
 from sms_handover.ros.endpoints import CountedPublisher
+from sms_handover.ros.event_wire import read_grasp_event
 from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.main import run_node
 from sms_handover.ros.phase_wire import PhaseWire
@@ -29,7 +28,6 @@ from sms_handover.ros.wire import (
     PoseWire,
     Stamped,
     StateWire,
-    decoded,
     stamped,
     state_of,
 )
@@ -145,12 +143,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
 
     def _on_grasp(self, message: Stamped[bytes], sent_ns: int) -> None:
         """Take what came of a grasp; the next state may have come before it."""
-        try:
-            event = grasp_event(decoded(message[1], GraspEvent))
-        except IndexError as error:
-            text = "a grasp event has no known action or status"
-            raise MessageError(Reason.NAMES, text) from error
-        self._generator.grasped((event,))
+        self._generator.grasped((read_grasp_event(message[1]),))
         if self._asked is None:
             self._proceed(self._newest_ns)
 

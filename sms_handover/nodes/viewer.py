@@ -3,20 +3,24 @@
 import webbrowser
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from rclpy.executors import Executor
 from rclpy.qos import QoSDurabilityPolicy, QoSProfile, QoSReliabilityPolicy
 
-from sms_handover.bag.decode import grasp_event, pose_values, task_phase
 from sms_handover.errors import SmsHandoverError
-from sms_handover.ros.convert import stamp_ns_of
+from sms_handover.frames import BASE, WORLD
+from sms_handover.model.poses import pose_row
+from sms_handover.ros.door import Read, Receive, Refusals
+from sms_handover.ros.event_wire import read_grasp_event
 from sms_handover.ros.main import EXIT_OK, RunnableNode, Stop, run_node
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.parameters import declare, refuse_unknown
+from sms_handover.ros.phase_wire import PhaseWire
 from sms_handover.ros.qos import LATCHED
 from sms_handover.ros.stamp_sync import StampSync
+from sms_handover.ros.wire import PoseWire, Stamped, StateWire, stamped, state_of
 from sms_handover.scene.live import LiveFrame, LiveScene
 from sms_handover.scene.parameters import ViewerParameters
 from sms_handover.scene.server import SceneServer
@@ -33,6 +37,9 @@ from sms_handover.topics import (
     graph_topics,
     target_pose,
 )
+from sms_handover.types import GraspEvent, TaskPhase
+
+T = TypeVar("T")
 
 _LOOK_S = 0.2  # [s] of wall time between two looks whether to stop
 _GLANCE = QoSProfile(  # a slow viewer loses messages; it never holds the graph up
@@ -58,13 +65,17 @@ class ViewerNode(RunnableNode):
         self._deputy_size: tuple[float, ...] = ()
         self._scene: LiveScene | None = None
         self._inputs: StampSync[Any] = StampSync()
+        self.refusals = Refusals(self.get_logger().warning, lambda topic, error: None)
+        self._pose_wire = PoseWire(WORLD)
+        self._state_wire: StateWire | None = None  # known with the robot
+        self._shown_ns = -1  # stamp of what is shown
         self._wanted: tuple[str, ...] = (SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
         self._listen(ROBOT_DESCRIPTION, self._on_robot, LATCHED)
         self._listen(DEPUTY_MARKER, self._on_deputy, LATCHED)
-        self._listen(GRASP_EVENT, self._on_event, LATCHED)
-        self._listen(TASK_PHASE, self._on_phase, _GLANCE)
+        self._take(GRASP_EVENT, self._on_event, read_grasp_event, LATCHED)
+        self._take(TASK_PHASE, self._on_phase, PhaseWire().read, _GLANCE)
         for name in self._wanted:
-            self._listen(name, partial(self._take, name), _GLANCE)
+            self._take(name, partial(self._add, name), stamped, _GLANCE)
         self.server = SceneServer(self.find_scene, self.parameters.port, "Handover, live")
 
     def run(self, executor: Executor, stop: Stop) -> int:
@@ -88,9 +99,21 @@ class ViewerNode(RunnableNode):
         return f"Waiting for {' and '.join(self.resolve_topic_name(name) for name in missing)}"
 
     def _listen(self, name: str, take: Callable[[Any], None], profile: QoSProfile) -> None:
-        """Subscribe to a topic of the graph."""
-        kind = next(topic.type for topic in graph_topics(self._arms) if topic.name == name)
-        self.create_subscription(message_class(kind), name, take, profile)
+        """Take the messages of a topic of the graph as they come."""
+        self.create_subscription(self._kind(name), name, take, profile)
+
+    def _take(self, name: str, take: Receive[T], read: Read[T], profile: QoSProfile) -> None:
+        """Take what is in the good messages of a topic of the graph; the others are counted and told."""
+        deliver = self.refusals.guarding(name, take, read)
+
+        def callback(data: Any) -> None:
+            deliver(data, 0, b"")
+
+        self.create_subscription(self._kind(name), name, callback, profile, raw=True)
+
+    def _kind(self, name: str) -> Any:
+        """Return the class of the messages of a topic of the graph."""
+        return message_class(next(topic.type for topic in graph_topics(self._arms) if topic.name == name))
 
     @property
     def _arms(self) -> tuple[str, ...]:
@@ -116,39 +139,49 @@ class ViewerNode(RunnableNode):
         except SmsHandoverError as error:
             self.get_logger().error(f"the robot cannot be shown: {error}")
             return
+        self._state_wire = StateWire(self._scene.joint_names, WORLD, BASE)
         targets = tuple(target_pose(arm) for arm in self._arms)
         self._wanted += targets
         for name in targets:
-            self._listen(name, partial(self._take, name), _GLANCE)
+            self._take(name, partial(self._add, name), stamped, _GLANCE)
 
-    def _on_phase(self, message: Any) -> None:
+    def _on_phase(self, phase: TaskPhase, sent_ns: int) -> None:
         """Show the phase."""
         if self._scene:
-            self._scene.enter(task_phase(message))
+            self._scene.enter(phase)
 
-    def _on_event(self, message: Any) -> None:
+    def _on_event(self, event: GraspEvent, sent_ns: int) -> None:
         """Show what came of a grasp."""
         if self._scene:
-            self._scene.tell(grasp_event(message))
+            self._scene.tell(event)
 
-    def _take(self, name: str, message: Any) -> None:
-        """Keep a message until all of its stamp are there, then show them."""
-        stamp_ns = stamp_ns_of(message.header.stamp)
-        if self._inputs.begins_anew(stamp_ns):
-            self._inputs.reset()
-        self._inputs.add(stamp_ns, name, message)
-        inputs = self._inputs.take(stamp_ns, self._wanted) if self._scene else None
-        if inputs is None or self._scene is None:
+    def _add(self, name: str, message: Stamped[bytes], sent_ns: int) -> None:
+        """Keep what is in a good message until all of its stamp are there, then show them."""
+        scene, wire = self._scene, self._state_wire
+        if scene is None or wire is None:
             return
-        joints = inputs[SAMPLED_JOINT_STATES]
-        self._scene.add(
+        reads: dict[str, Read[Stamped[Any]]] = {
+            SAMPLED_JOINT_STATES: wire.joints.checked,
+            SAMPLED_BASE_ODOMETRY: wire.odometry.checked,
+        }
+        stamp_ns, content = reads.get(name, self._pose_wire.checked)(message[1])
+        if stamp_ns < self._shown_ns:  # another run, or a playback that goes back
+            self._inputs.reset()
+            self._shown_ns = stamp_ns
+        self._inputs.add(stamp_ns, name, content)
+        inputs = self._inputs.take(stamp_ns, self._wanted)
+        if inputs is None:
+            return
+        self._shown_ns = stamp_ns
+        state = state_of(stamp_ns, inputs[SAMPLED_JOINT_STATES], inputs[SAMPLED_BASE_ODOMETRY])
+        scene.add(
             LiveFrame(
                 stamp_ns=stamp_ns,
-                joint_names=tuple(joints.name),
-                joint_position=np.array(joints.position),
-                base_in_world=np.array(pose_values(inputs[SAMPLED_BASE_ODOMETRY].pose)),
-                deputy_in_world=np.array(pose_values(inputs[DEPUTY_POSE])),
-                target_in_world={arm: np.array(pose_values(inputs[target_pose(arm)])) for arm in self._arms},
+                joint_names=scene.joint_names,
+                joint_position=state.joint_position,
+                base_in_world=pose_row(state.base_in_world),
+                deputy_in_world=pose_row(inputs[DEPUTY_POSE]),
+                target_in_world={arm: pose_row(inputs[target_pose(arm)]) for arm in scene.arms},
             )
         )
 

@@ -28,6 +28,11 @@ class DescribedRobot:
         ending = tool_frame("")
         return tuple(link.removesuffix(ending) for link in self.links if link.endswith(ending))
 
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Return the joints of the arms, in Pinocchio's order."""
+        return tuple(self.pin.names[2:])  # after Pinocchio's universe and the floating joint
+
     def poses(self, base_in_world: Array, joint_position: Array, joint_names: tuple[str, ...]) -> Array:
         """Return the pose in ``world`` of every link, (T, L, 7) in the order of ``links``.
 
@@ -48,7 +53,6 @@ class DescribedRobot:
 
     def _configuration_index(self, joint: str) -> int:
         """Return where a joint's angle lies in the configuration."""
-        names = tuple(self.pin.names[2:])  # after Pinocchio's universe and the floating joint
-        if joint not in names:
-            raise UnknownNameError("joint", joint, names, "robot description")
+        if joint not in self.joint_names:
+            raise UnknownNameError("joint", joint, self.joint_names, "robot description")
         return int(self.pin.joints[self.pin.getJointId(joint)].idx_q)

@@ -46,6 +46,7 @@ class LiveScene:
             raise ConfigurationError(f"frame rate is {frame_rate:g} 1/s, it must be positive")
         self._robot = DescribedRobot(urdf)
         self.arms = self._robot.arms
+        self.joint_names = self._robot.joint_names
         shapes = read_shapes(self._robot.pin, urdf)
         self._still = still_document("live", shapes, self._robot.links, self.arms, deputy_size)
         self._step_ns = round(NS_PER_S / frame_rate)

@@ -4,14 +4,31 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rclpy.publisher import Publisher
 from rclpy.qos import QoSReliabilityPolicy
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+from sms_handover_interfaces.msg import GraspEvent, TaskPhase
 
 from sms_handover.bag.decode import pose_values
 from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.nodes.viewer import ViewerNode
+from sms_handover.ros.message_types import message_class
+from sms_handover.ros.qos import profile_of
 from sms_handover.scene.live import LiveScene, Seen
-from sms_handover.topics import DEPUTY_POSE, VIEWER, Rate, graph_topics, target_pose, tool_pose
+from sms_handover.topics import (
+    DEPUTY_POSE,
+    GRASP_EVENT,
+    SAMPLED_BASE_ODOMETRY,
+    SAMPLED_JOINT_STATES,
+    TASK_PHASE,
+    VIEWER,
+    Rate,
+    graph_topics,
+    target_pose,
+    tool_pose,
+)
 
 from ..core.scene_documents import poses, times
 from .bench import Bench
@@ -43,6 +60,12 @@ def heard(graph: Graph, topic: str) -> dict[float, np.ndarray]:
     return {stamp / 1e9: np.array(pose_values(message)) for stamp, message in messages}
 
 
+def speaker_on(graph: Graph, name: str) -> Publisher:
+    """Return a publisher on a topic of the graph that is none of its own."""
+    topic = next(topic for topic in graph_topics(ARMS) if topic.name == name)
+    return graph.client.create_publisher(message_class(topic.type), name, profile_of(topic))
+
+
 def test_it_shows_every_body_where_it_was_published(graph: Graph) -> None:
     viewer = graph.bench.add(ViewerNode)
     assert viewer.find_scene() == "Waiting for /robot_description and /deputy/marker"
@@ -61,6 +84,58 @@ def test_it_shows_every_body_where_it_was_published(graph: Graph) -> None:
         for time, rows in drawn.items():
             assert np.abs(rows[bodies.index(body)][:3] - published[time][:3]).max() < 1e-6, body
     assert document["deputy_size"] == [0.1, 0.34, 0.1]
+
+
+def test_a_playback_that_goes_back_is_followed(graph: Graph) -> None:
+    """The viewer hears an instant of the run again after the end, as of a player that was told to seek."""
+    viewer = graph.bench.add(ViewerNode)
+    graph.run()
+    graph.bench.until(lambda: shown(viewer) and len(shown(viewer)["events"]) == 2, "both grasps")
+    targets = [target_pose(arm) for arm in ARMS]
+    wanted = (SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE, *targets)
+    publishers = {name: speaker_on(graph, name) for name in wanted}
+
+    def again() -> list[float]:
+        for name, publisher in publishers.items():
+            publisher.publish(graph.heard[name][5])
+        return times(shown(viewer)).tolist() if shown(viewer) else []
+
+    then = stamp_ns(graph.heard[DEPUTY_POSE][5]) / 1e9
+    graph.bench.until(lambda: again() == [then], "the instant")
+    viewer.server.close()
+
+
+def test_bad_messages_are_refused_and_end_no_viewer(graph: Graph) -> None:
+    """So is a state that the plant sends again, as it does when nothing answers it."""
+    viewer = graph.bench.add(ViewerNode)
+    graph.run()
+    graph.bench.until(lambda: shown(viewer) and len(shown(viewer)["events"]) == 2, "both grasps")
+    before = shown(viewer)
+    newest = graph.heard[DEPUTY_POSE][-1]
+    bad = {
+        DEPUTY_POSE: [newest, newest[:30]],
+        SAMPLED_JOINT_STATES: [serialize_message(JointState(name=["knee"], position=[0.0]))],
+        TASK_PHASE: [serialize_message(TaskPhase(state=77))],
+        GRASP_EVENT: [serialize_message(GraspEvent(status=77))],
+    }
+    say = [(speaker_on(graph, name), data) for name, messages in bad.items() for data in messages]
+
+    def refused() -> dict[str, int]:
+        for publisher, data in say:  # again and again, as the viewer is no reliable reader
+            publisher.publish(data)
+        return viewer.refusals.counts
+
+    expected = {
+        "deputy/pose: duplicate stamp",
+        "deputy/pose: malformed",
+        "sampled_joint_states: wrong names",
+        "task/grasp_event: wrong names",
+        "task/phase: wrong names",
+    }
+    graph.bench.until(lambda: refused().keys() >= expected, "the refusals")
+    assert viewer.refusals.counts.keys() == expected
+    assert shown(viewer) == before
+    viewer.server.close()
 
 
 def test_who_comes_late_sees_the_robot_and_what_came_of_the_grasps(graph: Graph) -> None:
