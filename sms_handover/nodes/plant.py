@@ -187,9 +187,10 @@ class PlantNode(GraphNode[PlantParameters]):
         self._begin_if_ready()
 
     def _begin_if_ready(self) -> None:
-        """Begin the run once the plant is active and every node is ready."""
-        waits = not self._waiting_for <= self.endpoints.silent(RUN_READY)
-        if self.run_state != RunState.WAITING or not self.active or waits or self.endpoints.unmatched:
+        """Begin the run once the plant is active and has matched, and every node is ready."""
+        if self.run_state != RunState.WAITING or not self.active or not self.has_matched:
+            return
+        if self.endpoints.unmatched or not self._waiting_for <= self.endpoints.silent(RUN_READY):
             return
         if self.runs:
             self._describe()

@@ -154,6 +154,11 @@ class GraphNode(ManagedNode, Generic[P]):
         """Tell whether this node has what it needs besides its topics; a node may override this."""
         return True
 
+    @property
+    def has_matched(self) -> bool:
+        """Tell whether every endpoint has matched, and what is due then has been done."""
+        return bool(self._matching.is_canceled())
+
     def on_matched(self) -> None:
         """Do what is due once every endpoint has matched: by default, say that this node is ready."""
         self._ready.publish(String(data=self.get_name()))
@@ -203,8 +208,7 @@ class GraphNode(ManagedNode, Generic[P]):
         """Take notice of the end of the run, and get ready for the next if the plant waits for it."""
         ended = message.state in (RunState.FINISHED, RunState.FAILED)
         waits = message.state == RunState.WAITING
-        took_part = self._matching.is_canceled()
-        if (ended or (waits and took_part)) and not self.finished:
+        if (ended or (waits and self.has_matched)) and not self.finished:
             self.inputs.poll()  # answers may be due still; they belong to the counts
             self.on_end()
         self.finished = ended
@@ -224,10 +228,10 @@ class GraphNode(ManagedNode, Generic[P]):
         their messages apart.
         """
         self.refusals.tell()
-        if not self.inputs.identifies and self._matching.is_canceled() and self.endpoints.intruders:
+        if not self.inputs.identifies and self.has_matched and self.endpoints.intruders:
             text = f"waiting in vain for {self.endpoints.intruders[0]}; only with transport {DIRECT!r}"
             raise MessageError(Reason.SENDER, f"{text} its messages can be told apart")
-        waiting = self.endpoints.unmatched if not self._matching.is_canceled() else []
+        waiting = [] if self.has_matched else self.endpoints.unmatched
         if not self.active:
             waiting = ["somebody to activate it"]
         level, words = self.diagnosis()

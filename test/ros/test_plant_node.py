@@ -91,6 +91,15 @@ def test_deputy_changes_hands(graph: Graph) -> None:
     assert graph.plant.diagnostic_values()["holder"] == "arm_b"
 
 
+def test_robot_description_comes_before_the_run(graph: Graph) -> None:
+    """Also if all others are ready before the plant looks whether its endpoints have matched."""
+    look = graph.plant._matching
+    look.timer_period_ns = 500_000_000  # ns
+    look.reset()
+    graph.run()
+    assert len(graph.heard[ROBOT_DESCRIPTION]) == 1
+
+
 def test_robot_description_is_there_for_late_comers(graph: Graph) -> None:
     graph.run()
     (message,) = Messages().of(graph, ROBOT_DESCRIPTION)
