@@ -16,6 +16,7 @@ def stop(number, frame):
     sys.exit(7)
 import signal
 signal.signal(signal.SIGTERM, stop)
+signal.signal(signal.SIGINT, signal.default_int_handler)  # whatever the tests were started by ignores
 with Keyboard() as keyboard:
     print("ready" if keyboard.usable else "no keys", flush=True)
     while True:
