@@ -92,7 +92,7 @@ def _in_process(name: str, seconds: float, seed: int) -> Tally:
 def page(tallies: dict[str, Tally], seconds: float, seed: int) -> str:
     """Return the page of the results."""
     rows = [
-        f"| {name} | {TARGETS[name].reads} | {tally.inputs} | {tally.refused} | {tally.slowest_s:.2f} | "
+        f"| {name} | {TARGETS[name].reads} | {tally.inputs} | {tally.refused or '-'} | {tally.slowest_s:.2f} | "
         f"{tally.memory_mb:.0f} | {len(tally.broken)} | {len(TARGETS[name].corpus)} |"
         for name, tally in tallies.items()
     ]
@@ -114,7 +114,8 @@ eight edits (words and numbers that are known to hurt, parts cut, repeated, swap
 input), as [Hypothesis](https://hypothesis.readthedocs.io) draws them. Only errors of our own may come
 out, within {LONGEST_S:g} s of processor time and {MOST_MEMORY // 2**20} MiB of memory
 for each input; a process that dies is a find. What is found is written to `test/data/corpus`, which the
-ordinary tests replay, together with a short run of every fuzzer.
+ordinary tests replay, together with a short run of every fuzzer. *Refused* counts the inputs of those that
+read with one reader; the last three hand each input to several, of which every one may refuse it.
 
 Hypothesis, not Atheris: it is plain Python for every version and system that we support, it is kept up
 week by week, and its runs are ordinary tests. Atheris follows the coverage of Python code, but its wheels
