@@ -92,8 +92,8 @@ def _in_process(name: str, seconds: float, seed: int) -> Tally:
 def page(tallies: dict[str, Tally], seconds: float, seed: int) -> str:
     """Return the page of the results."""
     rows = [
-        f"| {name} | {TARGETS[name].reads} | {tally.inputs} | {tally.refused or '-'} | {tally.slowest_s:.2f} | "
-        f"{tally.memory_mb:.0f} | {len(tally.broken)} | {len(TARGETS[name].corpus)} |"
+        f"| {name} | {TARGETS[name].reads} | {tally.inputs} | {tally.refused or '-'} | "
+        f"{tally.slowest_s:.2f} | {tally.memory_mb:.0f} | {len(tally.broken)} | {len(TARGETS[name].corpus)} |"
         for name, tally in tallies.items()
     ]
     return "\n".join([_HEAD, *rows, "", _tail(seconds, seed)]) + "\n"
