@@ -6,14 +6,16 @@ from typing import Any
 import numpy as np
 from sms_handover_interfaces.srv import SolveIK
 
+from sms_handover.checks import check_finite
 from sms_handover.errors import GraphError, SmsHandoverError
+from sms_handover.frames import WORLD
 from sms_handover.ik.levenberg_marquardt import solve_ik
 from sms_handover.ik.parameters import IkParameters
 from sms_handover.ros.convert import (
-    ik_status_message,
-    joint_positions_message,
     joints_in_order,
     pose_of_message,
+    set_ik_status,
+    set_joint_positions,
     stamp_ns_of,
 )
 from sms_handover.ros.graph_node import GraphNode
@@ -32,6 +34,10 @@ class IkNode(GraphNode[IkParameters]):
     def prepare(self) -> None:
         """Offer the service."""
         self.begin_anew()
+        self._names = list(self.robot.joint_names)
+        self._response = SolveIK.Response(valid=True)  # filled anew each time: most of it never changes
+        self._response.solution.name = self._names
+        self._response.status.header.frame_id = WORLD
         self.inputs.serve(SolveIK, SOLVE_IK, self._on_request)
 
     def begin_anew(self) -> None:
@@ -54,28 +60,26 @@ class IkNode(GraphNode[IkParameters]):
         """Return the stamp of the last request."""
         return self._stamp_ns
 
-    def _on_request(self, request: Any, response: Any) -> Any:
+    def _on_request(self, request: Any) -> Any:
         """Solve one request; a malformed one is answered with ``valid`` false and the reason."""
         try:
             question = self._question(request)
         except (SmsHandoverError, ValueError) as error:
             self._refused += 1
-            response.message = str(error)
-            return response
+            return SolveIK.Response(message=str(error))
         result = solve_ik(self.robot, question, self.parameters)
         self._solved[result.status] += 1
         self._stamp_ns = stamp_ns = stamp_ns_of(request.seed.header.stamp)
-        response.solution = joint_positions_message(self.robot.joint_names, result.joint_position, stamp_ns)
-        response.status = ik_status_message(result, stamp_ns)
-        response.valid = True
+        response = self._response
+        set_joint_positions(response.solution, result.joint_position, stamp_ns)
+        set_ik_status(response.status, result, stamp_ns)
         response.message = result.status.value
         return response
 
     def _question(self, request: Any) -> IkRequest:
         """Return what a request asks; raises SmsHandoverError or ValueError where it is malformed."""
-        seed = joints_in_order(self.robot.joint_names, request.seed.name, request.seed.position)
-        if not np.all(np.isfinite(seed)):
-            raise GraphError("the seed is not finite")
+        seed = joints_in_order(self._names, request.seed.name, request.seed.position)
+        check_finite(seed, "the seed")
         targets: dict[str, Pose] = {}
         for arm, message in zip(request.arms, request.tool_in_world, strict=True):
             self.robot.require_arm(arm)
@@ -88,9 +92,9 @@ class IkNode(GraphNode[IkParameters]):
 def _pose(message: Any, name: str) -> Pose:
     """Return the pose in a message; raises GraphError if it is none."""
     pose = pose_of_message(message)
-    if not (np.all(np.isfinite(pose.position)) and np.all(np.isfinite(pose.quaternion_xyzw))):
-        raise GraphError(f"{name} is not finite")
-    if not np.any(pose.quaternion_xyzw):
+    check_finite(pose.position, name)
+    check_finite(pose.quaternion_xyzw, name)
+    if not np.count_nonzero(pose.quaternion_xyzw):
         raise GraphError(f"{name} has no orientation: its quaternion is zero")
     return pose
 

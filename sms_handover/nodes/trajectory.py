@@ -5,15 +5,16 @@ from dataclasses import replace
 from math import inf
 from typing import Any
 
+from geometry_msgs.msg import Pose as PoseMessage
 from sms_handover_interfaces.srv import SolveIK
 
 from sms_handover.errors import GraphError
 from sms_handover.frames import BASE, WORLD
 from sms_handover.model.poses import pose_row
 from sms_handover.ros.convert import (
-    joint_positions_message,
     joints_in_order,
-    pose_message,
+    set_joint_positions,
+    set_pose,
     stamp_ns_of,
 )
 from sms_handover.ros.door import Receive
@@ -78,6 +79,9 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._answer: list[tuple[CountedPublisher, bytes]] = []
         self._failures = self._overdue = 0
         self._solver = self.inputs.asker(SolveIK, SOLVE_IK, self._on_solution)
+        self._names = list(self.robot.joint_names)
+        self._request = SolveIK.Request()  # filled anew each time: most of it never changes
+        self._request.seed.name = self._names
         self._asked: tuple[RobotState, TaskPhase, Targets] | None = None
         self._phase = self.endpoints.publisher(TASK_PHASE)
         self._ik_status = self.endpoints.publisher(IK_STATUS)
@@ -167,12 +171,14 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
     def _ask(self, state: RobotState, phase: TaskPhase, targets: Targets) -> None:
         """Ask the IK service, and publish when it has answered."""
         question = self._generator.ik_request(state, targets)
-        request = SolveIK.Request(
-            base_in_world=pose_message(question.base_in_world),
-            seed=joint_positions_message(self.robot.joint_names, question.seed, state.stamp_ns),
-            arms=list(question.tool_in_world),
-            tool_in_world=[pose_message(pose) for pose in question.tool_in_world.values()],
-        )
+        request, poses = self._request, question.tool_in_world.values()
+        set_pose(request.base_in_world, question.base_in_world)
+        set_joint_positions(request.seed, question.seed, state.stamp_ns)
+        if len(request.tool_in_world) != len(poses):
+            request.tool_in_world = [PoseMessage() for _ in poses]
+        request.arms = list(question.tool_in_world)
+        for message, pose in zip(request.tool_in_world, poses, strict=True):
+            set_pose(message, pose)
         self._asked = state, phase, targets
         self._solver.ask(request)
 
@@ -190,7 +196,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._generator.solved(converged=converged)
         self._failures += not converged
         solution = answer.solution
-        joints = joints_in_order(self.robot.joint_names, solution.name, solution.position)
+        joints = joints_in_order(self._names, solution.name, solution.position)
         self._publish(*asked, joints)
         self._ik_status.publish(answer.status)
         self._proceed(self._newest_ns)

@@ -3,12 +3,13 @@
 Phases and grasp events are read back by :mod:`sms_handover.bag.decode`, which reads fields by name.
 """
 
+from array import array
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Point, PoseStamped, Quaternion, Vector3, Vector3Stamped
 from geometry_msgs.msg import Pose as PoseMessage
+from geometry_msgs.msg import PoseStamped, Vector3, Vector3Stamped
 from sensor_msgs.msg import JointState
 from sms_handover_interfaces.msg import EnergyStamped
 from sms_handover_interfaces.msg import GraspCommand as GraspCommandMessage
@@ -32,6 +33,7 @@ from sms_handover.types import (
     PhaseState,
     Pose,
     TaskPhase,
+    frozen,
 )
 from sms_handover.units import NS_PER_S
 
@@ -67,6 +69,11 @@ def time_message(stamp_ns: int) -> Time:
     return Time(sec=stamp_ns // NS_PER_S, nanosec=stamp_ns % NS_PER_S)
 
 
+def set_time(message: Time, stamp_ns: int) -> None:
+    """Fill a time message from integer nanoseconds."""
+    message.sec, message.nanosec = divmod(stamp_ns, NS_PER_S)
+
+
 def stamp_ns_of(message: Time) -> int:
     """Return integer nanoseconds from a time message."""
     return int(message.sec) * NS_PER_S + int(message.nanosec)
@@ -79,15 +86,22 @@ def header(stamp_ns: int, frame: str = WORLD) -> Header:
 
 def pose_message(pose: Pose) -> PoseMessage:
     """Return a pose as a message."""
-    x, y, z = pose.position.tolist()
-    qx, qy, qz, qw = pose.quaternion_xyzw.tolist()
-    return PoseMessage(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
+    return set_pose(PoseMessage(), pose)
+
+
+def set_pose(message: PoseMessage, pose: Pose) -> PoseMessage:
+    """Fill a message with a pose, and return it."""
+    position, orientation = message.position, message.orientation
+    position.x, position.y, position.z = pose.position.tolist()
+    orientation.x, orientation.y, orientation.z, orientation.w = pose.quaternion_xyzw.tolist()
+    return message
 
 
 def pose_of_message(message: PoseMessage) -> Pose:
     """Return the pose in a message."""
     p, o = message.position, message.orientation
-    return Pose(np.array([p.x, p.y, p.z]), np.array([o.x, o.y, o.z, o.w]))
+    row = frozen(np.array([p.x, p.y, p.z, o.x, o.y, o.z, o.w]))
+    return Pose(row[:3], row[3:])
 
 
 def pose_stamped(pose: Pose, stamp_ns: int) -> PoseStamped:
@@ -108,7 +122,14 @@ def energy_message(kinetic: float, work: float, stamp_ns: int) -> EnergyStamped:
 
 def joint_positions_message(names: Sequence[str], position: Array, stamp_ns: int) -> JointState:
     """Return joint angles as a message."""
-    return JointState(header=header(stamp_ns, ""), name=list(names), position=position.tolist())
+    return set_joint_positions(JointState(name=list(names)), position, stamp_ns)
+
+
+def set_joint_positions(message: JointState, position: Array, stamp_ns: int) -> JointState:
+    """Fill a message that has the names with joint angles, and return it."""
+    set_time(message.header.stamp, stamp_ns)
+    message.position = array("d", position.tobytes())
+    return message
 
 
 def joints_in_order(names: Sequence[str], message_names: Sequence[str], values: Sequence[float]) -> Array:
@@ -116,6 +137,8 @@ def joints_in_order(names: Sequence[str], message_names: Sequence[str], values: 
 
     Raises MessageError if one is missing or given twice, or if there are not as many values as names.
     """
+    if message_names == names and len(values) == len(names):
+        return np.array(values, dtype=np.float64)
     if len(message_names) != len(values):
         text = f"a joint message has {len(message_names)} names and {len(values)} values"
         raise MessageError(Reason.LENGTHS, text)
@@ -171,16 +194,20 @@ def run_event_message(event: RunEvent) -> RunEventMessage:
 
 def ik_status_message(result: IkResult, stamp_ns: int) -> IkStatusMessage:
     """Return how a solve ended as a message."""
-    return IkStatusMessage(
-        header=header(stamp_ns),
-        status=_IK_STATUS[result.status],
-        iterations=result.iterations,
-        position_error=result.position_error,
-        orientation_error=result.orientation_error,
-        limit_margin=result.limit_margin,
-        manipulability=result.manipulability.tolist(),
-        seed_distance=result.seed_distance,
-    )
+    return set_ik_status(IkStatusMessage(header=header(stamp_ns)), result, stamp_ns)
+
+
+def set_ik_status(message: IkStatusMessage, result: IkResult, stamp_ns: int) -> IkStatusMessage:
+    """Fill a message that has a frame with how a solve ended, and return it."""
+    set_time(message.header.stamp, stamp_ns)
+    message.status = _IK_STATUS[result.status]
+    message.iterations = result.iterations
+    message.position_error = result.position_error
+    message.orientation_error = result.orientation_error
+    message.limit_margin = result.limit_margin
+    message.manipulability = array("d", result.manipulability.tobytes())
+    message.seed_distance = result.seed_distance
+    return message
 
 
 def _command_message(command: GraspCommand) -> GraspCommandMessage:

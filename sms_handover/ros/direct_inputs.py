@@ -245,8 +245,7 @@ class _Requests(_Source):
         request, header = self._entity.handle.service_take_request(self._kind.Request)
         if header is None:
             return False
-        response = self._answer(request, self._kind.Response())
-        self._entity.send_response(response, header)
+        self._entity.send_response(self._answer(request), header)
         return True
 
     def take_closed(self, *, drop: bool) -> int:

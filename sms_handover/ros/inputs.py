@@ -19,7 +19,7 @@ from rclpy.subscription import Subscription
 # CDR bytes; wall time in ns of their sending, else of their coming; global identifier of their publisher,
 # b"" if not known
 Deliver = Callable[[bytes, int, bytes], None]
-Answer = Callable[[Any, Any], Any]  # request and empty response to response
+Answer = Callable[[Any], Any]  # request to response
 
 
 class Asker(ABC):
@@ -135,7 +135,7 @@ class ExecutorInputs(Inputs):
 
     def serve(self, kind: Any, service: str, answer: Answer) -> None:
         """Offer a service."""
-        self._node.create_service(kind, service, answer)
+        self._node.create_service(kind, service, lambda request, empty: answer(request))
 
     def poll(self) -> int:
         """Return 0: the executor hands over everything."""

@@ -100,9 +100,8 @@ def test_requests_are_answered_in_order(bench: Bench) -> None:
         inputs: Inputs = make(server)
         service = f"twice_{make.__name__}"
 
-        def answer(request: Any, response: Any, service: str = service) -> Any:
-            response.success, response.message = request.data, service
-            return response
+        def answer(request: Any, service: str = service) -> Any:
+            return SetBool.Response(success=request.data, message=service)
 
         inputs.serve(SetBool, service, answer)
         loops.append(inputs)
