@@ -159,11 +159,6 @@ class PlantNode(GraphNode[PlantParameters]):
         return self._is_recorded and next_ns - self._recorded_ns > _MOST_UNRECORDED_NS
 
     @property
-    def _needed(self) -> tuple[str, ...]:
-        """Return the inputs that complete this tick, the last one to come last."""
-        return _COMMAND if self._plant.tick % self._per_reference else _PHASE_AND_COMMAND
-
-    @property
     def _at_reference(self) -> bool:
         """Tell whether a reference period begins with this tick."""
         return self._needed is _PHASE_AND_COMMAND
@@ -211,6 +206,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self._last_tick, self._failed_phase = self.common.last_tick(self._end_ns), ""
         self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
         self._command_watch.reset()
+        self._needed: tuple[str, ...] = _PHASE_AND_COMMAND  # what completes this tick; the last comes last
         self._recorded_ns = 0
         self._silent_tick = -1
 
@@ -221,7 +217,8 @@ class PlantNode(GraphNode[PlantParameters]):
 
         What other nodes wait for goes first, so that they work while the rest is published.
         """
-        with_reference = self._at_reference
+        with_reference = self._plant.tick % self._per_reference == 0
+        self._needed = _PHASE_AND_COMMAND if with_reference else _COMMAND
         self._outputs.publish_loop(self._plant, with_reference=with_reference)
         self._loop_clock.published()
         self._outputs.publish_rest(self._plant, with_reference=with_reference)

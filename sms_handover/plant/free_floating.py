@@ -10,7 +10,7 @@ from sms_handover.model.conserved import PhysicsReceipt, physics_receipt
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.deputy import MasslessDeputy
 from sms_handover.plant.grasping import answer
-from sms_handover.plant.integrators import TABLEAUS, LieGroupIntegrator
+from sms_handover.plant.integrators import TABLEAUS, Acceleration, LieGroupIntegrator
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.types import (
     Array,
@@ -59,6 +59,7 @@ class FreeFloatingPlant:
         self._tick_s = ns_to_seconds(tick_ns)
         self._integrator = LieGroupIntegrator(robot.pin, TABLEAUS[parameters.integrator], self._tick_s)
         self._generalized = np.zeros(robot.pin.nv)  # (0, u): no wrench on the base
+        self._acceleration = _acceleration(robot, self._generalized)
         self._check_start()
         self.reset()
 
@@ -157,12 +158,6 @@ class FreeFloatingPlant:
         self._generalized[BASE_NV:] = effort
         return effort
 
-    def _acceleration(self, q: Array, v: Array) -> Array:
-        """Return v' (6 + n,) under the efforts of this tick."""
-        robot = self._robot
-        acceleration: Array = pin.aba(robot.pin, robot.data, q, v, self._generalized, _IN_WORLD)
-        return acceleration
-
     def _deputy_follow(self) -> None:
         """Bring a held deputy to where its tool is now."""
         holder = self._deputy.holder
@@ -178,3 +173,14 @@ class FreeFloatingPlant:
                 raise ConfigurationError(
                     f"initial position of {name} is {value} rad, allowed is {low} to {high} rad"
                 )
+
+
+def _acceleration(robot: RobotModel, generalized: Array) -> Acceleration:
+    """Return v' (6 + n,) as a function of q and v, under the forces that ``generalized`` has at the time."""
+    model, data = robot.pin, robot.data
+
+    def acceleration(q: Array, v: Array) -> Array:
+        result: Array = pin.aba(model, data, q, v, generalized, _IN_WORLD)
+        return result
+
+    return acceleration

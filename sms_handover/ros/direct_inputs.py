@@ -63,7 +63,8 @@ class DirectInputs(Inputs):
 
     def accompany(self, others: Sequence[Inputs]) -> None:
         """Serve those of other nodes of the same process and thread too, in this order."""
-        self._company = (self, *(other for other in others if isinstance(other, DirectInputs)))
+        company = tuple(other for other in others if isinstance(other, DirectInputs))
+        self._company = (*company[:1], self, *company[1:])
 
     def poll(self) -> int:
         """Hand over everything that has come, in the order in which the inputs were made.
@@ -75,8 +76,8 @@ class DirectInputs(Inputs):
             found = sum([source.take_closed(drop=self.drops) for source in self._sources.values()])
         else:
             found = sum([source.take_all() for source in self._sources.values()])
-        for other in self._company[1:]:
-            found = found or other.poll()
+        for other in self._company:
+            found = found or (other is not self and other.poll())
         return found
 
     def spin_once(self, executor: Executor, timeout_s: float) -> None:
@@ -103,7 +104,8 @@ class DirectInputs(Inputs):
         """Hand over one message that a node cannot go on without, and tell whether there was one.
 
         Among nodes of one process it is there as soon as the other has published it, so this is nearly
-        always enough; to look for the others each time would take longer than to publish them.
+        always enough; to look for the others each time would take longer than to publish them. Who
+        answers this node is asked first: once it has answered there is something for this node.
         """
         for inputs in self._company:  # noqa: SIM110  any() with a generator takes longer
             if inputs._take_awaited():

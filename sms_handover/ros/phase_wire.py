@@ -1,6 +1,5 @@
 """The phase of the task as CDR bytes; it changes a few times in a run, so its bytes are kept."""
 
-import struct
 from collections.abc import Collection
 from dataclasses import replace
 
@@ -12,13 +11,12 @@ from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.errors import MessageError, Reason
 from sms_handover.ros.convert import phase_message
+from sms_handover.ros.template import head
 from sms_handover.ros.wire import Stamped, arrival_ns, decoded
 from sms_handover.types import GraspAction, TaskPhase
-from sms_handover.units import NS_PER_S
 
-_STAMP = struct.Struct("<iI")  # seconds, nanoseconds
-_HEAD = b"\x00\x01\x00\x00"  # encapsulation of plain little-endian CDR
-_BODY_AT = len(_HEAD) + _STAMP.size
+_STAMP_AT = 4  # [byte] behind the encapsulation
+_BODY_AT = len(head(0))
 _TYPE = "sms_handover_interfaces/msg/TaskPhase"
 
 
@@ -36,12 +34,11 @@ class PhaseWire:
         """Return the bytes of a message."""
         if self._packed is None or not _alike(self._packed[0], phase):
             self._packed = phase, self._serialize(phase)
-        stamp = _STAMP.pack(phase.stamp_ns // NS_PER_S, phase.stamp_ns % NS_PER_S)
-        return _HEAD + stamp + self._packed[1]
+        return head(phase.stamp_ns) + self._packed[1]
 
     def read(self, data: bytes) -> TaskPhase:
         """Return the phase in the bytes of a message, of any sender; raises MessageError if it is none."""
-        rest = data[: len(_HEAD)] + data[_BODY_AT:]
+        rest = data[:_STAMP_AT] + data[_BODY_AT:]
         if self._read is None or self._read[0] != rest:
             message = decoded(data, TaskPhaseMessage)
             try:

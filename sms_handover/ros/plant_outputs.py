@@ -4,14 +4,13 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from rosgraph_msgs.msg import Clock
 
 from sms_handover.frames import BASE, WORLD
 from sms_handover.model.poses import pose_row
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant
-from sms_handover.ros.convert import time_message
 from sms_handover.ros.endpoints import CountedPublisher
+from sms_handover.ros.template import head
 from sms_handover.ros.wire import PoseWire, StateWire, energy_wire, vector_wire
 from sms_handover.topics import (
     ANGULAR_MOMENTUM,
@@ -69,4 +68,4 @@ class PlantOutputs:
             publish[ANGULAR_MOMENTUM](self._vector_wire.pack(now_ns, receipt.angular_momentum))
             publish[ENERGY](self._energy_wire.pack(now_ns, energy))
         if now_ns % CLOCK_PERIOD_NS == 0:
-            publish[CLOCK](Clock(clock=time_message(now_ns)))
+            publish[CLOCK](head(now_ns))

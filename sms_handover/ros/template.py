@@ -12,13 +12,19 @@ import numpy as np
 from sms_handover.types import Array
 from sms_handover.units import NS_PER_S
 
-_STAMP = struct.Struct("<iI")  # seconds, nanoseconds
+_HEAD = struct.Struct("<4siI")  # encapsulation, seconds, nanoseconds
+_STAMP = struct.Struct("<iI")
 _STAMP_AT = 4  # [byte] behind the encapsulation header
 _BODY_AT = _STAMP_AT + _STAMP.size
 _DOUBLE = 8  # [byte]
 _SPARE = 8  # [byte] that rclpy may put behind the end of a message
 _FLOAT64 = np.dtype("<f8")
 _LITTLE_ENDIAN = b"\x00\x01"  # encapsulation of plain CDR; the two bytes behind it mean nothing
+
+
+def head(stamp_ns: int) -> bytes:
+    """Return how a message with a stamp begins: encapsulation and time, which are all of a Clock."""
+    return _HEAD.pack(_LITTLE_ENDIAN + bytes(2), stamp_ns // NS_PER_S, stamp_ns % NS_PER_S)
 
 
 class Template:

@@ -194,8 +194,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "joint damping of 0.04 N m s/rad",
         "plant/free_floating",
-        "q, v, self._generalized, _IN_WORLD",
-        "q, v, self._generalized - 0.04 * np.r_[np.zeros(BASE_NV), v[BASE_NV:]], _IN_WORLD",
+        "q, v, generalized, _IN_WORLD",
+        "q, v, generalized - 0.04 * np.r_[np.zeros(BASE_NV), v[BASE_NV:]], _IN_WORLD",
         "plant",
     ),
     _core(
