@@ -171,7 +171,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self.receive(TASK_PHASE, self._on_phase, self._phase_wire.checked)
         self.receive(JOINT_COMMAND, self._on_command, self._command_wire.checked)
         self.receive(RUN_RECORDED, self._on_recorded, stamped)
-        self.endpoints.subscribe(RUN_READY, self._on_ready)
+        self.hear(RUN_READY, String, self._on_ready)
         self._control = RunControl(self, self)
 
     # The start of a run

@@ -145,6 +145,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
         try:
             while self.goes_on(stop) and not (self.finished and self._drained()):
                 self.turn(executor)
+                self.look_for_news()
             if stop.asked and self.active:
                 self._take_the_rest(executor)
         finally:
@@ -252,7 +253,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
             return lambda data, sent_ns, publisher: receive(data, sent_ns)
 
         def deliver(data: bytes, sent_ns: int, publisher: bytes) -> None:
-            if publisher == sender.own or self._is_own(topic, sender, publisher):
+            if publisher in sender.own or self._is_own(topic, sender, publisher):
                 receive(data, sent_ns)
             else:
                 self._record_refused(topic, data, sent_ns)

@@ -69,7 +69,7 @@ class Refusals:
 
         def take(data: bytes, sent_ns: int, publisher: bytes) -> None:
             try:
-                if sender is not None and publisher != sender.own:
+                if sender is not None and publisher not in sender.own:
                     sender.require(publisher)
                 receive(read(data), sent_ns)
             except MessageError as error:

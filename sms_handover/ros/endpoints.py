@@ -56,15 +56,14 @@ class Endpoints:
             message_class(topic.type), topic.name, profile_of(topic), deliver
         )
 
-    def sender(self, name: str) -> Sender | None:
-        """Return what knows the one publisher of a topic, None if the table gives it several.
+    def sender(self, name: str) -> Sender:
+        """Return what knows the publishers of a topic.
 
         From now on the endpoints count as unmatched as long as somebody else publishes on the topic.
         """
-        if len(self._topics[name].publishers) > 1:
-            return None
+        several = len(self._topics[name].publishers) > 1
         full_name = self._node.resolve_topic_name(name)
-        self._senders[name] = Sender(self._node, full_name, self._peers)
+        self._senders[name] = Sender(self._node, full_name, self._peers, several=several)
         return self._senders[name]
 
     @property

@@ -1,7 +1,8 @@
 """What every node of the graph does alike: parameters, matching, readiness, counts, diagnostics."""
 
 from collections.abc import Callable, Sequence
-from typing import Generic, TypeVar
+from time import monotonic
+from typing import Any, Generic, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.executors import Executor
@@ -23,6 +24,7 @@ from sms_handover.ros.main import EXIT_OK, WAIT_S, RunnableNode, Stop
 from sms_handover.ros.managed_node import ManagedNode
 from sms_handover.ros.parameters import declare, refuse_unknown
 from sms_handover.ros.process import settle
+from sms_handover.ros.wire import decoded
 from sms_handover.simulation.parameters import DIRECT, EXECUTOR, LOCKSTEP, CommonParameters
 from sms_handover.simulation.scenario import load_robot_model
 from sms_handover.topics import (
@@ -41,6 +43,7 @@ T = TypeVar("T")
 INPUTS: dict[str, Callable[[Node], Inputs]] = {DIRECT: DirectInputs, EXECUTOR: ExecutorInputs}
 
 _DIAGNOSTICS_PERIOD_S = 1.0  # [s] of wall time
+_NEWS_PERIOD_S = 0.02  # [s] of wall time between two looks for news of the run
 _MATCHING_PERIOD_S = 0.02  # [s] of wall time between two looks at who has matched
 
 
@@ -60,11 +63,14 @@ class GraphNode(ManagedNode, Generic[P]):
         self._refusal: ConfigurationError | None = None
         self.finished = False
         self.inputs: Inputs = ExecutorInputs(self)
+        self.news: Inputs = ExecutorInputs(self)  # of the run, which count whether active or not
+        self._company: tuple[GraphNode[Any], ...] = (self,)
+        self._news_at = 0.0
         try:
             self.common: CommonParameters = declare(self, CommonParameters, "common.yaml", EVERY_NODE)
             self.parameters: P = declare(self, group, f"{name}.yaml" if shipped else None, name)
             refuse_unknown(self, CommonParameters, group)
-            self.inputs = INPUTS[self.common.transport](self)
+            self.inputs, self.news = (INPUTS[self.common.transport](self) for _ in range(2))
             self.inputs.awaited = lambda: self.awaited
         except ConfigurationError as error:
             self._refusal = error
@@ -93,7 +99,7 @@ class GraphNode(ManagedNode, Generic[P]):
         self._diagnostics = self.endpoints.publisher(DIAGNOSTICS)
         if name != PLANT:
             self._ready = self.endpoints.publisher(RUN_READY)
-            self.endpoints.subscribe(RUN_STATE, self._on_run_state)
+            self.hear(RUN_STATE, RunState, self._on_run_state)
         self.prepare()
         self._matching = self.create_timer(_MATCHING_PERIOD_S, self._look_for_peers)
         self.create_timer(_DIAGNOSTICS_PERIOD_S, self.publish_diagnostics)
@@ -112,6 +118,7 @@ class GraphNode(ManagedNode, Generic[P]):
 
     def clean_up(self) -> None:
         """Give the inputs back to the middleware."""
+        self.news.destroy()
         self.inputs.destroy()
         self.inputs.close(drop=False)
 
@@ -119,7 +126,16 @@ class GraphNode(ManagedNode, Generic[P]):
         """Handle events until asked to stop or shut down, and return the exit code."""
         while self.goes_on(stop):
             self.turn(executor)
+            self.look_for_news()
         return EXIT_OK
+
+    def look_for_news(self) -> None:
+        """Take the news of the run that have come, for the nodes of the same process too, now and then."""
+        now = monotonic()
+        if now >= self._news_at:
+            self._news_at = now + _NEWS_PERIOD_S
+            for node in self._company:
+                node.news.poll()
 
     def turn(self, executor: Executor) -> None:
         """Handle what has come, or wait a little for something to come; a node may override this."""
@@ -129,6 +145,7 @@ class GraphNode(ManagedNode, Generic[P]):
         """Serve the inputs of other nodes of the same process in the loop of this one."""
         company = tuple(other for other in others if isinstance(other, GraphNode))
         self.keep_company(company)
+        self._company = (self, *company)
         self.inputs.accompany([other.inputs for other in company])
 
     @property
@@ -138,6 +155,7 @@ class GraphNode(ManagedNode, Generic[P]):
 
     def destroy_node(self) -> None:
         """Destroy the node with its inputs."""
+        self.news.destroy()
         self.inputs.destroy()
         super().destroy_node()
 
@@ -145,6 +163,16 @@ class GraphNode(ManagedNode, Generic[P]):
         """Hand to ``receive`` what ``read`` finds in the good messages of a topic's own publisher."""
         sender = self.endpoints.sender(name)
         self.endpoints.receive(name, self.inputs, self.refusals.guarding(name, receive, read, sender))
+
+    def hear(self, name: str, kind: Any, take: Callable[[Any], None]) -> None:
+        """Hand to ``take`` the good messages of a topic that comes seldom and counts in every state."""
+        guarded = self.refusals.guarding(
+            name,
+            lambda message, sent_ns: take(message),
+            lambda data: decoded(data, kind),
+            self.endpoints.sender(name),
+        )
+        self.endpoints.receive(name, self.news, guarded)
 
     def settle(self) -> None:
         """Set up the process as the parameters ask; raises ConfigurationError. A node may override this."""

@@ -13,18 +13,19 @@ _NAMELESS = "_NODE_NAME_UNKNOWN_"
 
 
 class Sender:
-    """The one publisher whose messages on a topic count.
+    """The publishers whose messages on a topic count: of each node of the run one, or one in all.
 
-    It is the first that discovery gives to one of the nodes of the run, for as long as it is there.
-    Against one that forges identifiers only DDS-Security helps.
+    It is the first that discovery gives to such a node, for as long as it is there. Against one that
+    forges identifiers only DDS-Security helps.
     """
 
-    def __init__(self, node: Node, topic: str, peers: Collection[str]) -> None:
-        """Expect the messages of a topic, by its full name, from one of the nodes ``peers``."""
-        self.own = b""  # global identifier of the publisher once it is known
+    def __init__(self, node: Node, topic: str, peers: Collection[str], *, several: bool = False) -> None:
+        """Expect the messages of a topic, by its full name, from nodes among ``peers``."""
+        self.own: frozenset[bytes] = frozenset()  # global identifiers of the publishers that are known
         self._node = node
         self._topic = topic
         self._peers = frozenset(peers)
+        self._several = several
         self._strangers: dict[bytes, str] = {}  # names by global identifier
 
     @property
@@ -33,7 +34,7 @@ class Sender:
         return [_name(endpoint) for endpoint in self._split()[1]]
 
     def require(self, publisher: bytes) -> None:
-        """Take a message of a publisher that is not known as the own, b"" where that is not told.
+        """Take a message of a publisher that is not known as one of the own, b"" where that is not told.
 
         Raises MessageError if it is another's.
         """
@@ -42,12 +43,11 @@ class Sender:
         name = self._strangers.get(publisher)
         if name is None:
             own, others = self._split()
-            if own is not None and _identity(own) == publisher:
-                if own.node_name != _NAMELESS:
-                    self.own = publisher
-                return
-            if not (self.own or own or others):
-                return  # its messages are here before discovery tells of it
+            named = {_identity(endpoint) for endpoint in own if endpoint.node_name != _NAMELESS}
+            if publisher in named:
+                self.own = frozenset(named)
+            if publisher in map(_identity, own) or not (self.own or own or others):
+                return  # the latter: its messages are here before discovery tells of it
             name = self._name_of(publisher, others)
         raise MessageError(Reason.SENDER, f"node {name} publishes too, whose messages do not count")
 
@@ -61,14 +61,18 @@ class Sender:
                 return name
         return "that is gone again"
 
-    def _split(self) -> tuple[TopicEndpointInfo | None, list[TopicEndpointInfo]]:
-        """Return the publisher that counts, if it is there, and all others."""
+    def _split(self) -> tuple[list[TopicEndpointInfo], list[TopicEndpointInfo]]:
+        """Return the publishers that count, as far as they are there, and all others."""
         there = self._node.get_publishers_info_by_topic(self._topic)
-        candidates = [endpoint for endpoint in there if _identity(endpoint) == self.own]
-        candidates = candidates or [endpoint for endpoint in there if endpoint.node_name in self._peers]
-        candidates = candidates or [endpoint for endpoint in there if endpoint.node_name == _NAMELESS]
-        own = candidates[0] if candidates else None
-        return own, [endpoint for endpoint in there if endpoint is not own]
+        there.sort(key=lambda endpoint: _identity(endpoint) not in self.own)
+        by_node: dict[str, TopicEndpointInfo] = {}
+        for endpoint in there:
+            if endpoint.node_name in self._peers:
+                by_node.setdefault(endpoint.node_name, endpoint)
+        own = list(by_node.values())
+        nameless = [endpoint for endpoint in there if endpoint.node_name == _NAMELESS]
+        own = own + nameless if self._several else (own or nameless)[:1]
+        return own, [endpoint for endpoint in there if endpoint not in own]
 
 
 def _identity(endpoint: TopicEndpointInfo) -> bytes:

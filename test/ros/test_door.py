@@ -132,11 +132,11 @@ class FakeGraph:
 class Topic:
     """The door of one topic with its sender, and what has come through it."""
 
-    def __init__(self, **publishers: int) -> None:
-        """Let these nodes publish on it; the controller is to."""
+    def __init__(self, *, several: bool = False, **publishers: int) -> None:
+        """Let these nodes publish on it; the controller is to, or with ``several`` the plant too."""
         self.graph = FakeGraph(**publishers)
         node: Any = self.graph
-        self.sender = Sender(node, "/joint_command", ("plant", "controller"))
+        self.sender = Sender(node, "/joint_command", ("plant", "controller"), several=several)
         self.taken: list[int] = []
         self.refusals = Refusals(lambda line: None, lambda topic, error: None)
         self._deliver = self.refusals.guarding(
@@ -214,6 +214,18 @@ def test_a_second_node_of_the_same_name_is_another(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(topic.graph, "get_publishers_info_by_topic", lambda name: other + one)
     assert topic.sender.others == ["/controller"]
     assert topic.come(2, 1) == [1]
+
+
+def test_of_several_nodes_each_has_one_publisher_that_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    topic = Topic(several=True, controller=1, _NODE_NAME_UNKNOWN_=2)
+    assert topic.come(1, 2) == [1, 2]
+    topic.graph.publishers = {"controller": 1, "plant": 2, "intruder": 3}
+    assert topic.come(3, 1, 2, 3) == [1, 2]
+    assert topic.sender.others == ["/intruder"]
+    there = topic.graph.get_publishers_info_by_topic("")
+    twin = FakeGraph(plant=4).get_publishers_info_by_topic("")
+    monkeypatch.setattr(topic.graph, "get_publishers_info_by_topic", lambda name: twin + there)
+    assert topic.come(4, 2) == [2]
 
 
 def test_without_identifiers_every_message_is_taken() -> None:
