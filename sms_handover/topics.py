@@ -89,6 +89,12 @@ TF = "/tf"  # written into the bag by the recorder; tf2_msgs cannot be imported 
 
 REFUSED_TOPIC = "/refused"  # ends the topic of a bag with what others published where one alone is to
 
+
+def is_refused(topic: str) -> bool:
+    """Tell whether a topic of a bag holds what others published; nothing of that counts for the run."""
+    return topic.endswith(REFUSED_TOPIC)
+
+
 SOLVE_IK = "solve_ik"  # service of the ik node
 
 _OURS = "sms_handover_interfaces/msg"

@@ -79,6 +79,8 @@ class ContentCheck:
         else:
             self._newest[source.topic] = message.log_time_ns
         self._rebuild.book(message)
+        if topics.is_refused(source.topic):
+            return
         if source.schema.name == _RUN_STATE:
             self._state = self._decode(message) or self._state
         elif source.schema.name == PUBLISHED_COUNTS:
@@ -164,7 +166,7 @@ class ContentCheck:
 
     def _is_refused(self, topic: str) -> bool:
         """Tell whether a topic holds what others published where a node of ours alone was to."""
-        return self.is_ours and topic.endswith(topics.REFUSED_TOPIC)
+        return self.is_ours and topics.is_refused(topic)
 
     def _decode(self, message: ScannedMessage) -> Any:
         """Return a decoded message, None if that cannot be."""

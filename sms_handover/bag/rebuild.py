@@ -9,6 +9,7 @@ from sms_handover.bag.scan import ScannedMessage, Source
 from sms_handover.bag.schemas import SchemaTypes, types_of
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.errors import BagError
+from sms_handover.topics import is_refused
 
 
 class LedgerRebuild:
@@ -37,7 +38,7 @@ class LedgerRebuild:
             self._stamped[name] = False
             return
         self._stamped[name] = types.stamped
-        if source.schema.name == PUBLISHED_COUNTS:
+        if source.schema.name == PUBLISHED_COUNTS and not is_refused(name):
             self._reports[name] = types
 
     def book(self, message: ScannedMessage) -> None:

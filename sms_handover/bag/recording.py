@@ -15,6 +15,7 @@ from sms_handover.bag.split import Split
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.bag.writer import BagWriter
 from sms_handover.errors import BagError
+from sms_handover.topics import is_refused
 
 PUBLISHED_COUNTS = "sms_handover_interfaces/msg/PublishedCounts"
 
@@ -76,7 +77,7 @@ class Recording:
         self._keeper.add_topic(name, period_ns)
         self._stamped[name] = self._types.stamped(type_name)
         self._periods[name] = str(period_ns)
-        if type_name == PUBLISHED_COUNTS:
+        if type_name == PUBLISHED_COUNTS and not is_refused(name):
             self._reports.add(name)
 
     def describe(

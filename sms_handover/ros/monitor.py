@@ -4,23 +4,25 @@ from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from rclpy.node import Node
 from rclpy.qos import QoSHistoryPolicy, QoSProfile, QoSReliabilityPolicy
-from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
 from sms_handover_interfaces.msg import PublishedCounts, RunState, TaskPhase
-from sms_handover_interfaces.msg import RunEvent as RunEventMessage
 from std_srvs.srv import Trigger
 
-from sms_handover.bag.decode import grasp_event, header_ns, run_event, task_phase
+from sms_handover.bag.decode import header_ns, task_phase
 from sms_handover.errors import MessageError
 from sms_handover.events import RunEvent
+from sms_handover.ros.door import Read
+from sms_handover.ros.event_wire import read_grasp_event, read_run_event
 from sms_handover.ros.inputs import Inputs
+from sms_handover.ros.message_types import message_class
 from sms_handover.ros.qos import LATCHED
+from sms_handover.ros.sender import Sender
 from sms_handover.ros.wire import decoded
 from sms_handover.topics import (
     DIAGNOSTICS,
@@ -30,12 +32,16 @@ from sms_handover.topics import (
     RUN_PUBLISHED,
     RUN_STATE,
     TASK_PHASE,
+    graph_topics,
     target_pose,
     tool_pose,
 )
 from sms_handover.types import GraspEvent
 
 _EVERY_NODE = 16  # [messages] of which the newest may not push out those of other nodes
+
+
+T = TypeVar("T")
 
 
 @dataclass
@@ -63,9 +69,9 @@ class Progress:
 class RunMonitor:
     """Listens to a graph without taking part in it.
 
-    What decides comes by the executor of the node. What comes every reference period is for show, so
-    it is taken by ``inputs`` when :meth:`look` is called, and only the newest: a display that handled
-    each message would keep a processor from the loop.
+    Everything is taken by ``inputs`` when :meth:`look` is called. What comes every reference period is
+    for show, so of that only the newest: a display that handled each message would keep a processor
+    from the loop. What is bad, or from strangers, is left to the nodes to count.
     """
 
     def __init__(self, node: Node, arms: tuple[str, ...], inputs: Inputs) -> None:
@@ -76,10 +82,11 @@ class RunMonitor:
         self._targets: dict[str, PoseStamped] = {}
         self._published: dict[str, dict[str, int]] = {}
         self._finish = node.create_client(Trigger, f"{PLANT}/finish")
-        node.create_subscription(RunState, RUN_STATE, self._on_state, LATCHED)
-        node.create_subscription(GraspEventMessage, GRASP_EVENT, self._on_event, LATCHED)
-        node.create_subscription(RunEventMessage, RUN_EVENTS, self._on_run_event, LATCHED)
-        node.create_subscription(PublishedCounts, RUN_PUBLISHED, self._on_counts, LATCHED)
+        self._topics = {topic.name: topic for topic in graph_topics(arms)}
+        self._hear(RUN_STATE, _reader(RunState), self._on_state)
+        self._hear(GRASP_EVENT, read_grasp_event, self.progress.events.append)
+        self._hear(RUN_EVENTS, read_run_event, self.progress.run_events.append)
+        self._hear(RUN_PUBLISHED, _reader(PublishedCounts), self._on_counts)
         self._show(TaskPhase, TASK_PHASE, self._on_phase)
         self._show(DiagnosticArray, DIAGNOSTICS, self._on_diagnostics, depth=_EVERY_NODE)
         for arm in arms:
@@ -87,8 +94,22 @@ class RunMonitor:
             self._show(PoseStamped, tool_pose(arm), partial(self._on_tool, arm))
 
     def look(self) -> None:
-        """Take the newest of what is only for show."""
+        """Take what has come."""
         self._inputs.poll()
+
+    def _hear(self, name: str, read: Read[T], take: Callable[[T], None]) -> None:
+        """Hand every good message of the own publishers of a topic to ``take``."""
+        topic, full_name = self._topics[name], self._node.resolve_topic_name(name)
+        several = len(topic.publishers) > 1
+        sender = Sender(self._node, full_name, topic.publishers, several=several)
+
+        def receive(data: bytes, sent_ns: int, publisher: bytes) -> None:
+            with suppress(MessageError):
+                if publisher not in sender.own:
+                    sender.require(publisher)
+                take(read(data))
+
+        self._inputs.subscribe(message_class(topic.type), name, LATCHED, receive)
 
     def _show(self, kind: Any, topic: str, show: Callable[[Any], None], *, depth: int = 1) -> None:
         """Hand the newest messages of a topic to ``show``."""
@@ -97,7 +118,7 @@ class RunMonitor:
         )  # a display must never hold the loop back
 
         def receive(data: bytes, sent_ns: int, publisher: bytes) -> None:
-            with suppress(MessageError):  # a broken one is for the nodes to count
+            with suppress(MessageError, IndexError):
                 show(decoded(data, kind))
 
         self._inputs.subscribe(kind, topic, profile, receive)
@@ -150,12 +171,6 @@ class RunMonitor:
         self.progress.wall_time = message.wall_time
         self.progress.stamp_ns = header_ns(message)
 
-    def _on_event(self, message: Any) -> None:
-        self.progress.events.append(grasp_event(message))
-
-    def _on_run_event(self, message: Any) -> None:
-        self.progress.run_events.append(run_event(message))
-
     def _on_counts(self, message: Any) -> None:
         self._published[message.node] = dict(zip(message.topics, message.counts, strict=False))
 
@@ -190,3 +205,8 @@ class RunMonitor:
                 self.progress.waiting.pop(status.name, None)
             else:
                 self.progress.waiting[status.name] = status.message
+
+
+def _reader(kind: Any) -> Read[Any]:
+    """Return what reads messages of a class."""
+    return lambda data: decoded(data, kind)

@@ -46,10 +46,18 @@ class Sender:
             named = {_identity(endpoint) for endpoint in own if endpoint.node_name != _NAMELESS}
             if publisher in named:
                 self.own = frozenset(named)
-            if publisher in map(_identity, own) or not (self.own or own or others):
-                return  # the latter: its messages are here before discovery tells of it
+            if publisher in map(_identity, own) or self._may_be_early(publisher, own, others):
+                return
             name = self._name_of(publisher, others)
         raise MessageError(Reason.SENDER, f"node {name} publishes too, whose messages do not count")
+
+    def _may_be_early(
+        self, publisher: bytes, own: list[TopicEndpointInfo], others: list[TopicEndpointInfo]
+    ) -> bool:
+        """Tell whether a message may be here before discovery has told of its publisher."""
+        if self._several:
+            return publisher not in map(_identity, others)
+        return not (self.own or own or others)
 
     def _name_of(self, publisher: bytes, others: list[TopicEndpointInfo]) -> str:
         """Return who publishes in words, and keep in mind who is a stranger for good."""

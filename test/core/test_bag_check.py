@@ -112,12 +112,21 @@ def test_what_strangers_sent_makes_no_bag_incomplete(tmp_path: Path) -> None:
     joints, kind = TYPES.serialize(joint_state(5)), "sensor_msgs/msg/JointState"
     bad = [joints[: len(joints) // 2], joints, TYPES.serialize(joint_state(3)), joints + bytes(100_000), b""]
     refused = [("/joint_command/refused", kind, data) for data in bad]
+    counts = TYPES.serialize(published_counts("plant", {"/joint_states": 10**9}))
+    refused.append(("/run/published/refused", f"{OURS}/PublishedCounts", counts))
     bag = write_finished(tmp_path / "bag", refused=refused)
     result = check(bag)
     assert result.complete, result.findings
     note = "/joint_command/refused: 5 messages of others than the topic's own publisher"
     assert note in texts(result, Severity.NOTE)
     assert recover(bag, tmp_path / "again") and check(tmp_path / "again").complete
+
+
+def test_what_strangers_sent_makes_no_bag_complete_either(tmp_path: Path) -> None:
+    over = TYPES.make(f"{OURS}/RunState", header=header(0), state=3, tick=0, wall_time=0.0, detail="")
+    refused = [("/run/state/refused", f"{OURS}/RunState", TYPES.serialize(over))]
+    result = check(write_finished(tmp_path / "bag", finished=False, refused=refused))
+    assert texts(result, Severity.MISSING) == ["the run was not finished when the recording ended, at 0.2 s"]
 
 
 def test_a_message_of_ours_that_cannot_be_decoded_is_damage(tmp_path: Path) -> None:

@@ -49,6 +49,12 @@ def _spoil(message: Any, kind: str) -> bytes:
         message.header.frame_id = "elsewhere"
     if kind == "other-names":
         message.name = [f"other_{name}" for name in _JOINTS]
+    if kind == "over":
+        message.state = message.FINISHED
+    if kind == "missed":
+        message.status = message.MISSED
+    if kind == "lie":
+        message.node, message.topics, message.counts = "plant", ["/joint_states"], [10**9]
     if kind == "future":
         stamp = message.stamp if hasattr(message, "stamp") else message.header.stamp
         stamp.sec = _LATE_S

@@ -20,6 +20,7 @@ from sms_handover.ros.graph_node import INPUTS
 from sms_handover.ros.inputs import ExecutorInputs, Inputs
 from sms_handover.ros.monitor import RunMonitor
 from sms_handover.ros.qos import LATCHED, LOSSLESS
+from sms_handover.simulation.parameters import DIRECT
 from sms_handover.topics import (
     DIAGNOSTICS,
     GRASP_EVENT,
@@ -93,25 +94,25 @@ def test_progress_is_followed(graph: FakeGraph) -> None:
     progress = graph.monitor.progress
     assert (progress.state, progress.stamp_ns, graph.monitor.finished) == (RunState.WAITING, 0, False)
     graph.state(RunState.RUNNING, 0)
-    graph.bench.until(lambda: progress.state == RunState.RUNNING, "the start")
+    graph.until(lambda: progress.state == RunState.RUNNING, "the start")
     phase = phase_message(TaskPhase(40_000_000, 1, "carry"))
     graph.until(lambda: progress.phase == "carry", "the phase", (TASK_PHASE, phase))
     assert progress.stamp_ns == 40_000_000
     graph.state(RunState.FINISHED, 50_000_000, "the whole run is done")
-    graph.bench.until(lambda: graph.monitor.finished, "the end")
+    graph.until(lambda: graph.monitor.finished, "the end")
     assert (progress.stamp_ns, progress.detail) == (50_000_000, "the whole run is done")
 
 
 def test_a_failed_run_is_over_too(graph: FakeGraph) -> None:
     graph.state(RunState.FAILED, 7, "why")
-    graph.bench.until(lambda: graph.monitor.finished, "the end")
+    graph.until(lambda: graph.monitor.finished, "the end")
 
 
 def test_a_reset_sets_the_time_back(graph: FakeGraph) -> None:
     graph.state(RunState.FINISHED, 50_000_000)
-    graph.bench.until(lambda: graph.monitor.finished, "the end")
+    graph.until(lambda: graph.monitor.finished, "the end")
     graph.state(RunState.RUNNING, 0, "reset")
-    graph.bench.until(lambda: not graph.monitor.finished, "the second start")
+    graph.until(lambda: not graph.monitor.finished, "the second start")
     assert graph.monitor.progress.stamp_ns == 0
 
 
@@ -139,7 +140,7 @@ def test_grasp_events_are_kept_in_order(graph: FakeGraph) -> None:
     ]
     for event in events:
         graph.say(GRASP_EVENT, event_message(event))
-    graph.bench.until(lambda: len(graph.monitor.progress.events) == 2, "the events")
+    graph.until(lambda: len(graph.monitor.progress.events) == 2, "the events")
     assert repr(graph.monitor.progress.events) == repr(events)
 
 
@@ -154,11 +155,11 @@ def test_every_event_has_been_heard_when_the_plant_says_so(graph: FakeGraph) -> 
 
     tell("controller", 0)
     graph.say(GRASP_EVENT, GraspEventMessage())
-    graph.bench.until(lambda: monitor.progress.events, "the first event")
+    graph.until(lambda: monitor.progress.events, "the first event")
     assert not monitor.heard_every_event
     tell("plant", 2)
     graph.say(GRASP_EVENT, GraspEventMessage())
-    graph.bench.until(lambda: monitor.heard_every_event, "the second event and the counts")
+    graph.until(lambda: monitor.heard_every_event, "the second event and the counts")
     assert len(monitor.progress.events) == 2
 
 
@@ -172,16 +173,40 @@ def test_decisions_of_every_node_are_heard(graph: FakeGraph) -> None:
         counts = PublishedCounts(node=node, topics=[f"/space/{RUN_EVENTS}"], counts=[count])
         graph.say(RUN_PUBLISHED, counts)
     graph.say(RUN_EVENTS, run_event_message(events[0]))
-    graph.bench.until(lambda: monitor.progress.run_events, "the first event")
+    graph.until(lambda: monitor.progress.run_events, "the first event")
     assert not monitor.heard_every_event
     graph.say(RUN_EVENTS, run_event_message(events[1]))
-    graph.bench.until(lambda: monitor.heard_every_event, "the second event and the counts")
+    graph.until(lambda: monitor.heard_every_event, "the second event and the counts")
     assert repr(monitor.progress.run_events) == repr(events)
+
+
+def test_what_strangers_say_of_a_run_is_not_believed(bench: Bench) -> None:
+    """Neither that it is over, nor that a grasp has missed; nor what makes no sense, whoever says it."""
+    graph = FakeGraph(bench, INPUTS[DIRECT])
+    progress = graph.monitor.progress
+    graph.state(RunState.RUNNING, 0)
+    graph.until(lambda: progress.state == RunState.RUNNING, "the start")
+    stranger, publishers = bench.plain("stranger"), list[Publisher]()
+    lies = (
+        (RUN_STATE, RunState(state=RunState.FINISHED)),
+        (GRASP_EVENT, GraspEventMessage(status=GraspEventMessage.MISSED)),
+        (RUN_PUBLISHED, PublishedCounts(node="plant", topics=["/task/grasp_event"], counts=[7])),
+    )
+    for topic, message in lies:
+        publishers.append(stranger.create_publisher(type(message), topic, LATCHED))
+        bench.until(lambda: publishers[-1].get_subscription_count() == 1, f"the match of {topic}")
+        publishers[-1].publish(message)
+    graph.say(GRASP_EVENT, GraspEventMessage(status=77))
+    graph.say(GRASP_EVENT, GraspEventMessage())
+    graph.say(RUN_PUBLISHED, PublishedCounts(node="plant", topics=["/task/grasp_event"], counts=[1]))
+    graph.until(lambda: graph.monitor.heard_every_event, "the truth")
+    assert (len(progress.events), progress.state) == (1, RunState.RUNNING)
+    graph.destroy()
 
 
 def test_a_run_without_events_has_none_to_wait_for(graph: FakeGraph) -> None:
     graph.say(RUN_PUBLISHED, PublishedCounts(node="plant", topics=["/joint_states"], counts=[7]))
-    graph.bench.until(lambda: graph.monitor.heard_every_event, "the counts")
+    graph.until(lambda: graph.monitor.heard_every_event, "the counts")
     assert graph.monitor.progress.events == []
 
 
