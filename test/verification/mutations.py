@@ -38,7 +38,7 @@ FAST = (
     "test/verification/test_conservation.py",
 )
 SLOW = "handover"  # what needs whole handovers is left out in the verification folder
-TIMEOUT_S = 300.0  # a break may make a loop endless; that is noticed too
+TIMEOUT_S = 900.0  # all fast tests take a few minutes; a break may make a loop endless, which is noticed too
 
 SURVIVED = ""
 
