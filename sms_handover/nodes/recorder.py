@@ -51,6 +51,7 @@ from sms_handover.topics import (
 )
 
 _POLL_S = 0.005  # [s] of wall time between two batches: long enough to be cheap, short enough to lose little
+_LOCKSTEP_POLL_S = 0.002  # [s] where the plant would run out of what it may be ahead, and wait
 _QUIET_S = 0.05  # [s] of wall time without a message after which nothing is on the way any more
 _REST_S = 1.0  # [s] of wall time at most to wait for that
 _BEHIND = 4096  # [reference periods] by which a recorder without a processor may be behind and make up for it
@@ -69,6 +70,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
         """Declare the parameters."""
         super().__init__(RECORDER, RecorderParameters)
         self._told = True
+        self._poll_s = _POLL_S
         self._described = self._run_is_over = False
 
     def prepare(self) -> None:
@@ -80,6 +82,8 @@ class RecorderNode(GraphNode[RecorderParameters]):
         except BagError as error:
             raise ConfigurationError(str(error)) from error
         self._told = False
+        if self.common.mode == LOCKSTEP:
+            self._poll_s = _LOCKSTEP_POLL_S
         self._others = [peer for peer in self.common.peers if peer != RECORDER]
         self._peer_parameters = PeerParameters(self, self.common.peers)
         self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
@@ -159,7 +163,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
 
     def turn(self, executor: Executor) -> None:
         """Record what has come; between two runs, go on with the next bag."""
-        executor.spin_once(timeout_sec=_POLL_S)
+        executor.spin_once(timeout_sec=self._poll_s)
         nothing = not self.inputs.poll()
         if not self.active:
             return
