@@ -47,6 +47,7 @@ _PHASE_AND_COMMAND = (TASK_PHASE, JOINT_COMMAND)
 _MOST_UNRECORDED_NS = 45_000_000  # [ns] of simulation time that may be lost with the recorder
 _RUNNING = int(RunState.RUNNING)  # asking the message class for it takes a call each time
 _TIMING_PERIOD_S = 1.0  # [s] of wall time
+_LAST_TURNS = 3  # looks for inputs: the state is taken, the command is taken, and one for what came between
 _LOOK_PERIOD_S = 0.5  # [s] of wall time between two looks whether the loop goes on
 
 
@@ -143,6 +144,7 @@ class PlantNode(GraphNode[PlantParameters]):
             return
         self.inputs.poll()
         if clock.due():
+            self._give_last_turns()
             self._tick_now()
 
     @property
@@ -157,11 +159,6 @@ class PlantNode(GraphNode[PlantParameters]):
         """Tell whether the next state would be more than may be lost if the recorder were killed."""
         next_ns = self._plant.stamp_ns + self._tick_ns
         return self._is_recorded and next_ns - self._recorded_ns > _MOST_UNRECORDED_NS
-
-    @property
-    def _at_reference(self) -> bool:
-        """Tell whether a reference period begins with this tick."""
-        return self._needed is _PHASE_AND_COMMAND
 
     def _make_endpoints(self) -> None:
         """Make publishers, subscriptions and services."""
@@ -231,7 +228,7 @@ class PlantNode(GraphNode[PlantParameters]):
         tick = self._plant.tick
         waiting = self.active and tick == self._silent_tick and not self._ahead_of_recorder
         if waiting and not self._control.holds:
-            self._outputs.publish_loop(self._plant, with_reference=self._at_reference)
+            self._outputs.publish_loop(self._plant, with_reference=self._needed is _PHASE_AND_COMMAND)
         self._silent_tick = tick
 
     def _look_for_answer(self) -> None:
@@ -297,6 +294,16 @@ class PlantNode(GraphNode[PlantParameters]):
         if self._control.steps_left:
             self._control.stepped()
         self._publish_state()
+
+    def _give_last_turns(self) -> None:
+        """Let a controller of this thread answer the state of a tick that is due, if it has not (real time).
+
+        It had no processor in time, as the plant had none, and takes a small part of a tick. One in
+        another process gets no more time by this.
+        """
+        for _ in range(_LAST_TURNS):
+            if self._command.stamp_ns == self._plant.stamp_ns or not self.inputs.poll():
+                return
 
     def _tick_now(self) -> None:
         """Integrate one tick with the last command that came (real time)."""

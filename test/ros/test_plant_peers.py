@@ -15,6 +15,7 @@ from std_srvs.srv import SetBool, Trigger
 from sms_handover.bag.stamp import stamp_ns
 from sms_handover.ros.convert import header, phase_message
 from sms_handover.ros.endpoints import Endpoints
+from sms_handover.simulation.parameters import DIRECT
 from sms_handover.topics import (
     BASE_ODOMETRY,
     CLOCK,
@@ -280,6 +281,20 @@ def test_in_real_time_the_last_command_is_held(bench: Bench, fast_clock: None) -
     assert efforts(graph) == [[0.0] * 14] * 501
     last = Messages().of(graph, RUN_STATE)[-1]
     assert (last.state, last.tick) == (RunState.FINISHED, 500)
+
+
+def test_in_real_time_a_controller_of_the_same_thread_answers_late_ticks_too(
+    bench: Bench, fast_clock: None
+) -> None:
+    """The clock leaves it no time before the next tick, and still no command is held."""
+    common = {**REALTIME, "transport": DIRECT, "duration": 0.2}
+    graph = Graph(bench, {"common": common}, names=(PLANT, CONTROLLER))
+    graph.plant.accompany([graph.nodes[CONTROLLER]])
+    graph.ear.get_ready(bench)
+    run_until(graph, lambda: graph.plant.finished)
+    bench.until(graph.everything_heard, "all messages")
+    assert len(graph.heard[JOINT_COMMAND]) == 201
+    assert " 0 held an old command" in Messages().of(graph, RUN_STATE)[-1].detail
 
 
 def test_in_real_time_a_reset_after_the_end_runs_again(bench: Bench, fast_clock: None) -> None:
