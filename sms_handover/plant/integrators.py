@@ -80,6 +80,8 @@ class LieGroupIntegrator:
         )
         ends = [_of_velocities(weights, a, h) for weights in b]
         self._end_weights = np.array([*ends, np.concatenate([[0.0], h * b.sum(axis=0)])])
+        self._ends = np.zeros((len(self._end_weights), model.nv))  # the motions, then the increment of v
+        *self._motions, self._increment = self._ends
 
     def step(self, acceleration: Acceleration, q: Array, v: Array) -> tuple[Array, Array]:
         """Return configuration (7 + n,) and velocity (6 + n,) after one step, as read-only arrays.
@@ -98,10 +100,10 @@ class LieGroupIntegrator:
             q_stage = pin.integrate(model, configurations[origin], motion)
             configurations.append(q_stage)
             result[:] = acceleration(q_stage, velocity)
-        *motions, increment = self._end_weights.dot(rows)
-        for motion in motions:
+        self._end_weights.dot(rows, self._ends)
+        for motion in self._motions:
             q = pin.integrate(model, q, motion)
-        return frozen(q), frozen(v + increment)
+        return frozen(q), frozen(v + self._increment)
 
     def _stage(self, index: int, origin: int, motion_weights: Array, a: Array, h: float) -> _Stage:
         """Return a stage with its weights and its places in the work space."""
