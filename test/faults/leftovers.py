@@ -13,6 +13,7 @@ MARK = "SMS_HANDOVER_FAULT"  # environment variable that every process of a tria
 GRACE_S = 20.0  # [s] of wall time for the nodes to notice that their launcher is gone, on a busy machine
 SHARED_MEMORY = Path("/dev/shm")
 
+_KILLED_S = 20.0  # [s] of wall time at most in which the system takes away what was killed
 _LONGEST = 100  # characters of a command line
 
 
@@ -44,7 +45,7 @@ def end_all(pids: Iterable[int]) -> None:
         with suppress(ProcessLookupError):
             os.kill(pid, signal.SIGKILL)
     for pid in pids:
-        has_ended(pid, GRACE_S)
+        has_ended(pid, _KILLED_S)
 
 
 def shared_memory() -> int:
