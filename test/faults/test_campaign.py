@@ -67,7 +67,8 @@ def hangs(trial: Trial, seen: None) -> Kept:
 
 
 def leaves_a_process(trial: Trial, seen: None) -> Kept:
-    trial.command(["sh", "-c", "setsid sleep 61 >/dev/null 2>&1 &"])
+    begun = 'until [ "$(cat /proc/$!/comm)" = sleep ]; do :; done'
+    trial.command(["sh", "-c", f"setsid sleep 61 >/dev/null 2>&1 & {begun}"])
     return Kept()
 
 
