@@ -15,6 +15,7 @@ import yaml
 from yaml.constructor import ConstructorError
 
 LARGEST_FILE = 2**18  # [byte], some thirty times the schedule of the paper
+_LARGEST = 2**19  # characters and nodes of a text, with every alias written out
 _DEEPEST = 32  # mappings and lists inside one another
 
 
@@ -30,11 +31,10 @@ class Mapping(dict[str | float, Any]):
 class YamlLoader(yaml.SafeLoader):
     """Loads plain data; raises yaml.YAMLError with the line where something else stands."""
 
-    largest = 2**19  # characters and nodes, with every alias written out
-
-    def __init__(self, stream: str) -> None:
-        """Read a text."""
+    def __init__(self, stream: str, largest: int = _LARGEST) -> None:
+        """Read a text of at most so many characters and nodes, with every alias written out."""
         super().__init__(stream)
+        self._largest = largest
         self._depth = 0
         self._size = 0  # of what has been read, with every alias written out
         self._sizes: dict[int, int] = {}  # of the nodes, by their identity
@@ -56,7 +56,7 @@ class YamlLoader(yaml.SafeLoader):
         else:
             self._size += 1 + (len(node.value) if isinstance(node, yaml.ScalarNode) else 0)
             self._sizes[id(node)] = self._size - before
-        if self._size > self.largest:
+        if self._size > self._largest:
             raise ConstructorError(None, None, "with its aliases written out it is too large", mark)
         return node
 
@@ -105,9 +105,16 @@ def read_text(path: Path, largest: int = LARGEST_FILE) -> str:
     return content.decode("utf-8")
 
 
-def load(text: str, loader: type[YamlLoader] = YamlLoader) -> Any:
-    """Return what a YAML text holds, mappings as :class:`Mapping`; raises yaml.YAMLError."""
-    return yaml.load(text, loader)
+def load(text: str, largest: int = _LARGEST) -> Any:
+    """Return what a YAML text holds, mappings as :class:`Mapping`; raises yaml.YAMLError.
+
+    ``largest`` bounds its characters and nodes, with every alias written out.
+    """
+    loader = YamlLoader(text, largest)
+    try:
+        return loader.get_single_data()
+    finally:
+        loader.dispose()
 
 
 def compose(text: str) -> yaml.Node | None:

@@ -8,7 +8,7 @@ from typing import Any
 import yaml
 
 from sms_handover.errors import BagError
-from sms_handover.yaml_files import YamlLoader, load, read_text
+from sms_handover.yaml_files import load, read_text
 
 METADATA_FILE = "metadata.yaml"
 ROSBAG2_KEY = "rosbag2_bagfile_information"
@@ -16,12 +16,6 @@ ROSBAG2_RECORD = "rosbag2"  # name of the metadata record with the same text
 LARGEST_METADATA = 2**22  # [byte] some 4000 topics, or 20 000 files of a split bag
 _VERSION = 9
 _ROS_DISTRO = "jazzy"
-
-
-class _MetadataLoader(YamlLoader):
-    """Loads the description of a bag, which may be longer than what users write."""
-
-    largest = LARGEST_METADATA
 
 
 @dataclass(frozen=True)
@@ -76,7 +70,7 @@ def metadata_of(bag: Path) -> dict[str, Any] | None:
     if not file.is_file():
         return None
     try:
-        body = load(read_text(file, LARGEST_METADATA), _MetadataLoader)[ROSBAG2_KEY]
+        body = load(read_text(file, LARGEST_METADATA), LARGEST_METADATA)[ROSBAG2_KEY]
         return dict(body)
     except (OSError, UnicodeDecodeError, yaml.YAMLError, LookupError, TypeError, ValueError) as error:
         raise BagError(f"{file} is not readable: {' '.join(str(error).split())[:200]}") from error

@@ -34,7 +34,6 @@ from sms_handover.share import config_file
 from sms_handover.topics import (
     CLOCK,
     CONTAINER,
-    CONTROLLER,
     LOOP_NODES,
     NODES,
     PLAYER,
@@ -80,17 +79,22 @@ def test_the_reference_is_what_the_node_has(
     node = bench.add(GRAPH[name])
     published, subscribed = topics_of(name)
     told = {topic.name: topic.type for topic in published}
-    command = "/joint_command"  # made last; what a node has made may take a moment to be told
-    bench.until(
-        lambda: name != CONTROLLER or node.count_publishers(command), "the last endpoint of the controller"
-    )
-    theirs = node.get_publisher_names_and_types_by_node(name, "/")
     ros_own = {*ROS_OWN, f"/{name}/transition_event"}
-    assert {topic for topic, _ in theirs} - ros_own == absolute(expanded(set(told)))
-    for topic, (type_name,) in theirs:
-        assert topic in ros_own or type_name in told.values()
-    theirs = node.get_subscriber_names_and_types_by_node(name, "/")
-    assert {topic for topic, _ in theirs} - ROS_OWN == absolute(expanded({t.name for t in subscribed}))
+    publishes, reads = absolute(expanded(set(told))), absolute(expanded({t.name for t in subscribed}))
+
+    def theirs() -> tuple[dict[str, list[str]], dict[str, list[str]]]:
+        ends = (node.get_publisher_names_and_types_by_node, node.get_subscriber_names_and_types_by_node)
+        found, heard = ({t: kinds for t, kinds in end(name, "/") if t not in ros_own} for end in ends)
+        return found, heard
+
+    def is_told() -> bool:  # what a node has made may take a moment to be told
+        found, heard = theirs()
+        return publishes <= set(found) and reads <= set(heard)
+
+    bench.until(is_told, "the endpoints of the node")
+    found, heard = theirs()
+    assert (set(found), set(heard)) == (publishes, reads)
+    assert all(type_name in told.values() for (type_name,) in found.values())
     offered, called = services_of(name)
     own = {s: t for s, t in node.get_service_names_and_types_by_node(name, "/")}
     own = {service: types for service, types in own.items() if not any(r in service for r in ROS_SERVICES)}
