@@ -48,7 +48,7 @@ def _reproduce(bag: Path) -> int:
         except BagError as error:
             raise ConfigurationError(str(error)) from error  # exit code 2: what was given cannot be used
         again = simulate(scenario)
-    ended_early = 1 < recorded.tick_ns.size < again.tick_ns.size
+    ended_early = recorded.tick_ns.size < again.tick_ns.size
     if ended_early:
         end_ns = int(recorded.tick_ns[-1])
         recorded, again = before(recorded, end_ns), before(again, end_ns)

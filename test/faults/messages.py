@@ -65,7 +65,7 @@ def intrude(words: tuple[str, ...], trial: Trial, *, real_time: bool = False) ->
                 command, env=environment, stdin=subprocess.PIPE, stdout=said, stderr=said, text=True
             )
             try:
-                run.until_recorded(trial.folder / "run" / "bag", under_way(trial) // 8)
+                run.until_recorded(trial.folder / "run" / "bag", under_way(trial))
                 with nullcontext() if real_time else held(run, IK):
                     _tell(stranger, "talk\n")
                     run.until(lambda: "talked" in _said(trial), "the stranger has been heard")
