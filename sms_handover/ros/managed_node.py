@@ -78,6 +78,15 @@ class ManagedNode(LifecycleNodeMixin, RunnableNode):
             trigger()
             self._raise_error()
 
+    def destroy_node(self) -> None:
+        """Destroy the node with its state machine.
+
+        rclpy 7.1 leaves that until the garbage is collected, and as long as it is there the process goes
+        on taking part in the graph, with the half of a service that the others then wait for in vain.
+        """
+        super().destroy_node()
+        self.__dict__.pop("_state_machine", None)
+
     def keep_company(self, others: tuple["ManagedNode", ...]) -> None:
         """Look after other nodes of the same process and thread too."""
         self._companions = others

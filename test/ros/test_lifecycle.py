@@ -1,5 +1,7 @@
 """The lifecycle of the nodes: transitions by services as `ros2 lifecycle` asks for them, right and wrong."""
 
+import gc
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -173,6 +175,25 @@ def test_an_error_in_a_transition_ends_the_node_with_its_reason(
     stop: Any = lambda: None  # noqa: E731
     with pytest.raises(ConfigurationError, match=text):
         node.goes_on(stop)
+
+
+def test_a_node_that_is_destroyed_has_left_the_graph(bench: Bench, name: str) -> None:
+    """At once, with all threads of the middleware, as a node does that is not managed."""
+    threads = []
+    gc.collect()  # what tests before this one have left
+    gc.disable()
+    try:
+        for make in (lambda: Node(name, start_parameter_services=False), NODES[name]):
+            bench.start({**MANAGED, "recorder": {"folder": "bag"}})
+            node = bench.add(make)
+            if isinstance(node, GraphNode):
+                node.trigger_configure()
+            del node
+            bench.close()
+            threads.append(len(os.listdir("/proc/self/task")))
+    finally:
+        gc.enable()
+    assert threads[1] == threads[0]
 
 
 # The run
