@@ -99,6 +99,8 @@ class AnsweringNode(GraphNode[P]):
     def begin(self) -> None:
         """Go back to the start of a run."""
         self._controller.reset()
+        for order in self._orders.values():
+            order.reset()
 
     def on_answered(self, stamp: int) -> None:
         """Do what is due after an answer; a node may override this."""
@@ -107,8 +109,6 @@ class AnsweringNode(GraphNode[P]):
         """Forget the run: integrals, references and what waits of it."""
         self.begin()
         self._inputs.begin_anew()
-        for order in self._orders.values():
-            order.reset()
         self._answered_ns = 0
         self._answer_bytes = b""
 
@@ -141,8 +141,6 @@ class AnsweringNode(GraphNode[P]):
         if self._inputs.begins_anew(stamp):
             self._inputs.reset()
             self.begin()
-            for order in self._orders.values():
-                order.reset()
         if not self._lockstep and topic in self._orders:
             if self._inputs.admits(stamp, topic):
                 self._orders[topic].take(stamp, self._answered_ns)
