@@ -45,13 +45,12 @@ def simulate(
         law = CheckedController(controller, robot.joint_names)
         law.reset()
     generator = TrajectoryGenerator(robot, schedule, parameters.trajectory)
-    last_tick = common.last_tick(schedule.end_ns)
-    periods = last_tick // common.ticks_per_reference + 1
-    recorder = RunRecorder(robot.joint_names, robot.arms, last_tick + 1, periods)
+    last_tick, per_reference = common.last_tick(schedule.end_ns), common.ticks_per_reference
+    recorder = RunRecorder(robot.joint_names, robot.arms, last_tick + 1, last_tick // per_reference + 1)
     tick = 0
     while tick <= last_tick:
         stamp_ns = plant.stamp_ns
-        if tick % common.ticks_per_reference == 0:
+        if tick % per_reference == 0:
             state = plant.state
             deputy = plant.deputy
             recorder.plant(plant.tools_in_world, deputy.deputy_in_world, plant.receipt, plant.work)
@@ -68,8 +67,9 @@ def simulate(
                 generator.solved(converged=solution.status is IkStatus.CONVERGED)
             recorder.events(events)
             recorder.decisions(generator.take_decisions())
-            last_tick = common.last_tick(phase.end_ns, failed=phase.failed)
-            recorder.make_room(last_tick + 1, last_tick // common.ticks_per_reference + 1)
+            before, last_tick = last_tick, common.last_tick(phase.end_ns, failed=phase.failed)
+            if last_tick > before:
+                recorder.make_room(last_tick + 1, last_tick // per_reference + 1)
             if progress:
                 progress(stamp_ns, phase)
         effort = law.effort(stamp_ns, plant.q, plant.v)
