@@ -1,29 +1,38 @@
 """Takes the nodes of a graph through their lifecycle, all of them one state after the other."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
+from time import monotonic
 from typing import Any
 
-from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
+from lifecycle_msgs.msg import State, Transition
+from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.node import Node
 
 _CONFIGURE, _ACTIVATE = Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE
 _SHUTDOWN = Transition.TRANSITION_ACTIVE_SHUTDOWN
 _DOES = {_CONFIGURE: "configured", _ACTIVATE: "activated", _SHUTDOWN: "shut down"}
+# The states before and after a transition; any other is one between.
+_BEFORE = {_CONFIGURE: State.PRIMARY_STATE_UNCONFIGURED, _ACTIVATE: State.PRIMARY_STATE_INACTIVE}
+_AFTER = {_CONFIGURE: State.PRIMARY_STATE_INACTIVE, _ACTIVATE: State.PRIMARY_STATE_ACTIVE}
+
+_SILENCE_S = 2.0  # [s] of wall time without an answer after which a node is asked where it is
 
 
 class LifecycleDriver:
     """Configures every node, then activates every node, and in the end shuts them down.
 
     Nothing blocks: :meth:`look` does what is due, and answers come by the executor of the node. A node
-    that fails in a transition tells why itself, and ends.
+    that fails in a transition tells why itself, and ends. The first answer of a service is lost if its node
+    has not found who asks within 100 ms (rmw_fastrtps); so one that is silent is asked for its state,
+    and for the transition again if it has not made it.
     """
 
     def __init__(self, node: Node, names: Collection[str]) -> None:
         """Prepare to drive the nodes of these names."""
         self._clients = {name: node.create_client(ChangeState, f"{name}/change_state") for name in names}
+        self._states = {name: node.create_client(GetState, f"{name}/get_state") for name in names}
         self._done: dict[int, set[str]] = {transition: set() for transition in _DOES}
-        self._asked: dict[int, set[str]] = {transition: set() for transition in _DOES}
+        self._asked_at: dict[tuple[int, str], float] = {}  # [s] of wall time
         self._failed: dict[str, str] = {}
 
     @property
@@ -42,10 +51,11 @@ class LifecycleDriver:
 
     def look(self) -> None:
         """Ask for the transitions that are due towards the state ``active``."""
-        if not self._have_all(_CONFIGURE):
-            self._ask(_CONFIGURE)
-        elif not self.active:
-            self._ask(_ACTIVATE)
+        if self.active:
+            return
+        transition = _ACTIVATE if self._have_all(_CONFIGURE) else _CONFIGURE
+        self._ask(transition)
+        self._ask_the_silent(transition)
 
     def shut_down(self) -> None:
         """Ask every node to shut down, so that its process ends; those that are gone are left alone."""
@@ -58,18 +68,39 @@ class LifecycleDriver:
     def _ask(self, transition: int) -> None:
         """Ask every node that is there for a transition, once."""
         for name, client in self._clients.items():
-            if name not in self._asked[transition] and client.service_is_ready():
-                self._asked[transition].add(name)
+            if (transition, name) not in self._asked_at and client.service_is_ready():
+                self._asked_at[transition, name] = monotonic()
                 request = ChangeState.Request(transition=Transition(id=transition))
-                client.call_async(request).add_done_callback(self._keep(name, transition))
+                client.call_async(request).add_done_callback(self._answer(name, transition))
 
-    def _keep(self, name: str, transition: int) -> Any:
-        """Return what takes the answer of a node."""
+    def _ask_the_silent(self, transition: int) -> None:
+        """Ask nodes that have not answered for a while where they are."""
+        now = monotonic()
+        for name in self._clients.keys() - self._done[transition]:
+            client, asked_at = self._states[name], self._asked_at.get((transition, name), now)
+            if now - asked_at > _SILENCE_S and client.service_is_ready():
+                self._asked_at[transition, name] = now
+                client.call_async(GetState.Request()).add_done_callback(self._state(name, transition))
+
+    def _answer(self, name: str, transition: int) -> Callable[[Any], None]:
+        """Return what takes the answer of a node that was asked for a transition."""
 
         def on_answer(future: Any) -> None:
             if future.result().success:
                 self._done[transition].add(name)
-            else:
+            elif name not in self._done[transition]:
                 self._failed[name] = f"{name} could not be {_DOES[transition]}"
 
         return on_answer
+
+    def _state(self, name: str, transition: int) -> Callable[[Any], None]:
+        """Return what takes the answer of a node that was asked where it is."""
+
+        def on_state(future: Any) -> None:
+            state = future.result().current_state.id
+            if state == _AFTER[transition]:
+                self._done[transition].add(name)
+            elif state == _BEFORE[transition] and name not in self._done[transition]:
+                self._asked_at.pop((transition, name), None)  # it has not heard of it
+
+        return on_state

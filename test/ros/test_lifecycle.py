@@ -10,6 +10,7 @@ import pytest
 from lifecycle_msgs.msg import State, Transition, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 from rclpy.node import Node
+from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
 from sms_handover.bag.stamp import stamp_ns
@@ -19,6 +20,7 @@ from sms_handover.nodes.ik import IkNode
 from sms_handover.nodes.plant import PlantNode
 from sms_handover.nodes.recorder import RecorderNode
 from sms_handover.nodes.trajectory import TrajectoryNode
+from sms_handover.ros import lifecycle_driver
 from sms_handover.ros.graph_node import GraphNode
 from sms_handover.ros.lifecycle_driver import LifecycleDriver
 from sms_handover.simulation.parameters import DIRECT, EXECUTOR
@@ -216,6 +218,34 @@ def drive(graph: Graph) -> None:
     graph.bench.until(active, "every node to be active")
     assert driver.waiting_for == ""
     graph.ear.get_ready(graph.bench)
+
+
+@pytest.mark.parametrize("lost", ["request", "answer"])
+def test_a_node_that_is_silent_is_asked_again(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, lost: str
+) -> None:
+    """The middleware loses the first answer of a service if its node has not found who asks soon enough."""
+    monkeypatch.setattr(lifecycle_driver, "_SILENCE_S", 0.05)
+    bench.start(MANAGED)
+    node = bench.add(IkNode)
+    driver = LifecycleDriver(bench.plain("launcher"), [IK])
+    client = driver._clients[IK]
+    ask: Callable[[Any], Any] = client.call_async
+
+    def lose(request: Any) -> Future:
+        monkeypatch.setattr(client, "call_async", ask)
+        if lost == "answer":
+            ask(request)
+        return Future()
+
+    monkeypatch.setattr(client, "call_async", lose)
+
+    def active() -> bool:
+        driver.look()
+        return driver.active
+
+    bench.until(active, "the node to be active")
+    assert node.state_name == "active"
 
 
 def wait_for_tick(graph: Graph, tick: int) -> None:
