@@ -243,8 +243,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "the two motions of a step in the wrong order",
         "plant/integrators",
-        "for motion in motions:",
-        "for motion in reversed(motions):",
+        "for motion in self._motions:",
+        "for motion in reversed(self._motions):",
         "integrators",
     ),
     _core(
