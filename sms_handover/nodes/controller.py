@@ -77,6 +77,7 @@ class AnsweringNode(GraphNode[P]):
         ahead_ns = self._reference_ns if self._lockstep else NS_PER_S
         self._inputs: StampSync[Any] = StampSync(ahead_ns=ahead_ns, paced=not self._lockstep)
         self._orders = {topic: StampOrder(ahead_ns) for topic in guidance}
+        self._early: dict[str, Any] = {}  # what may belong to a run that begins
         self._answered_ns = 0
         self._answer_bytes = b""
         for topic, read in {**guidance, **state}.items():
@@ -109,6 +110,7 @@ class AnsweringNode(GraphNode[P]):
         """Forget the run: integrals, references and what waits of it."""
         self.begin()
         self._inputs.begin_anew()
+        self._early.clear()
         self._answered_ns = 0
         self._answer_bytes = b""
 
@@ -137,10 +139,20 @@ class AnsweringNode(GraphNode[P]):
         return lambda content, sent_ns: self._take(topic, *content)
 
     def _take(self, topic: str, stamp: int, content: Any) -> None:
-        """Take one input; a state of time zero behind an answered one begins the run anew."""
+        """Take one input; a state of time zero behind an answered one begins the run anew.
+
+        A reference of time zero waits for such a state: it may as well be the answer, once more, to one
+        that the plant has sent again.
+        """
         if self._inputs.begins_anew(stamp):
+            if topic not in _STATE:
+                self._early[topic] = content
+                return
             self._inputs.reset()
             self.begin()
+            early, self._early = self._early, {}
+            for name, first in early.items():
+                self._take(name, stamp, first)
         if not self._lockstep and topic in self._orders:
             if self._inputs.admits(stamp, topic):
                 self._orders[topic].take(stamp, self._answered_ns)

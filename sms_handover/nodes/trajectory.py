@@ -75,7 +75,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._lockstep = self.common.mode == LOCKSTEP
         ahead_ns = self.common.reference_ns if self._lockstep else NS_PER_S
         self._inputs: StampSync[Any] = StampSync(ahead_ns=ahead_ns, paced=not self._lockstep)
-        self._stamp_ns = self._newest_ns = 0
+        self._stamp_ns = self._newest_ns = self._asked_ns = 0
         self._answer: list[tuple[CountedPublisher, bytes]] = []
         self._failures = self._overdue = 0
         self._solver = self.inputs.asker(SolveIK, SOLVE_IK, self._on_solution)
@@ -133,7 +133,9 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         if self._inputs.begins_anew(stamp):
             self._inputs.reset()
             self._generator.reset()
-        if topic == DEPUTY_POSE and stamp == self._stamp_ns and self._asked is None:
+        if topic == DEPUTY_POSE and self._asked is not None:
+            self._ask_again(stamp)
+        elif topic == DEPUTY_POSE and stamp == self._stamp_ns:
             self._publish_again()
         self._inputs.add(stamp, topic, content)
         self._newest_ns = stamp
@@ -179,13 +181,23 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         request.arms = list(question.tool_in_world)
         for message, pose in zip(request.tool_in_world, poses, strict=True):
             set_pose(message, pose)
-        self._asked = state, phase, targets
+        self._asked, self._asked_ns = (state, phase, targets), state.stamp_ns
         self._solver.ask(request)
+
+    def _ask_again(self, stamp: int) -> None:
+        """Repeat a request that has no answer when the plant asks again or, in real time, after a second.
+
+        The first answer of a service is lost if its node has not found who asks within 100 ms (rmw_fastrtps).
+        """
+        if stamp == self._stamp_ns or stamp - self._asked_ns > NS_PER_S:
+            self._asked_ns = stamp
+            self._overdue += 1
+            self._solver.ask(self._request)
 
     def _on_solution(self, answer: Any) -> None:
         """Publish the reference that follows from a solution, converged or not."""
         if self._overdue and (self._asked is None or not _answers(answer, self._asked[0].stamp_ns)):
-            self._overdue -= 1  # it is due to the run before
+            self._overdue -= 1  # it is due to the run before, or to a request that was repeated
             return
         if self._asked is None:
             return

@@ -43,7 +43,7 @@ class Inputs(ABC):
     """
 
     wakes: int = 0
-    awaited: Callable[[], str] = str
+    awaited: Callable[[], str] = staticmethod(lambda: "")
     identifies: bool = False
     closed: bool = False
     drops: bool = False

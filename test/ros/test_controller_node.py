@@ -198,6 +198,20 @@ def test_time_zero_begins_anew(bench: Bench, law: str) -> None:
     assert rest.node.diagnostic_values()["late"] == 0
 
 
+def test_a_first_reference_that_comes_again_late_changes_nothing(bench: Bench) -> None:
+    """As when the plant has sent its first state again, and the trajectory has answered it again."""
+    rest = Rest(bench, law="pid")
+    expected = rest.by_hand()
+    for number in range(4):
+        state, reference, phase = inputs(rest, number * REFERENCE_NS, number)
+        rest.send(rest.messages(state, reference, phase), *INPUTS)
+        rest.wait_for(number + 1)
+        expected.enter(phase)
+        expected.track(reference)
+        assert rest.efforts()[-1].tobytes() == expected.step(state).effort.tobytes()
+        rest.send(rest.messages(*inputs(rest, 0, 0)), TASK_PHASE, JOINT_REFERENCE)
+
+
 def test_in_real_time_the_last_reference_holds(bench: Bench) -> None:
     """No reference yet: no effort. Then the last one, whatever its stamp."""
     rest = Rest(bench, mode="realtime")

@@ -1,6 +1,7 @@
 """The trajectory node: what it refuses before a run, and what it does with the answers it gets."""
 
 from collections.abc import Sequence
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,9 @@ from std_msgs.msg import String
 from sms_handover.errors import GraphError, ScheduleError
 from sms_handover.nodes.trajectory import TrajectoryNode
 from sms_handover.ros.endpoints import Endpoints
+from sms_handover.simulation.parameters import TRANSPORTS
+from sms_handover.simulation.scenario import load_scenario
+from sms_handover.simulation.simulate import simulate
 from sms_handover.topics import (
     DIAGNOSTICS,
     IK,
@@ -123,6 +127,34 @@ def test_a_state_that_comes_again_is_answered_with_all_that_belongs_to_it(bench:
     bench.until(lambda: all(len(graph.heard[topic]) > before[topic] for topic in topics), "all of it again")
     for topic in topics:
         assert graph.heard[topic][-1] == graph.heard[topic][-2]
+
+
+@pytest.mark.parametrize("answers", [0, 2])
+@pytest.mark.parametrize("transport", TRANSPORTS)
+def test_a_request_without_an_answer_is_repeated(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, transport: str, answers: int
+) -> None:
+    """The references are those of ever, also if it turns out that the first was answered after all."""
+    graph = Graph(bench, {"plant": {"resend_after": 0.05}, "common": {"transport": transport}})
+    trajectory = graph.nodes["trajectory"]
+    assert isinstance(trajectory, TrajectoryNode)
+    ask, asked = trajectory._solver.ask, count()
+
+    def ask_badly(request: Any) -> None:
+        if next(asked) != 3:
+            ask(request)
+        elif answers:
+            ask(request)
+            trajectory._ask_again(trajectory._stamp_ns)
+
+    monkeypatch.setattr(trajectory._solver, "ask", ask_badly)
+    graph.run()
+    schedule = {"common": {"schedule": str(bench.folder / "schedule.yaml")}}
+    expected = simulate(load_scenario(schedule))
+    heard = Messages().of(graph, JOINT_REFERENCE)
+    found = dict(zip(graph.stamps(JOINT_REFERENCE), (message.position for message in heard), strict=True))
+    assert list(found) == expected.reference_ns.tolist()
+    np.testing.assert_array_equal(list(found.values()), expected.reference_position)
 
 
 def with_schedule(bench: Bench, text: str, parameters: dict[str, dict[str, object]] | None = None) -> None:
