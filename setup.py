@@ -85,8 +85,10 @@ setup(
             "matplotlib>=3.10,<4",
             "plotly>=7,<8",  # of it only plotly.js is used
         ],
+        "compiled": ["casadi>=3.7,<4"],  # writes the equations of motion out as C
         "parquet": ["pyarrow>=18,<27"],
         "test": [
+            "casadi>=3.7,<4",
             "hypothesis>=6.140,<7",  # draws the inputs of the fuzzers
             "mcap-ros2-support>=0.5.7,<1",
             "mypy>=1.15",

@@ -19,6 +19,7 @@ from benchmarks.mujoco_model import apart
 from benchmarks.results import DIAGRAMS, Result, Table, publish, row
 from sms_handover.model.conserved import physics_receipt
 from sms_handover.plant.integrators import TABLEAUS, Tableau
+from sms_handover.simulation.parameters import COMPILED, PINOCCHIO
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
 
@@ -26,9 +27,11 @@ DIAGRAM = "work_precision.svg"
 REFERENCE_STEPS = 4  # per tick: what is then left of the error is rounding
 EULER = Tableau(1, ((),), (0,), ((1.0,),))
 KUTTA = Tableau(3, ((), (1 / 3,), (0.0, 2 / 3)), (0, 0, 0), ((1 / 3, 0.0, 0.0), (-1 / 12, 0.0, 3 / 4)))
+OURS = {PINOCCHIO: "ours", COMPILED: "ours, compiled"}
 Point = tuple[float, float, str]  # us per tick, error in rad, name
 _MARKS = {
     "ours": ("o", 4),
+    "ours, compiled": ("D", 4),
     "MuJoCo": ("s", -11),
     "Drake": ("^", 4),
 }  # and how far up the labels stand, points
@@ -69,7 +72,11 @@ def cases() -> list[Case]:
     in_mujoco = [("RK4", 1), ("EULER", 1), ("EULER", 4)]
     in_drake = [("runge_kutta3", 1), ("runge_kutta5", 1), ("semi_explicit_euler", 1)]
     return [
-        *(Case("ours", name, n, partial(Ours, tableau=tableau, steps=n)) for name, tableau, n in ours),
+        *(
+            Case(engine, name, n, partial(Ours, tableau=tableau, dynamics=dynamics, steps=n))
+            for dynamics, engine in OURS.items()
+            for name, tableau, n in ours
+        ),
         *(Case("MuJoCo", name, n, partial(InMujoco, integrator=name, steps=n)) for name, n in in_mujoco),
         *(Case("Drake", name, n, partial(InDrake, scheme=name, steps=n)) for name, n in in_drake),
     ]
@@ -146,7 +153,7 @@ def main() -> None:
     task = HandoverTask.of(scenario, run)
     every = cases()
     contestants = {
-        "exact": Ours(task, TABLEAUS["rk4"], REFERENCE_STEPS),
+        "exact": Ours(task, TABLEAUS["rk4"], PINOCCHIO, REFERENCE_STEPS),
         **{c.name: c.make(task) for c in every},
     }
     courses = race(task, contestants)

@@ -1,5 +1,7 @@
 """Imports point one way: edge -> simulation -> {plant, trajectory, ik, control} -> model -> foundation.
 
+``compiled``, which stands in for algorithms of Pinocchio, lies between simulation and plant.
+
 Read from the syntax trees, so an import inside a function or for type checking alone counts too.
 """
 
@@ -32,7 +34,18 @@ FOUNDATION_MODULES = {
     "yaml_files",
 }
 MIDDLE = {"plant", "trajectory", "ik", "control"}
-CORE = {"model", *MIDDLE, "simulation", "bag", "analysis", "scene", "playback", "report", "export"}
+CORE = {
+    "model",
+    *MIDDLE,
+    "compiled",
+    "simulation",
+    "bag",
+    "analysis",
+    "scene",
+    "playback",
+    "report",
+    "export",
+}
 EDGE = {"ros", "nodes", "external", "cli"}
 
 # What a layer may import besides itself and the foundation.
@@ -40,7 +53,8 @@ ALLOWED: dict[str, set[str]] = {
     FOUNDATION: set(),
     "model": set(),
     **{layer: {"model"} for layer in MIDDLE},
-    "simulation": {"model", *MIDDLE},
+    "compiled": {"model", "plant"},
+    "simulation": {"model", *MIDDLE, "compiled"},
     "bag": {"model", "simulation"},
     "analysis": {"model", "simulation", "bag", "scene"},
     "scene": {"model", "bag"},
@@ -52,8 +66,12 @@ ALLOWED: dict[str, set[str]] = {
     "external": CORE | {"ros", "nodes"},
     "cli": CORE | {"ros", "nodes"},
 }
-DRAWING = {"matplotlib", "mpl_toolkits"}  # optional, so one package alone may need them
 FIGURES = "sms_handover.analysis.figures"
+OPTIONAL = {
+    "matplotlib": FIGURES,
+    "mpl_toolkits": FIGURES,
+    "casadi": "sms_handover.compiled",
+}  # who needs them
 ROS = re.compile(r"rclpy|ament_index_python|launch(_ros)?|tf2_\w+|rosidl_\w+|\w+_(msgs|srvs|interfaces)")
 
 
@@ -94,8 +112,8 @@ def violations(source: str, module: str) -> list[str]:
         head, *rest = name.split(".")
         if ROS.fullmatch(head) and layer not in EDGE:
             found.append(f"{module}:{line} imports {name}: only {sorted(EDGE)} may know ROS")
-        if head in DRAWING and not module.startswith(f"{FIGURES}."):
-            found.append(f"{module}:{line} imports {name}: only {FIGURES} may")
+        if head in OPTIONAL and not module.startswith(f"{OPTIONAL[head]}."):
+            found.append(f"{module}:{line} imports {name}: only {OPTIONAL[head]} may")
         if head != PACKAGE or not rest or rest[0].startswith("__"):
             continue
         target = layer_of(name)
@@ -130,6 +148,8 @@ def test_imports_point_one_way(file: Path) -> None:
         ("sms_handover.ik.residual", "import sms_handover_interfaces.srv"),
         ("sms_handover.analysis.metrics", "from matplotlib.figure import Figure"),
         ("sms_handover.cli.figures", "def draw():\n    import mpl_toolkits.mplot3d"),
+        ("sms_handover.control.nmpc", "import casadi"),
+        ("sms_handover.compiled.step", "from sms_handover.control import nmpc"),
     ],
 )
 def test_a_wrong_import_is_caught(module: str, source: str) -> None:

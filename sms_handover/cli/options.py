@@ -13,7 +13,7 @@ from sms_handover.control.parameters import LAWS
 from sms_handover.errors import ConfigurationError
 from sms_handover.parameters import build, read_parameter_files
 from sms_handover.share import config_file
-from sms_handover.simulation.parameters import MODES
+from sms_handover.simulation.parameters import DYNAMICS, MODES
 from sms_handover.simulation.scenario import COMMON, Scenario, load_scenario
 from sms_handover.topics import CONTROLLER, RECORDER, TRAJECTORY
 from sms_handover.trajectory.time_law import TIME_LAWS
@@ -34,6 +34,12 @@ def add_scenario_options(parser: ArgumentParser) -> None:
         help="simulated time in s (default: the schedule's)",
     )
     group.add_argument("--time-law", choices=tuple(TIME_LAWS), help="approach of targets (default: step)")
+    group.add_argument(
+        "--dynamics",
+        choices=DYNAMICS,
+        help="compiled: the equations of motion as C code, made once, several times faster; needs CasADi and "
+        "a C compiler (default: pinocchio)",
+    )
     group.add_argument(
         "--params-file",
         type=Path,
@@ -64,6 +70,7 @@ def overrides_of(options: Namespace) -> Overrides:
         (COMMON, "schedule", options.schedule and str(options.schedule.resolve())),
         (COMMON, "robot", options.robot and str(options.robot.resolve())),
         (COMMON, "duration", options.duration),
+        (COMMON, "dynamics", options.dynamics),
     )
     for node, name, value in shortcuts:
         if value is not None:

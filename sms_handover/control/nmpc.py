@@ -1,6 +1,8 @@
 """Closed-form nonlinear model predictive control of the reduced dynamics."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -11,6 +13,8 @@ from sms_handover.parameters import parameter
 from sms_handover.types import BASE_NQ, BASE_NV, Array
 
 MAX_CONTROL_ORDER = 3
+
+InverseDynamics = Callable[[Array, Array, Array], Array]  # joint efforts (n,) of q, v, joint accelerations
 
 
 @dataclass(frozen=True)
@@ -42,9 +46,12 @@ class NmpcLaw(ControlLaw[NmpcGains]):
     a perfect model and unlimited efforts.
     """
 
-    def __init__(self, robot: RobotModel, gains: NmpcGains) -> None:
-        """Set up the law for a robot."""
+    def __init__(
+        self, robot: RobotModel, gains: NmpcGains, inverse_dynamics: InverseDynamics | None = None
+    ) -> None:
+        """Set up the law for a robot, by default with :func:`reduced_inverse_dynamics`."""
         self._robot = robot
+        self._inverse_dynamics = inverse_dynamics or partial(reduced_inverse_dynamics, robot)
         self._errors = np.zeros((2, robot.n_joints))  # rows e, e'
         self._error, self._error_rate = self._errors
         self.use(gains)
@@ -63,7 +70,7 @@ class NmpcLaw(ControlLaw[NmpcGains]):
         np.subtract(q[BASE_NQ:], position, out=self._error)
         np.subtract(v[BASE_NV:], velocity, out=self._error_rate)
         wanted = acceleration - self._feedback.dot(self._errors)  # q_d'' - A_1 e - A_2 e'
-        return self._robot.limited(reduced_inverse_dynamics(self._robot, q, v, wanted))
+        return self._robot.limited(self._inverse_dynamics(q, v, wanted))
 
     def linearised(self, inertia: Array) -> LinearFeedback:
         """Return K_e = A_1 H*, K_v = A_2 H*, K_z = 0."""

@@ -3,15 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from sms_handover.errors import ConfigurationError
 from sms_handover.model.conserved import PhysicsReceipt, physics_receipt
-from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
+from sms_handover.model.robot_model import BASE_NQ, RobotModel
 from sms_handover.plant.deputy import MasslessDeputy
 from sms_handover.plant.grasping import answer
-from sms_handover.plant.integrators import TABLEAUS, Acceleration, LieGroupIntegrator
+from sms_handover.plant.integrators import TABLEAUS
 from sms_handover.plant.parameters import PlantParameters
+from sms_handover.plant.stepper import PinocchioStepper, Stepper
 from sms_handover.types import (
     Array,
     DeputyState,
@@ -24,10 +24,6 @@ from sms_handover.types import (
     read_only,
 )
 from sms_handover.units import ns_to_seconds
-
-# Axes in which Pinocchio works. Those of the world take a tenth less time than those of the joints, with a
-# rounding that grows with the distance to the origin; the integrator keeps the base at the origin.
-_IN_WORLD = pin.Convention.WORLD
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,17 +45,23 @@ class FreeFloatingPlant:
     """
 
     def __init__(
-        self, robot: RobotModel, parameters: PlantParameters, initial: InitialState, tick_ns: int
+        self,
+        robot: RobotModel,
+        parameters: PlantParameters,
+        initial: InitialState,
+        tick_ns: int,
+        stepper: Stepper | None = None,
     ) -> None:
-        """Place robot and deputy at rest; raises ConfigurationError on a joint outside its limits."""
+        """Place robot and deputy at rest; raises ConfigurationError on a joint outside its limits.
+
+        ``stepper`` advances the robot by a tick; by default Pinocchio does.
+        """
         self._robot = robot
         self._tolerance = parameters.grasp_tolerance
         self._initial = initial
         self._tick_ns = tick_ns
         self._tick_s = ns_to_seconds(tick_ns)
-        self._integrator = LieGroupIntegrator(robot.pin, TABLEAUS[parameters.integrator], self._tick_s)
-        self._generalized = np.zeros(robot.pin.nv)  # (0, u): no wrench on the base
-        self._acceleration = _acceleration(robot, self._generalized)
+        self._stepper = stepper or PinocchioStepper(robot, TABLEAUS[parameters.integrator], self._tick_s)
         self._check_start()
         self.reset()
 
@@ -141,7 +143,7 @@ class FreeFloatingPlant:
         """
         effort = self._limited(asked)
         before = self.q
-        q, v = self._integrator.step(self._acceleration, before, self.v)
+        q, v = self._stepper.step(before, self.v, effort)
         self._work += float(effort.dot(q[BASE_NQ:] - before[BASE_NQ:]))
         self.q, self.v, self.joint_effort = q, v, effort
         self._tick += 1
@@ -155,7 +157,6 @@ class FreeFloatingPlant:
         if np.count_nonzero(at_limit):
             self._saturated_ticks += at_limit
             effort = frozen(self._robot.limited(asked))
-        self._generalized[BASE_NV:] = effort
         return effort
 
     def _deputy_follow(self) -> None:
@@ -173,14 +174,3 @@ class FreeFloatingPlant:
                 raise ConfigurationError(
                     f"initial position of {name} is {value} rad, allowed is {low} to {high} rad"
                 )
-
-
-def _acceleration(robot: RobotModel, generalized: Array) -> Acceleration:
-    """Return v' (6 + n,) as a function of q and v, under the forces that ``generalized`` has at the time."""
-    model, data = robot.pin, robot.data
-
-    def acceleration(q: Array, v: Array) -> Array:
-        result: Array = pin.aba(model, data, q, v, generalized, _IN_WORLD)
-        return result
-
-    return acceleration

@@ -56,6 +56,7 @@ ARGUMENTS = {
     "robot": LaunchArgument(_EVERY_NODE, "robot"),
     "duration": LaunchArgument(_EVERY_NODE, "duration"),
     "mode": LaunchArgument(_EVERY_NODE, "mode"),
+    "dynamics": LaunchArgument(_EVERY_NODE, "dynamics"),
     "bag": LaunchArgument(RECORDER, "folder"),
     "external": LaunchArgument(_EVERY_NODE, "external"),
     "autostart": LaunchArgument(_EVERY_NODE, "autostart"),

@@ -11,6 +11,8 @@ LOCKSTEP, REALTIME = "lockstep", "realtime"
 MODES = (LOCKSTEP, REALTIME)
 DIRECT, EXECUTOR = "direct", "executor"
 TRANSPORTS = (DIRECT, EXECUTOR)
+PINOCCHIO, COMPILED = "pinocchio", "compiled"
+DYNAMICS = (PINOCCHIO, COMPILED)
 EXTERNAL = (CONTROLLER,)
 
 
@@ -28,6 +30,11 @@ class CommonParameters:
     robot: str = parameter("path of the robot description; empty: the package's robot.yaml")
     schedule: str = parameter("path of the task schedule; empty: the package's handover.yaml")
 
+    dynamics: str = parameter(
+        "what works out the equations of motion; pinocchio: its algorithms; compiled: the same equations as "
+        "C code for this robot, made once, which is several times faster and needs CasADi and a C compiler",
+        choices=DYNAMICS,
+    )
     mode: str = parameter(
         "lockstep: every tick waits for its command; realtime: paced by the wall clock", choices=MODES
     )

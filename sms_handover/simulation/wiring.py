@@ -2,16 +2,19 @@
 
 import numpy as np
 
+from sms_handover.compiled.dynamics import CompiledInverseDynamics, CompiledStepper
 from sms_handover.control.controller import Gains, JointController
+from sms_handover.control.nmpc import NmpcGains
 from sms_handover.control.parameters import LAWS, ControllerParameters, gains_of
 from sms_handover.errors import UnknownNameError
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
+from sms_handover.plant.integrators import TABLEAUS
 from sms_handover.plant.parameters import PlantParameters
-from sms_handover.simulation.parameters import CommonParameters
+from sms_handover.simulation.parameters import COMPILED, CommonParameters
 from sms_handover.trajectory.schedule import Schedule
 from sms_handover.types import Array
-from sms_handover.units import seconds_to_ns
+from sms_handover.units import ns_to_seconds, seconds_to_ns
 
 
 def initial_joints(robot: RobotModel, schedule: Schedule) -> Array:
@@ -25,14 +28,17 @@ def initial_joints(robot: RobotModel, schedule: Schedule) -> Array:
 def make_plant(
     robot: RobotModel, schedule: Schedule, common: CommonParameters, parameters: PlantParameters
 ) -> FreeFloatingPlant:
-    """Return the plant at the start of the schedule."""
+    """Return the plant at the start of the schedule; raises ConfigurationError."""
     initial = InitialState(
         schedule.base_in_world,
         initial_joints(robot, schedule),
         schedule.deputy.deputy_in_world,
         dict(schedule.deputy.grasp_frames),
     )
-    return FreeFloatingPlant(robot, parameters, initial, common.tick_ns)
+    stepper = None
+    if common.dynamics == COMPILED:
+        stepper = CompiledStepper(robot, TABLEAUS[parameters.integrator], ns_to_seconds(common.tick_ns))
+    return FreeFloatingPlant(robot, parameters, initial, common.tick_ns, stepper)
 
 
 def gains_by_phase(schedule: Schedule, parameters: ControllerParameters) -> tuple[Gains, ...]:
@@ -50,10 +56,16 @@ def gains_by_phase(schedule: Schedule, parameters: ControllerParameters) -> tupl
 def make_controller(
     robot: RobotModel, schedule: Schedule, common: CommonParameters, parameters: ControllerParameters
 ) -> JointController:
-    """Return the controller, its gains checked for stability at the start of the schedule."""
+    """Return the controller, its gains checked for stability at the start of the schedule.
+
+    Raises ConfigurationError.
+    """
     start = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
     longest_ns = longest_reference_ns(common, parameters)
-    return JointController(robot, gains_by_phase(schedule, parameters), common.tick_ns, start, longest_ns)
+    gains = gains_by_phase(schedule, parameters)
+    compiled = common.dynamics == COMPILED and isinstance(gains[0], NmpcGains)
+    inverse_dynamics = CompiledInverseDynamics(robot) if compiled else None
+    return JointController(robot, gains, common.tick_ns, start, longest_ns, inverse_dynamics)
 
 
 def longest_reference_ns(common: CommonParameters, parameters: ControllerParameters) -> int:

@@ -28,6 +28,7 @@ pytestmark = pytest.mark.ros
 SAMPLES = {
     "controller": "pid",
     "time_law": "quintic",
+    "dynamics": "compiled",
     "schedule": "my task.yaml",
     "robot": "robot.yaml",
     "duration": "5",

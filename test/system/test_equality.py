@@ -7,6 +7,8 @@ import pytest
 from sms_handover.analysis.equality import compare_runs
 from sms_handover.bag.reader import read_run
 from sms_handover.run_data import RunData
+from sms_handover.simulation.scenario import load_scenario
+from sms_handover.simulation.simulate import simulate
 from sms_handover.topics import CONTAINER, RECORDER
 from sms_handover.types import GraspStatus
 
@@ -62,6 +64,17 @@ def test_run_in_one_process(
     assert ended.code == 0, ended
     assert {path.stem for path in (tmp_path / "out" / "log").glob("*.log")} == {CONTAINER, RECORDER}
     assert_same_bits(read_run(tmp_path / "out" / "bag"), simulated[law])
+
+
+def test_compiled_dynamics(schedule: Path, simulated: dict[str, RunData], tmp_path: Path) -> None:
+    """They are the same in the graph and in one process, though not bit for bit Pinocchio's."""
+    ended = sms_handover("run", "--dynamics", "compiled", "--schedule", schedule, "-o", "out", cwd=tmp_path)
+    assert ended.code == 0, ended
+    run = read_run(tmp_path / "out" / "bag")
+    assert_same_bits(
+        run, simulate(load_scenario({"common": {"schedule": str(schedule), "dynamics": "compiled"}}))
+    )
+    assert run.joint_velocity.tobytes() != simulated["nmpc"].joint_velocity.tobytes()
 
 
 def test_the_laws_differ(simulated: dict[str, RunData]) -> None:

@@ -193,10 +193,39 @@ BREAKS: tuple[Break, ...] = (
     # plant
     _core(
         "joint damping of 0.04 N m s/rad",
-        "plant/free_floating",
-        "q, v, generalized, _IN_WORLD",
-        "q, v, generalized - 0.04 * np.r_[np.zeros(BASE_NV), v[BASE_NV:]], _IN_WORLD",
+        "plant/stepper",
+        "q, v, self._generalized, _IN_WORLD",
+        "q, v, self._generalized - 0.04 * np.r_[np.zeros(BASE_NV), v[BASE_NV:]], _IN_WORLD",
         "plant",
+    ),
+    # compiled dynamics
+    _core(
+        "compiled: the momentum of a body left out of its moment",
+        "compiled/rigid_bodies",
+        "moment += ca.cross(angular, spin) + ca.cross(linear, momentum)",
+        "moment += ca.cross(angular, spin)",
+        "compiled_dynamics",
+    ),
+    _core(
+        "compiled: rotors left out of the mass matrix",
+        "compiled/rigid_bodies",
+        "matrix[joint][joint] += self._bodies[index].rotor",
+        "matrix[joint][joint] += 0.0",
+        "compiled_dynamics",
+    ),
+    _core(
+        "compiled: weights of a scheme taken from its first motion alone",
+        "compiled/step",
+        "total = [sum(weights) for weights in zip(*tableau.b, strict=True)]",
+        "total = list(tableau.b[0])",
+        "compiled_dynamics",
+    ),
+    _core(
+        "compiled: a library is not held against Pinocchio",
+        "compiled/dynamics",
+        "if not apart <= _TOLERANCE:",
+        "if not apart <= 1e9:",
+        "compiled_dynamics",
     ),
     _core(
         "effort limits inverted",
@@ -342,8 +371,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "NMPC efforts not limited",
         "control/nmpc",
-        "return self._robot.limited(reduced_inverse_dynamics(self._robot, q, v, wanted))",
-        "return reduced_inverse_dynamics(self._robot, q, v, wanted)",
+        "return self._robot.limited(self._inverse_dynamics(q, v, wanted))",
+        "return self._inverse_dynamics(q, v, wanted)",
         "nmpc",
     ),
     _core(

@@ -5,16 +5,14 @@ the map of Euler rates to body twists, whose condition number enters squared.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from sms_handover.model.assembly import ArmDescription, RobotDescription
 from sms_handover.model.conserved import physics_receipt
 from sms_handover.model.description import load_robot
-from sms_handover.model.parts import Inertia, JointDescription, Origin
 from sms_handover.model.reduced import (
     generalized_jacobian,
     reduced_dynamics,
@@ -23,6 +21,7 @@ from sms_handover.model.reduced import (
 )
 from sms_handover.model.robot_model import BASE_NV, RobotModel
 from sms_handover.types import Array
+from test.core.robots import someone_else
 from test.verification.conftest import Record
 from test.verification.lagrangian import Lagrangian, pinocchio_configuration
 
@@ -33,48 +32,6 @@ _EULER = (1.0 + np.sin(_PITCH)) / (1.0 - np.sin(_PITCH))  # cond(E)^2 at that pi
 _ROUNDING = 10 * 12 * _EPS * _EULER  # [-] ten frames of a dozen operations: 3e-13
 _ASKED = 1e-10  # [-] where rounding alone, times cond(H), would allow more than we want to see
 _AGAINST = "Lagrangian in Euler angles, CasADi"
-
-
-def _someone_else(description: RobotDescription, seed: int) -> RobotDescription:
-    """Return a robot of the same build with every number changed, so that no coincidence passes.
-
-    Its bodies are heaps of random points (so their inertias are physical), its axes point anywhere,
-    its frames are turned about all axes, its motors have rotors.
-    """
-    random = np.random.default_rng(seed)
-
-    def numbers(size: int) -> tuple[float, ...]:
-        return tuple(random.uniform(-1.0, 1.0, size).tolist())
-
-    def inertia(old: Inertia) -> Inertia:
-        points = random.normal(size=(10, 3)) * 0.2
-        points -= points.mean(axis=0)
-        mass = old.mass * float(random.uniform(0.5, 2.0))
-        spread = mass / 10.0 * points.T @ points
-        full = np.trace(spread) * np.eye(3) - spread
-        moments = (full[0, 0], full[0, 1], full[0, 2], full[1, 1], full[1, 2], full[2, 2])
-        return Inertia(old.body, mass, tuple(0.1 * x for x in numbers(3)), tuple(map(float, moments)))
-
-    def origin(old: Origin) -> Origin:
-        return Origin(tuple(x + 0.1 * y for x, y in zip(old.xyz, numbers(3), strict=True)), numbers(3))
-
-    def joint(old: JointDescription) -> JointDescription:
-        axis = random.normal(size=3)
-        axis /= np.linalg.norm(axis)
-        rotor = float(random.uniform(0.1, 0.4))
-        return replace(old, origin=origin(old.origin), axis=tuple(axis.tolist()), rotor_inertia=rotor)
-
-    def arm(old: ArmDescription) -> ArmDescription:
-        return replace(
-            old,
-            mount=origin(old.mount),
-            joints=tuple(joint(item) for item in old.joints),
-            links=tuple(replace(item, inertia=inertia(item.inertia)) for item in old.links),
-            flange=origin(old.flange),
-        )
-
-    base = replace(description.base, inertia=inertia(description.base.inertia))
-    return replace(description, base=base, arms=tuple(arm(item) for item in description.arms))
 
 
 @dataclass(frozen=True)
@@ -105,7 +62,7 @@ def pair(request: pytest.FixtureRequest) -> Pair:
     """Two robots: a suite that sees one only cannot tell a convention from a coincidence."""
     description = load_robot()
     if request.param != "the shipped robot":
-        description = _someone_else(description, seed=5)
+        description = someone_else(description, seed=5)
     return Pair(request.param, RobotModel(description), Lagrangian(description))
 
 

@@ -1,0 +1,38 @@
+"""Calling a C function as CasADi generates it, with arrays that belong to the caller."""
+
+import ctypes
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from sms_handover.types import Array
+
+_SIZES = 4  # that a generated function tells: arguments, results, integers and numbers of work space
+
+
+class CFunction:
+    """A function of a library, bound to its arguments and its results.
+
+    ``arguments`` and ``results`` are read and written where they lie whenever it is called; they and the
+    work space are kept alive with it. The interpreter is not let go meanwhile: a call takes microseconds.
+    """
+
+    def __init__(
+        self, library: Path, name: str, arguments: Sequence[Array], results: Sequence[Array]
+    ) -> None:
+        """Load the library; raises OSError or AttributeError if it has no such function."""
+        loaded = ctypes.PyDLL(str(library))
+        sizes = [ctypes.c_longlong() for _ in range(_SIZES)]
+        loaded[f"{name}_work"](*(ctypes.byref(size) for size in sizes))
+        n_arguments, n_results, _, n_work = (size.value for size in sizes)
+        work = np.zeros(max(1, n_work))
+        self._kept = (*arguments, *results, work)
+        self._call = loaded[name]
+        self._arguments = (ctypes.c_void_p * n_arguments)(*(array.ctypes.data for array in arguments))
+        self._results = (ctypes.c_void_p * n_results)(*(array.ctypes.data for array in results))
+        self._work = ctypes.c_void_p(work.ctypes.data)
+
+    def __call__(self) -> None:
+        """Work out the results of what the arguments hold now."""
+        self._call(self._arguments, self._results, None, self._work, 0)

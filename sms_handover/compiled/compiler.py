@@ -1,0 +1,101 @@
+"""Making libraries of C code, and keeping them for the next run."""
+
+import hashlib
+import os
+import platform
+import shlex
+import shutil
+import stat
+import subprocess
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from sms_handover.errors import ConfigurationError
+
+# No fused or reordered operations: what machines then differ in is what their sine and cosine round.
+_FLAGS = ("-O2", "-march=native", "-ffp-contract=off", "-fPIC", "-shared")
+_TIMEOUT_S = 600.0  # [s] a robot of 4 arms takes 10
+_TELLING = ("model name", "flags", "CPU part", "Features")  # of /proc/cpuinfo, on x86 and on ARM
+_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+
+
+def library_of(what: str, identity: bytes, source: Callable[[], str]) -> Path:
+    """Return the shared library of some C code, compiled here unless an earlier run has done it.
+
+    ``identity`` is all that the code depends on; it, the compiler and the processor decide whether a
+    library that lies there will do, so ``source`` is asked for only where one must be made. The libraries
+    are in ``sms_handover`` below ``$XDG_CACHE_HOME`` or ``~/.cache``, a folder of the user alone: whoever
+    could write to it could run what he likes. Raises ConfigurationError without a C compiler, or if it fails,
+    or on a folder that others can write to.
+    """
+    command = _compiler()
+    folder = _own_folder()
+    parts = (*command, *_FLAGS, _machine(command))
+    key = hashlib.sha256(b"\0".join([identity, *(part.encode() for part in parts)]))
+    library = folder / f"{what}-{key.hexdigest()[:32]}.so"
+    if not library.exists():
+        _compile(command, source(), library)
+    return library
+
+
+def _compiler() -> list[str]:
+    """Return the command of the C compiler: $CC, or cc."""
+    command = shlex.split(os.environ.get("CC", "")) or ["cc"]
+    if shutil.which(command[0]) is None:
+        raise ConfigurationError(
+            f"dynamics 'compiled' needs a C compiler, and there is no {command[0]!r}: "
+            "install one, set CC to it, or take dynamics 'pinocchio'"
+        )
+    return command
+
+
+def _machine(command: list[str]) -> str:
+    """Return what the compiler calls itself and which processor it compiles for."""
+    try:
+        version = _run([*command, "--version"]).stdout
+        cpu = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").partition("\n\n")[0]
+    except (OSError, subprocess.SubprocessError):
+        return platform.platform()
+    kept = (
+        line for line in cpu.splitlines() if line.startswith(("model name", "flags", "Features", "CPU part"))
+    )
+    return "\n".join((platform.platform(), version, *kept))
+
+
+def _own_folder() -> Path:
+    """Return the folder of the libraries, which nobody else can write to."""
+    cache = os.environ.get("XDG_CACHE_HOME", "")
+    folder = (Path(cache) if os.path.isabs(cache) else Path.home() / ".cache") / "sms_handover"
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = folder.stat()
+    except OSError as error:
+        raise ConfigurationError(f"cannot keep compiled dynamics in {folder}: {error.strerror}") from error
+    if found.st_uid != os.getuid() or found.st_mode & _OTHERS_WRITE:
+        raise ConfigurationError(
+            f"{folder} belongs to user {found.st_uid} and has mode {stat.filemode(found.st_mode)}: "
+            "what others can write to is not run; allowed is a folder of your own with mode 0700"
+        )
+    return folder
+
+
+def _compile(command: list[str], source: str, library: Path) -> None:
+    """Make a library and put it into its place at once, so that nobody meets half of one."""
+    with tempfile.TemporaryDirectory(dir=library.parent) as scratch:
+        code, made = Path(scratch) / "dynamics.c", Path(scratch) / "dynamics.so"
+        code.write_text(source, encoding="ascii")
+        call = [*command, *_FLAGS, str(code), "-o", str(made), "-lm"]
+        try:
+            done = _run(call)
+        except (OSError, subprocess.SubprocessError) as error:
+            raise ConfigurationError(f"{shlex.join(call)} failed: {error}") from error
+        if done.returncode:
+            reason = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[0]
+            raise ConfigurationError(f"{shlex.join(call)} failed: {reason}")
+        made.replace(library)
+
+
+def _run(command: list[str]) -> "subprocess.CompletedProcess[str]":
+    """Run a command to its end and return what it printed."""
+    return subprocess.run(command, check=False, capture_output=True, text=True, timeout=_TIMEOUT_S)

@@ -1,0 +1,135 @@
+"""What plant and controller take in place of Pinocchio's algorithms: the same values, compiled."""
+
+import hashlib
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from sms_handover.compiled.c_function import CFunction
+from sms_handover.compiled.compiler import library_of
+from sms_handover.compiled.tree import Body, body_tree
+from sms_handover.errors import ConfigurationError, MissingDependencyError
+from sms_handover.model.reduced import reduced_inverse_dynamics
+from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
+from sms_handover.plant.integrators import Tableau
+from sms_handover.plant.stepper import PinocchioStepper
+from sms_handover.types import Array, frozen
+
+_STEP, _JOINT_EFFORTS = "step", "joint_efforts"  # names of the C functions
+_TOLERANCE = 1e-9  # [-] of the largest value; rounding leaves 1e-14, another robot's library is far off
+_SEED = 0
+
+
+class CompiledStepper:
+    """Steps of ``h`` s of the free-floating robot, as :class:`~sms_handover.plant.stepper.PinocchioStepper`.
+
+    An instance owns work space, so it is not to be shared between threads.
+    """
+
+    def __init__(self, robot: RobotModel, tableau: Tableau, h: float) -> None:
+        """Compile the step unless that is done, and hold it against Pinocchio; raises ConfigurationError."""
+        bodies = body_tree(robot)
+        library = library_of(
+            _STEP, _identity(bodies, repr(tableau)), lambda: _writer().step_source(_STEP, bodies, tableau)
+        )
+        size = robot.n_joints
+        self._q, self._v, self._u = np.zeros(BASE_NQ + size), np.zeros(BASE_NV + size), np.zeros(size)
+        self._q_next, self._v_next = np.zeros_like(self._q), np.zeros_like(self._v)
+        arguments = (self._q, self._v, self._u, np.array([h]))
+        self._function = CFunction(library, _STEP, arguments, (self._q_next, self._v_next))
+        q, v, u = _example(robot)
+        theirs = PinocchioStepper(robot, tableau, h).step(q, v, u)
+        _require_equal(library, [*zip(self.step(q, v, u), theirs, strict=True)])
+
+    def step(self, q: Array, v: Array, effort: Array) -> tuple[Array, Array]:
+        """Return configuration (7 + n,) and velocity (6 + n,) after one step, as read-only arrays."""
+        self._q[:] = q
+        self._v[:] = v
+        self._u[:] = effort
+        self._function()
+        return frozen(self._q_next.copy()), frozen(self._v_next.copy())
+
+
+class CompiledInverseDynamics:
+    """Joint efforts for joint accelerations, as :func:`~sms_handover.model.reduced.reduced_inverse_dynamics`.
+
+    An instance owns work space, so it is not to be shared between threads.
+    """
+
+    def __init__(self, robot: RobotModel) -> None:
+        """Compile it unless that is done, and hold it against Pinocchio; raises ConfigurationError."""
+        bodies = body_tree(robot)
+        library = library_of(
+            _JOINT_EFFORTS,
+            _identity(bodies, ""),
+            lambda: _writer().joint_efforts_source(_JOINT_EFFORTS, bodies),
+        )
+        size = robot.n_joints
+        self._angles, self._v, self._wanted = np.zeros(size), np.zeros(BASE_NV + size), np.zeros(size)
+        self._efforts = np.zeros(size)
+        arguments = (self._angles, self._v, self._wanted)
+        self._function = CFunction(library, _JOINT_EFFORTS, arguments, (self._efforts,))
+        example = _example(robot)
+        _require_equal(library, [(self(*example), reduced_inverse_dynamics(robot, *example))])
+
+    def __call__(self, q: Array, v: Array, joint_acceleration: Array) -> Array:
+        """Return the joint efforts (n,) N m at q (7 + n,), v (6 + n,) for accelerations (n,) rad/s^2."""
+        self._angles[:] = q[BASE_NQ:]
+        self._v[:] = v
+        self._wanted[:] = joint_acceleration
+        self._function()
+        efforts: Array = self._efforts.copy()
+        return efforts
+
+
+def _identity(bodies: tuple[Body, ...], scheme: str) -> bytes:
+    """Return a digest of all that the C code depends on: the robot, the scheme, and who writes it."""
+    digest = hashlib.sha256(f"{scheme} casadi {_casadi_version()}".encode())
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(source.read_bytes())
+    for body in bodies:
+        for numbers in (body.rotation, body.place, body.axis, body.first_moment, body.inertia):
+            digest.update(np.ascontiguousarray(numbers).tobytes())
+        digest.update(np.array([body.parent, body.mass, body.rotor]).tobytes())
+    return digest.digest()
+
+
+def _writer() -> Any:
+    """Return the module that writes C code: CasADi is asked for where there is something to write."""
+    try:
+        return import_module("sms_handover.compiled.source")
+    except ModuleNotFoundError as error:
+        if error.name != "casadi":
+            raise
+        raise MissingDependencyError("compiled dynamics", "casadi", "compiled") from error
+
+
+def _casadi_version() -> str:
+    """Return the version of CasADi, or nothing: a library that lies there does without."""
+    try:
+        return version("casadi")
+    except PackageNotFoundError:
+        return ""
+
+
+def _example(robot: RobotModel) -> tuple[Array, Array, Array]:
+    """Return some q, v and one value per joint, the same each time."""
+    random = np.random.default_rng(_SEED)
+    base = pin.SE3ToXYZQUAT(pin.SE3(pin.exp3(random.normal(size=3)), random.normal(size=3)))
+    q = np.concatenate([base, random.uniform(-1.0, 1.0, robot.n_joints)])
+    return q, random.uniform(-0.1, 0.1, robot.pin.nv), random.uniform(-1.0, 1.0, robot.n_joints)
+
+
+def _require_equal(library: Path, pairs: list[tuple[Array, Array]]) -> None:
+    """Raise ConfigurationError unless a library gives what Pinocchio gives."""
+    for ours, theirs in pairs:
+        apart = float(np.abs(ours - theirs).max() / np.abs(theirs).max())
+        if not apart <= _TOLERANCE:
+            raise ConfigurationError(
+                f"compiled dynamics in {library} are off Pinocchio's by {apart:.1e} of the largest value, "
+                f"allowed is {_TOLERANCE:g}: remove the file, or take dynamics 'pinocchio'"
+            )

@@ -1,0 +1,90 @@
+"""One step of the plant as a CasADi function: the schemes of ``plant.integrators``, written out."""
+
+from typing import Any
+
+import casadi as ca
+
+from sms_handover.model.robot_model import BASE_NQ, BASE_NV
+from sms_handover.plant.integrators import Tableau
+
+_SMALL = 1e-3  # [rad^2] below, four terms of a series leave less than rounding
+
+
+def step_function(name: str, acceleration: Any, tableau: Tableau, joints: int) -> Any:
+    """Return (q, v, u, h) -> (q, v) after a step of ``h`` s; ``acceleration`` maps angles, v and u to v'.
+
+    The sums are those of :class:`~sms_handover.plant.integrators.LieGroupIntegrator`. As the acceleration
+    does not depend on where the base is, the base moves at the end of the step only.
+    """
+    q, v = ca.MX.sym("q", BASE_NQ + joints), ca.MX.sym("v", BASE_NV + joints)
+    u, h = ca.MX.sym("u", joints), ca.MX.sym("h")
+    velocities: list[Any] = []
+    accelerations: list[Any] = []
+    for row in tableau.a:
+        at = q[BASE_NQ:] + h * _sum(row, [velocity[BASE_NV:] for velocity in velocities])
+        velocity = v + h * _sum(row, accelerations)
+        accelerations.append(acceleration(at, velocity, u))
+        velocities.append(velocity)
+    pose, angles = q[:BASE_NQ], q[BASE_NQ:]
+    move = _move()
+    for row in tableau.b:
+        motion = h * _sum(row, velocities)
+        pose, angles = move(pose, motion[:BASE_NV]), angles + motion[BASE_NV:]
+    total = [sum(weights) for weights in zip(*tableau.b, strict=True)]
+    return ca.Function("step", [q, v, u, h], [ca.vertcat(pose, angles), v + h * _sum(total, accelerations)])
+
+
+def _sum(weights: Any, values: list[Any]) -> Any:
+    """Return the weighted sum, leaving out what has no weight."""
+    total = 0.0
+    for weight, value in zip(weights, values, strict=False):
+        if weight:
+            total = total + weight * value
+    return total
+
+
+def _move() -> Any:
+    """Return (pose, motion) -> pose (+) motion, the exponential map of SE(3).
+
+    A pose is (7,) position and quaternion x y z w, a motion (6,) is in axes of the pose. The new
+    quaternion is brought back to unit length to first order, as Pinocchio does.
+    """
+    pose, motion = ca.SX.sym("pose", BASE_NQ), ca.SX.sym("motion", BASE_NV)
+    position, vector, scalar = pose[:3], pose[3:6], pose[6]
+    linear, angular = motion[:3], motion[3:]
+    square = ca.dot(angular, angular)
+    half, first, second = _coefficients(square)
+    turned = ca.cross(angular, linear)
+    shift = linear + first * turned + second * ca.cross(angular, turned)
+    across = ca.cross(vector, shift)
+    moved = position + shift + 2.0 * (scalar * across + ca.cross(vector, across))
+    turn, along = half * angular, ca.cos(0.5 * ca.sqrt(square))
+    imaginary = scalar * turn + along * vector + ca.cross(vector, turn)
+    quaternion = ca.vertcat(imaginary, scalar * along - ca.dot(vector, turn))
+    quaternion *= 0.5 * (3.0 - ca.dot(quaternion, quaternion))
+    return ca.Function("move", [pose, motion], [ca.vertcat(moved, quaternion)])
+
+
+def _coefficients(square: Any) -> tuple[Any, Any, Any]:
+    """Return sin(a/2)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 for a^2."""
+    small = square < _SMALL
+    safe = ca.if_else(small, 1.0, square)
+    angle = ca.sqrt(safe)
+    sine = ca.sin(0.5 * angle) / angle
+    return (
+        ca.if_else(small, _series(square, (1 / 2, -1 / 48, 1 / 3840, -1 / 645120, 1 / 185794560)), sine),
+        ca.if_else(small, _series(square, (1 / 2, -1 / 24, 1 / 720, -1 / 40320, 1 / 3628800)), 2.0 * sine**2),
+        ca.if_else(
+            small,
+            _series(square, (1 / 6, -1 / 120, 1 / 5040, -1 / 362880, 1 / 39916800)),
+            (angle - ca.sin(angle)) / (angle * safe),
+        ),
+    )
+
+
+def _series(x: Any, coefficients: tuple[float, ...]) -> Any:
+    """Return c_0 + c_1 x + c_2 x^2 ... by Horner's rule."""
+    value = 0.0
+    for coefficient in reversed(coefficients):
+        value = coefficient + x * value
+    return value

@@ -1,0 +1,74 @@
+"""The numbers of a robot that its equations of motion need, read from its Pinocchio model."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from sms_handover.model.robot_model import BASE_NV, RobotModel
+from sms_handover.types import Array, read_only
+
+_ROUNDING = 1e-14  # [-, m, kg m, kg m^2] an entry that is nearer than this to -1, 0 or 1 was meant to be it
+_BASE = 1  # index of the base among Pinocchio's joints; that of the universe is 0
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A body, and the joint that carries it; all in the frame of this joint, which moves with the body.
+
+    ``parent`` is the index of the body that carries the joint, -1 for the base. ``rotation`` (3, 3) and
+    ``place`` (3,) m are those of the joint's frame at angle zero in the frame of the parent, ``axis`` (3,)
+    is that of the joint. ``first_moment`` (3,) kg m is the mass times the centre of mass, ``inertia``
+    (3, 3) kg m^2 is about the origin of the frame; ``rotor`` kg m^2 is the reflected inertia of the motor.
+    """
+
+    parent: int
+    rotation: Array
+    place: Array
+    axis: Array
+    mass: float
+    first_moment: Array
+    inertia: Array
+    rotor: float
+
+
+def body_tree(robot: RobotModel) -> tuple[Body, ...]:
+    """Return the bodies, base first, then one for each joint in the order of ``robot.joint_names``."""
+    model = robot.pin
+    return tuple(_body(model, index) for index in range(_BASE, model.njoints))
+
+
+def _body(model: pin.Model, index: int) -> Body:
+    """Return one body of a Pinocchio model."""
+    placement, inertia = model.jointPlacements[index], model.inertias[index]
+    lever = np.array(inertia.lever)
+    about_origin = inertia.inertia + inertia.mass * (lever @ lever * np.eye(3) - np.outer(lever, lever))
+    is_base = index == _BASE
+    return Body(
+        parent=-1 if is_base else model.parents[index] - _BASE,
+        rotation=_tidy(placement.rotation),
+        place=_tidy(placement.translation),
+        axis=read_only(np.zeros(3)) if is_base else _axis(model, index),
+        mass=float(inertia.mass),
+        first_moment=_tidy(inertia.mass * lever),
+        inertia=_tidy(about_origin),
+        rotor=0.0 if is_base else float(model.armature[BASE_NV - 1 + index - _BASE]),
+    )
+
+
+def _axis(model: pin.Model, index: int) -> Array:
+    """Return the axis (3,) of a revolute joint in its own frame."""
+    joint = model.joints[index]
+    data = joint.createData()
+    joint.calc(data, pin.neutral(model))
+    return _tidy(np.array(data.S).reshape(-1)[3:])
+
+
+def _tidy(values: Array) -> Array:
+    """Return an array in which entries that rounding keeps off -1, 0 and 1 are put there.
+
+    A turn by pi/2 has cosines of 6e-17; as zeros they take whole terms out of the equations.
+    """
+    array = np.array(values, dtype=np.float64)
+    nearest = np.clip(np.round(array), -1.0, 1.0)
+    return read_only(np.where(np.abs(array - nearest) < _ROUNDING, nearest + 0.0, array))

@@ -1,0 +1,226 @@
+"""Compiled dynamics: the values of Pinocchio to rounding, a library made once, and what can be missing."""
+
+import stat
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sms_handover.compiled import dynamics
+from sms_handover.compiled.compiler import library_of
+from sms_handover.compiled.dynamics import CompiledInverseDynamics, CompiledStepper
+from sms_handover.errors import ConfigurationError, MissingDependencyError, UnknownNameError
+from sms_handover.model.conserved import physics_receipt
+from sms_handover.model.description import load_robot
+from sms_handover.model.reduced import reduced_dynamics, reduced_inverse_dynamics
+from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
+from sms_handover.plant.integrators import TABLEAUS
+from sms_handover.plant.stepper import PinocchioStepper
+from sms_handover.simulation.scenario import load_scenario
+from sms_handover.simulation.simulate import simulate
+from sms_handover.types import Array
+
+from .conftest import Draw
+from .robots import someone_else
+
+_TICK = 1e-3  # [s]
+_ROUNDING = 1e-12  # [-] of the largest value: ten frames of a dozen operations, and the condition of H
+
+
+@pytest.fixture(autouse=True, scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A folder of this module for the libraries, so that each is made here once."""
+    folder = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(folder))
+        yield folder / "sms_handover"
+
+
+def _one_armed() -> RobotModel:
+    description = load_robot()
+    return RobotModel(replace(description, arms=description.arms[:1]))
+
+
+ROBOTS: dict[str, Callable[[], RobotModel]] = {
+    "shipped": RobotModel.load,
+    "every number changed": lambda: RobotModel(someone_else(load_robot(), seed=6)),
+    "one arm": _one_armed,
+}
+
+
+@pytest.fixture(scope="module", params=ROBOTS)
+def any_robot(request: pytest.FixtureRequest) -> RobotModel:
+    return ROBOTS[request.param]()
+
+
+def _off(found: Array, expected: Array) -> float:
+    return float(np.abs(found - expected).max() / np.abs(expected).max())
+
+
+@pytest.mark.parametrize("scheme", TABLEAUS)
+def test_a_step_is_that_of_pinocchio(any_robot: RobotModel, scheme: str) -> None:
+    draw = Draw(any_robot, seed=3)
+    compiled = CompiledStepper(any_robot, TABLEAUS[scheme], _TICK)
+    ours = PinocchioStepper(any_robot, TABLEAUS[scheme], _TICK)
+    for _ in range(20):
+        q, v = draw.q(), draw.v()
+        effort = draw.effort(q)
+        q_next, v_next = compiled.step(q, v, effort)
+        q_expected, v_expected = ours.step(q, v, effort)
+        assert _off(q_next, q_expected) < _ROUNDING
+        assert _off(v_next - v, v_expected - v) < _ROUNDING / _TICK
+
+
+@pytest.mark.parametrize("turn", [0.0, 1e-9, 0.0316, 0.0317, 0.5, 3.0])
+def test_a_base_that_turns_far_in_a_step_moves_on_its_screw(robot: RobotModel, turn: float) -> None:
+    """On both sides of where the series of the exponential map gives way to its closed form."""
+    compiled = CompiledStepper(robot, TABLEAUS["midpoint"], _TICK)
+    ours = PinocchioStepper(robot, TABLEAUS["midpoint"], _TICK)
+    draw = Draw(robot, seed=4)
+    q, v = draw.q(), np.zeros(robot.pin.nv)
+    v[:3], v[3:BASE_NV] = draw.vector(3), turn / _TICK * np.array([0.6, -0.48, 0.64])
+    effort = np.zeros(robot.n_joints)
+    assert np.abs(compiled.step(q, v, effort)[0] - ours.step(q, v, effort)[0])[:BASE_NQ].max() < 1e-12
+
+
+def test_joint_efforts_are_those_of_the_free_base(any_robot: RobotModel) -> None:
+    """Against Pinocchio by two ways: eliminating the base from the forces, and from the matrix."""
+    draw, compiled = Draw(any_robot, seed=5), CompiledInverseDynamics(any_robot)
+    for _ in range(20):
+        q, v, wanted = draw.q(), draw.v(), draw.vector(any_robot.n_joints)
+        found, reduced = compiled(q, v, wanted), reduced_dynamics(any_robot, q, v)
+        assert _off(found, reduced_inverse_dynamics(any_robot, q, v, wanted)) < _ROUNDING
+        assert _off(found, reduced.inertia @ wanted + reduced.bias) < _ROUNDING
+
+
+def test_joint_efforts_bring_about_what_was_asked_for(robot: RobotModel) -> None:
+    """The two libraries undo each other: rates grow by the accelerations asked for."""
+    draw, h = Draw(robot, seed=6), 1e-7  # s
+    efforts, stepper = CompiledInverseDynamics(robot), CompiledStepper(robot, TABLEAUS["rk4"], h)
+    for _ in range(5):
+        q, v, wanted = draw.q(), draw.v(), draw.vector(robot.n_joints)
+        _, v_next = stepper.step(q, v, efforts(q, v, wanted))
+        assert (v_next - v)[BASE_NV:] / h == pytest.approx(wanted, abs=1e-4)
+
+
+def test_the_results_of_a_call_are_its_own(robot: RobotModel, draw: Draw) -> None:
+    """What one tick gave does not change with the next, and cannot be changed."""
+    stepper, inverse = CompiledStepper(robot, TABLEAUS["rk4"], _TICK), CompiledInverseDynamics(robot)
+    q, v, effort = draw.q(), draw.v(), np.zeros(robot.n_joints)
+    first, efforts = stepper.step(q, v, effort), inverse(q, v, effort)
+    kept = [array.copy() for array in (*first, efforts)]
+    stepper.step(*first, effort)
+    inverse(*first, effort)
+    assert all(np.array_equal(a, b) for a, b in zip((*first, efforts), kept, strict=True))
+    assert not any(array.flags.writeable for array in first)
+
+
+def test_a_whole_run_differs_by_rounding_alone() -> None:
+    """The approach and the grasp, in closed loop: positions agree, and what is conserved stays so."""
+    runs = [
+        simulate(load_scenario({"common": {"dynamics": name, "duration": 2.0}}))
+        for name in ("pinocchio", "compiled")
+    ]
+    ours, compiled = runs
+    assert not np.array_equal(ours.joint_velocity, compiled.joint_velocity)
+    assert np.abs(ours.joint_position - compiled.joint_position).max() < 1e-13
+    assert np.abs(ours.base_pose - compiled.base_pose).max() < 1e-13
+    robot = RobotModel.load()
+    end = (
+        np.concatenate([compiled.base_pose[-1], compiled.joint_position[-1]]),
+        np.concatenate([compiled.base_twist[-1], compiled.joint_velocity[-1]]),
+    )
+    receipt = physics_receipt(robot, *end)
+    assert np.abs(receipt.linear_momentum).max() < 1e-12
+    assert np.abs(receipt.angular_momentum).max() < 1e-12
+
+
+def test_pid_is_compiled_too() -> None:
+    found, theirs = (
+        simulate(load_scenario({"common": {"dynamics": name, "duration": 0.1}, "controller": {"law": "pid"}}))
+        for name in ("compiled", "pinocchio")
+    )
+    assert np.abs(found.joint_position - theirs.joint_position).max() < 1e-13
+
+
+def test_a_library_is_made_once(robot: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another run finds it and asks neither CasADi nor the compiler to make one."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    CompiledInverseDynamics(robot)
+    (library,) = (tmp_path / "sms_handover").iterdir()
+    made = library.stat()
+    assert stat.S_IMODE(library.parent.stat().st_mode) == 0o700
+
+    def refuse() -> None:
+        raise AssertionError("asked for again")
+
+    monkeypatch.setattr(dynamics, "_writer", refuse)
+    CompiledInverseDynamics(robot)
+    assert (library.stat().st_ino, library.stat().st_mtime_ns) == (made.st_ino, made.st_mtime_ns)
+    with pytest.raises(AssertionError, match="asked for again"):
+        CompiledInverseDynamics(_one_armed())
+
+
+def test_a_library_of_another_robot_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever lies under a name, what it says is held against Pinocchio before anything moves."""
+    wrong = RobotModel(someone_else(load_robot(), seed=7))
+    libraries: list[Path] = []
+    made = library_of
+
+    def remember(*arguments: Any) -> Path:
+        libraries.append(made(*arguments))
+        return libraries[0]
+
+    monkeypatch.setattr(dynamics, "library_of", remember)
+    CompiledInverseDynamics(wrong)
+    with pytest.raises(ConfigurationError, match=r"joint_efforts-\w+\.so are off Pinocchio's by .*: remove"):
+        CompiledInverseDynamics(RobotModel.load())
+
+
+def test_without_a_compiler(robot: RobotModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", "no-such-compiler -m64")
+    with pytest.raises(ConfigurationError, match="'no-such-compiler': install one, set CC to it, or take"):
+        CompiledInverseDynamics(robot)
+
+
+def test_a_compiler_that_fails(robot: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    compiler = tmp_path / "cc"
+    compiler.write_text("#!/bin/sh\necho 'no room left' >&2\nexit 3\n", encoding="ascii")
+    compiler.chmod(0o700)
+    monkeypatch.setenv("CC", str(compiler))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with pytest.raises(ConfigurationError, match=r"cc -O2 .* failed: no room left"):
+        CompiledInverseDynamics(robot)
+    assert [*(tmp_path / "sms_handover").iterdir()] == []
+
+
+def test_without_casadi(robot: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    for part in ("source", "step", "rigid_bodies"):
+        monkeypatch.delitem(sys.modules, f"sms_handover.compiled.{part}", raising=False)
+    monkeypatch.setitem(sys.modules, "casadi", None)
+    with pytest.raises(
+        MissingDependencyError, match=r"compiled dynamics need casadi.*sms_handover\[compiled\]"
+    ):
+        CompiledInverseDynamics(robot)
+
+
+def test_a_folder_that_others_can_write_to_is_not_used(
+    robot: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A library from there would be the code of whoever put it there."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    folder = tmp_path / "sms_handover"
+    folder.mkdir()
+    folder.chmod(0o777)
+    with pytest.raises(ConfigurationError, match=r"has mode drwxrwxrwx: .* allowed is a folder of your own"):
+        CompiledInverseDynamics(robot)
+
+
+def test_another_kind_of_dynamics_is_unknown() -> None:
+    with pytest.raises(UnknownNameError, match="did you mean 'compiled'"):
+        load_scenario({"common": {"dynamics": "compield"}})
