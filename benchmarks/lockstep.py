@@ -11,6 +11,8 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 
 from benchmarks.results import Result, Table, publish, row
+from sms_handover.simulation.parameters import COMPILED as COMPILED_DYNAMICS
+from sms_handover.simulation.parameters import PINOCCHIO
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
 
@@ -19,16 +21,20 @@ SIMULATED_S = 4.0  # s of simulated time per run
 TICKS = round(SIMULATED_S * 1e3)
 TRIPS = 5000
 _CPU = max(os.sched_getaffinity(0))
+_COMPILED = ("--dynamics", "compiled")
 _EXECUTOR = ("-p", "common.transport:=executor")
 _FACTOR = re.compile(r"([\d.]+) x real time")
 
 FLOOR = "bare exchange of the same messages between two processes, no work"
 SOLO = "the same between two nodes of one process"
 ALONE = "one process, no DDS"
+ALONE_COMPILED = "one process, no DDS, compiled dynamics"
 GRAPH = "graph, not recorded"
 RECORDED = "graph, recorded"
 COMPOSED = "graph with --compose, not recorded"
 COMPOSED_RECORDED = "graph with --compose, recorded"
+COMPILED = "graph with --compose and compiled dynamics, not recorded"
+COMPILED_RECORDED = "graph with --compose and compiled dynamics, recorded"
 ONE_CPU = "graph on one processor, not recorded"
 FALLBACK = "graph by rclpy's executor, not recorded"
 COMPOSED_FALLBACK = "graph with --compose by rclpy's executor, not recorded"
@@ -40,9 +46,9 @@ def bare(role: str) -> float:
     return 1e-6 * float(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
-def alone() -> float:
+def alone(dynamics: str) -> float:
     """Return the time in s of a tick in one process."""
-    scenario = load_scenario({"common": {"duration": SIMULATED_S}})
+    scenario = load_scenario({"common": {"duration": SIMULATED_S, "dynamics": dynamics}})
     start = perf_counter()
     simulate(scenario)
     return (perf_counter() - start) / TICKS
@@ -62,11 +68,14 @@ def main() -> None:
         contestants: dict[str, Callable[[], float]] = {
             FLOOR: partial(bare, "ping"),
             SOLO: partial(bare, "solo"),
-            ALONE: alone,
+            ALONE: partial(alone, PINOCCHIO),
+            ALONE_COMPILED: partial(alone, COMPILED_DYNAMICS),
             GRAPH: partial(graph, folder, ["--no-record"]),
             RECORDED: partial(graph, folder, []),
             COMPOSED: partial(graph, folder, ["--compose", "--no-record"]),
             COMPOSED_RECORDED: partial(graph, folder, ["--compose"]),
+            COMPILED: partial(graph, folder, ["--compose", "--no-record", *_COMPILED]),
+            COMPILED_RECORDED: partial(graph, folder, ["--compose", *_COMPILED]),
             ONE_CPU: partial(graph, folder, ["--no-record", "-p", f"common.cpu:={_CPU}"]),
             FALLBACK: partial(graph, folder, ["--no-record", *_EXECUTOR]),
             COMPOSED_FALLBACK: partial(graph, folder, ["--compose", "--no-record", *_EXECUTOR]),
@@ -91,7 +100,8 @@ def main() -> None:
                 f"{ROUNDS} rounds in turn. The bare exchange is two processes that hand each other the two "
                 "messages of a state and the command, with the same bytes, quality of service and way of "
                 "taking them; its time depends on which processors the system puts the two on. With "
-                "--compose the four nodes of the loop are in one process and thread."
+                "--compose the four nodes of the loop are in one process and thread. One process without DDS "
+                "includes reading the scenario."
             ],
             tables=[Table(heading, rows)],
             values={"us_per_tick": {name: [1e6 * t for t in each] for name, each in times.items()}},

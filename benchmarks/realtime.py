@@ -22,9 +22,15 @@ _START_S = 3.0  # s that the graph takes to begin, in which the sleeper sleeps a
 _BUSY = "while True: pass"
 
 _FIRST = ("-p", "common.priority:=50")
+_AWAKE = ("-p", "plant.busy_wait:=0.001")
 CASES: dict[str, tuple[bool, tuple[str, ...]]] = {
     "as found, a process per node": (False, ()),
     "as found, --compose": (False, ("--compose",)),
+    "as found, --compose, never asleep": (False, ("--compose", *_AWAKE)),
+    "as found, --compose, never asleep, compiled dynamics": (
+        False,
+        ("--compose", *_AWAKE, "--dynamics", "compiled"),
+    ),
     "as found, --compose, priority 50": (False, ("--compose", *_FIRST)),
     "every processor busy, --compose": (True, ("--compose",)),
     "every processor busy, --compose, priority 50": (True, ("--compose", *_FIRST)),

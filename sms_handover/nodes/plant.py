@@ -142,10 +142,11 @@ class PlantNode(GraphNode[PlantParameters]):
         if left_s > 0.0:
             self.inputs.spin_once(executor, left_s)
             return
-        self.inputs.poll()
+        self.inputs.look(executor)
         if clock.due():
             self._give_last_turns()
             self._tick_now()
+            self.inputs.give_turn(executor)
 
     @property
     def awaited(self) -> str:

@@ -96,6 +96,15 @@ class DirectInputs(Inputs):
         else:
             self._slept = True
             awaited.wait(min(timeout_s, _SERVE_S))
+        self.give_turn(executor)
+
+    def look(self, executor: Executor) -> None:
+        """Handle what has come for the loop; the executor has its turns elsewhere."""
+        self.poll()
+
+    def give_turn(self, executor: Executor) -> None:
+        """Let the executor handle one thing if it has had no turn for long."""
+        now = monotonic()
         if now >= self._serve_at:
             self._serve_at = now + _SERVE_S
             executor.spin_once(timeout_sec=0.0)

@@ -90,6 +90,14 @@ class Inputs(ABC):
         The arrival of what is ``awaited`` ends the sleep, while that of others need not.
         """
 
+    @abstractmethod
+    def look(self, executor: Executor) -> None:
+        """Handle what has come for the loop, without a sleep: for a loop that keeps the processor."""
+
+    @abstractmethod
+    def give_turn(self, executor: Executor) -> None:
+        """Let the executor handle one thing if it has had no turn for long, while there is time for it."""
+
 
 class ExecutorInputs(Inputs):
     """Leaves everything to the executor that spins the node."""
@@ -144,6 +152,13 @@ class ExecutorInputs(Inputs):
     def spin_once(self, executor: Executor, timeout_s: float) -> None:
         """Let the executor handle what comes."""
         executor.spin_once(timeout_sec=timeout_s)
+
+    def look(self, executor: Executor) -> None:
+        """Let the executor handle what has come."""
+        executor.spin_once(timeout_sec=0.0)
+
+    def give_turn(self, executor: Executor) -> None:
+        """Do nothing: whatever comes is handled by the executor."""
 
 
 class _ExecutorAsker(Asker):

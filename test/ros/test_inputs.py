@@ -31,19 +31,19 @@ class Loop:
         self.bench = bench
         self.node = bench.loose("listener")
         self.inputs = make(self.node)
-        self._executor = EventsExecutor()
+        self.executor = EventsExecutor()
         self._added = False
 
     def until(self, condition: Callable[[], object], awaited: str = "") -> None:
         """Spin until a condition holds."""
         if not self._added:
-            self._executor.add_node(self.node)
+            self.executor.add_node(self.node)
             self._added = True
         self.inputs.awaited = lambda: awaited
         deadline = monotonic() + DEADLINE_S
         while not condition():
             assert monotonic() < deadline
-            self.inputs.spin_once(self._executor, 0.05)
+            self.inputs.spin_once(self.executor, 0.05)
 
 
 @pytest.fixture(params=[DirectInputs, ExecutorInputs])
@@ -156,6 +156,25 @@ def test_the_executor_gets_its_turn_while_the_loop_runs(bench: Bench) -> None:
     fired.clear()
     loop.until(lambda: len(fired) >= 3, "topic")
     assert len(taken) > 3
+
+
+@pytest.mark.parametrize("make", [DirectInputs, ExecutorInputs])
+def test_a_loop_that_keeps_the_processor_misses_nothing(bench: Bench, make: Callable[[Node], Inputs]) -> None:
+    """It never sleeps, as in real time before a deadline: messages come, and a timer fires."""
+    loop = Loop(bench, make)
+    publisher = bench.loose("speaker").create_publisher(String, "topic", LOSSLESS)
+    taken: list[bytes] = []
+    fired: list[int] = []
+    subscription = loop.inputs.subscribe(String, "topic", LOSSLESS, lambda *message: taken.append(message[0]))
+    loop.until(lambda: publisher.get_subscription_count() == 1 == subscription.get_publisher_count())
+    loop.node.create_timer(0.01, lambda: fired.append(len(taken)))
+    for number in range(COUNT):
+        publisher.publish(String(data=str(number)))
+    deadline = monotonic() + DEADLINE_S
+    while len(taken) < COUNT or len(fired) < 3:
+        assert monotonic() < deadline
+        loop.inputs.look(loop.executor)
+        loop.inputs.give_turn(loop.executor)
 
 
 def test_what_is_given_back_is_gone(bench: Bench) -> None:
