@@ -1,6 +1,7 @@
 """Making libraries of C code, and keeping them for the next run."""
 
 import hashlib
+import logging
 import os
 import platform
 import shlex
@@ -13,6 +14,7 @@ from pathlib import Path
 
 from sms_handover.errors import ConfigurationError
 
+_LOG = logging.getLogger(__name__)
 # No fused or reordered operations: what machines then differ in is what their sine and cosine round.
 _FLAGS = ("-O2", "-march=native", "-ffp-contract=off", "-fPIC", "-shared")
 _TIMEOUT_S = 600.0  # [s] a robot of 4 arms takes 10
@@ -35,6 +37,7 @@ def library_of(what: str, identity: bytes, source: Callable[[], str]) -> Path:
     key = hashlib.sha256(b"\0".join([identity, *(part.encode() for part in parts)]))
     library = folder / f"{what}-{key.hexdigest()[:32]}.so"
     if not library.exists():
+        _LOG.warning("compiling the %s of this robot: some seconds, once", what.replace("_", " "))
         _compile(command, source(), library)
     return library
 

@@ -66,10 +66,9 @@ class NmpcLaw(ControlLaw[NmpcGains]):
 
     def effort(self, q: Array, v: Array, desired: Array, dt: float) -> Array:
         """Return the joint efforts (n,) N m, limited to what the joints can give; ``dt`` plays no part."""
-        position, velocity, acceleration = desired
-        np.subtract(q[BASE_NQ:], position, out=self._error)
-        np.subtract(v[BASE_NV:], velocity, out=self._error_rate)
-        wanted = acceleration - self._feedback.dot(self._errors)  # q_d'' - A_1 e - A_2 e'
+        np.subtract(q[BASE_NQ:], desired[0], out=self._error)
+        np.subtract(v[BASE_NV:], desired[1], out=self._error_rate)
+        wanted = desired[2] - self._feedback.dot(self._errors)  # q_d'' - A_1 e - A_2 e'
         return self._robot.limited(self._inverse_dynamics(q, v, wanted))
 
     def linearised(self, inertia: Array) -> LinearFeedback:

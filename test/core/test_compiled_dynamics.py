@@ -147,10 +147,15 @@ def test_pid_is_compiled_too() -> None:
     assert np.abs(found.joint_position - theirs.joint_position).max() < 1e-13
 
 
-def test_a_library_is_made_once(robot: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another run finds it and asks neither CasADi nor the compiler to make one."""
+def test_a_library_is_made_once(
+    robot: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """That takes long enough to be told. Another run finds it and makes none."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     CompiledInverseDynamics(robot)
+    assert [record.message.split(":")[0] for record in caplog.records] == [
+        "compiling the joint efforts of this robot"
+    ]
     (library,) = (tmp_path / "sms_handover").iterdir()
     made = library.stat()
     assert stat.S_IMODE(library.parent.stat().st_mode) == 0o700
@@ -160,6 +165,7 @@ def test_a_library_is_made_once(robot: RobotModel, tmp_path: Path, monkeypatch: 
 
     monkeypatch.setattr(dynamics, "_writer", refuse)
     CompiledInverseDynamics(robot)
+    assert len(caplog.records) == 1
     assert (library.stat().st_ino, library.stat().st_mtime_ns) == (made.st_ino, made.st_mtime_ns)
     with pytest.raises(AssertionError, match="asked for again"):
         CompiledInverseDynamics(_one_armed())

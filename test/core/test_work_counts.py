@@ -83,6 +83,7 @@ def _loop(overrides: Overrides | None = None) -> Loop:
         ({}, {"aba": 4, "integrate": 5, "crba": 1, "rnea": 1}),
         ({"plant": {"integrator": "midpoint"}}, {"aba": 2, "integrate": 2, "crba": 1, "rnea": 1}),
         ({"controller": {"law": "pid"}}, {"aba": 4, "integrate": 5}),
+        ({"common": {"dynamics": "compiled"}}, {}),
     ],
 )
 def test_a_tick_calls_pinocchio_as_often_as_its_equations_ask(
