@@ -9,11 +9,14 @@ import numpy as np
 
 from benchmarks.results import Result, Table, publish, row
 from benchmarks.timing import interleaved
+from sms_handover.compiled.dynamics import CompiledInverseDynamics, CompiledStepper
 from sms_handover.control.controller import JointController
 from sms_handover.control.nmpc import NmpcGains
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
+from sms_handover.plant.integrators import TABLEAUS
 from sms_handover.share import config_file
+from sms_handover.simulation.parameters import COMPILED, DYNAMICS
 from sms_handover.simulation.scenario import load_parameters, load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.types import JointReference, Pose
@@ -22,6 +25,7 @@ ROUNDS = 25
 TICKS = 50  # per round and robot
 MOUNTS = ((0.3, 0.0), (-0.3, 0.0), (0.0, 0.3), (0.0, -0.3))  # [m] y and z on the +x face
 BENT = (0.0, -0.5, 0.0, -1.7, 0.0, -0.6, 0.0)  # [rad]
+TICK_NS = 1_000_000  # [ns] while arms are added
 TICK_S = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)  # [s]
 SIMULATED_S = 1.0  # [s] per round and tick
 HOME = Pose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
@@ -46,12 +50,15 @@ def robot_with(arms: int, folder: Path) -> RobotModel:
     return RobotModel.load(path)
 
 
-def ticks_of(robot: RobotModel) -> Callable[[], None]:
+def ticks_of(robot: RobotModel, dynamics: str) -> Callable[[], None]:
     """Return what lets a robot under NMPC go through ticks of 1 ms towards a reference."""
-    joints = np.tile(BENT, len(robot.arms))
-    plant = FreeFloatingPlant(robot, load_parameters().plant, InitialState(HOME, joints, HOME, {}), 1_000_000)
+    joints, parameters = np.tile(BENT, len(robot.arms)), load_parameters().plant
+    compiled = dynamics == COMPILED
+    stepper = CompiledStepper(robot, TABLEAUS[parameters.integrator], 1e-9 * TICK_NS) if compiled else None
+    plant = FreeFloatingPlant(robot, parameters, InitialState(HOME, joints, HOME, {}), TICK_NS, stepper)
     start = robot.configuration(HOME, joints)
-    controller = JointController(robot, [NmpcGains(1.0, 0)], 1_000_000, start)
+    efforts = CompiledInverseDynamics(robot) if compiled else None
+    controller = JointController(robot, [NmpcGains(1.0, 0)], TICK_NS, start, inverse_dynamics=efforts)
     controller.track(JointReference(0, joints + 0.1, np.zeros_like(joints)))
 
     def run() -> None:
@@ -65,13 +72,20 @@ def arms_table() -> Table:
     """Return the cost of a tick for one to four arms."""
     with TemporaryDirectory() as folder:
         robots = {arms: robot_with(arms, Path(folder)) for arms in range(1, len(MOUNTS) + 1)}
-    times = interleaved({str(arms): ticks_of(robot) for arms, robot in robots.items()}, ROUNDS)
+    runs = {
+        f"{arms} {dynamics}": ticks_of(robot, dynamics)
+        for arms, robot in robots.items()
+        for dynamics in DYNAMICS
+    }
+    times = interleaved(runs, ROUNDS)
     rows = []
-    for arms, robot in robots.items():
-        joints, seconds = robot.n_joints, times.best(str(arms))
+    for name in runs:
+        arms, dynamics = name.split()
+        joints, seconds = robots[int(arms)].n_joints, times.best(name)
         per_tick = 1e6 * seconds / TICKS
-        rows.append(row(str(arms), str(joints), per_tick, per_tick / joints, seconds / times.best("2")))
-    heading = ("arms", "joints", "us per tick", "us per tick and joint", "time over two arms")
+        over_two = seconds / times.best(f"2 {dynamics}")
+        rows.append(row(arms, str(joints), dynamics, per_tick, per_tick / joints, over_two))
+    heading = ("arms", "joints", "dynamics", "us per tick", "us per tick and joint", "time over two arms")
     return Table(heading, rows, "Plant and NMPC, tick by tick, without inverse kinematics and record:")
 
 
