@@ -6,11 +6,13 @@ the map of Euler rates to body twists, whose condition number enters squared.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
+from sms_handover.compiled.dynamics import CompiledInverseDynamics, CompiledStepper
 from sms_handover.model.conserved import physics_receipt
 from sms_handover.model.description import load_robot
 from sms_handover.model.reduced import (
@@ -20,6 +22,7 @@ from sms_handover.model.reduced import (
     tool_jacobian,
 )
 from sms_handover.model.robot_model import BASE_NV, RobotModel
+from sms_handover.plant.integrators import Tableau
 from sms_handover.types import Array
 from test.core.robots import someone_else
 from test.verification.conftest import Record
@@ -31,6 +34,7 @@ _EPS = float(np.finfo(float).eps)
 _EULER = (1.0 + np.sin(_PITCH)) / (1.0 - np.sin(_PITCH))  # cond(E)^2 at that pitch
 _ROUNDING = 10 * 12 * _EPS * _EULER  # [-] ten frames of a dozen operations: 3e-13
 _ASKED = 1e-10  # [-] where rounding alone, times cond(H), would allow more than we want to see
+_EULER_SCHEME = Tableau(1, ((),), (0,), ((1.0,),))
 _AGAINST = "Lagrangian in Euler angles, CasADi"
 
 
@@ -169,6 +173,36 @@ def test_reduced_dynamics(pair: Pair, record: Record) -> None:
     record(f"c* of {pair.name}, relative, {_STATES} states", bias, bound, against=_AGAINST)
     claim = f"effort that {pair.name} needs for its free motion, relative to c*, {_STATES} states"
     record(claim, effort, bound, against=_AGAINST)
+
+
+def test_compiled_dynamics(
+    pair: Pair, record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The C code solves the same equations: v' from one step of Euler's scheme, and the efforts of NMPC."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    h = 1.0  # [s] v' is then what v grows by
+    stepper, efforts = CompiledStepper(pair.robot, _EULER_SCHEME, h), CompiledInverseDynamics(pair.robot)
+    random = np.random.default_rng(4)
+    worst_cond = 0.0
+
+    def errors(q: Array, q_pin: Array, v: Array) -> tuple[float, float]:
+        nonlocal worst_cond
+        motion = pair.lagrangian.motion(q, v)
+        weights = _balance(motion.inertia)
+        torque = random.uniform(-2.0, 2.0, pair.robot.n_joints)
+        right = np.concatenate([np.zeros(BASE_NV), torque]) - motion.bias
+        expected = np.asarray(np.linalg.solve(motion.inertia, right), dtype=np.float64)
+        found = (stepper.step(q_pin, v, torque)[1] - v) / h
+        effort = efforts(q_pin, v, expected[BASE_NV:])
+        worst_cond = max(worst_cond, _cond(motion.inertia))
+        return _relative(found / weights, expected / weights), _relative(effort, torque)
+
+    forward, inverse = np.max([errors(*state) for state in pair.states()], axis=0)
+    bound = min(_ASKED, 3.0 * _ROUNDING * worst_cond)
+    claim = f"compiled forward dynamics of {pair.name}, relative in the balanced norm, {_STATES} states"
+    record(claim, forward, bound, against=_AGAINST)
+    claim = f"compiled joint efforts of {pair.name}, relative, {_STATES} states"
+    record(claim, inverse, bound, against=_AGAINST)
 
 
 def test_tool_jacobians(pair: Pair, record: Record) -> None:
