@@ -357,15 +357,15 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "NMPC error q_d - q",
         "control/nmpc",
-        "np.subtract(q[BASE_NQ:], position, out",
-        "np.subtract(position, q[BASE_NQ:], out",
+        "np.subtract(q[BASE_NQ:], desired[0], out",
+        "np.subtract(desired[0], q[BASE_NQ:], out",
         "nmpc",
     ),
     _core(
         "desired acceleration left out",
         "control/nmpc",
-        "wanted = acceleration - self",
-        "wanted = 0.0 * acceleration - self",
+        "wanted = desired[2] - self",
+        "wanted = 0.0 * desired[2] - self",
         "nmpc",
     ),
     _core(
