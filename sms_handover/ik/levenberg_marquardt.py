@@ -1,18 +1,46 @@
 """Levenberg-Marquardt inverse kinematics with the error-dependent damping of Sugihara."""
 
+from dataclasses import dataclass
+
 import eigenpy
 import numpy as np
 
 from sms_handover.ik.parameters import IkParameters
 from sms_handover.ik.residual import PoseResidual, Residual, manipulability
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.types import Array, IkRequest, IkResult, IkStatus
+from sms_handover.types import Array, IkRequest, IkResult, IkStatus, frozen
 
 _DAMPING_GROWTH = 2.5  # [-] factor on the damping after a step that does not lower the error
 _MAX_GROWTHS = 40  # [-] damping then exceeds any curvature, so the step is as good as zero
 
 
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Where the solver has ended and how: joint angles (n,) rad, read-only, with the residual there."""
+
+    joint_position: Array
+    residual: Residual
+    status: IkStatus
+    iterations: int
+
+
 def solve_ik(robot: RobotModel, request: IkRequest, parameters: IkParameters) -> IkResult:
+    """Return what :func:`find_joints` finds with the figures that tell how good the configuration is."""
+    found = find_joints(robot, request, parameters)
+    q = found.joint_position
+    return IkResult(
+        joint_position=q,
+        status=found.status,
+        iterations=found.iterations,
+        position_error=found.residual.position_error,
+        orientation_error=found.residual.orientation_error,
+        limit_margin=float(np.minimum(q - robot.lower, robot.upper - q).min()),
+        manipulability=manipulability(robot, q),
+        seed_distance=float(np.abs(q - request.seed).max()),
+    )
+
+
+def find_joints(robot: RobotModel, request: IkRequest, parameters: IkParameters) -> Solution:
     """Return the joint angles that bring the tools to their targets, or come nearest from the seed.
 
     Iterates q <- clamp(q - J^T (J J^T + W_n)^-1 e) with W_n = (E + bias) 1 and E = e^T e / 2
@@ -21,20 +49,18 @@ def solve_ik(robot: RobotModel, request: IkRequest, parameters: IkParameters) ->
     damping. Joints that the step would push through a limit are frozen at it for that iteration, so the
     others make up for it. Always returns: the status tells how it ended.
     """
-    seed = robot.within_limits(request.seed)
-    if not request.tool_in_world:
-        return _result(robot, request, seed, None, IkStatus.CONVERGED, 0)
     problem = PoseResidual(robot, request.base_in_world, request.tool_in_world)
-    q, residual = seed, problem.evaluate(seed)
+    q = frozen(robot.within_limits(request.seed))
+    residual = problem.evaluate(q)
     for iteration in range(parameters.max_iterations):
         if _converged(residual, parameters):
-            return _result(robot, request, q, residual, IkStatus.CONVERGED, iteration)
+            return Solution(q, residual, IkStatus.CONVERGED, iteration)
         q_next, residual_next = _descend(robot, problem, q, residual, parameters.damping_bias)
         if np.abs(q_next - q).max() <= parameters.stall_step:
-            return _result(robot, request, q, residual, IkStatus.STALLED, iteration)
+            return Solution(q, residual, IkStatus.STALLED, iteration)
         q, residual = q_next, residual_next
     status = IkStatus.CONVERGED if _converged(residual, parameters) else IkStatus.ITERATION_LIMIT
-    return _result(robot, request, q, residual, status, parameters.max_iterations)
+    return Solution(q, residual, status, parameters.max_iterations)
 
 
 def _converged(residual: Residual, parameters: IkParameters) -> bool:
@@ -64,24 +90,8 @@ def _descend(
         damping = residual.energy + bias * _DAMPING_GROWTH**growth
         np.add(undamped, damping, out=diagonal)
         step = eigenpy.LLT(damped).solve(residual.values).dot(jacobian)
-        candidate = robot.within_limits(q - step)
+        candidate = frozen(robot.within_limits(q - step))
         found = problem.evaluate(candidate)
         if found.energy < residual.energy:
             return candidate, found
     return q, residual
-
-
-def _result(
-    robot: RobotModel, request: IkRequest, q: Array, residual: Residual | None, status: IkStatus, count: int
-) -> IkResult:
-    """Return the result with the figures that tell how good the configuration is."""
-    return IkResult(
-        joint_position=q,
-        status=status,
-        iterations=count,
-        position_error=residual.position_error if residual else 0.0,
-        orientation_error=residual.orientation_error if residual else 0.0,
-        limit_margin=float(np.minimum(q - robot.lower, robot.upper - q).min()),
-        manipulability=manipulability(robot, request.base_in_world, q),
-        seed_distance=float(np.abs(q - request.seed).max()),
-    )

@@ -2,8 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
-from math import hypot
+from math import hypot, sqrt
 
 import numpy as np
 import pinocchio as pin
@@ -13,30 +12,21 @@ from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.types import Array, Pose
 
 _ROWS = 6  # residual rows per tool: position, orientation
+_BASE_AT_ORIGIN = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])  # position in m, quaternion x y z w
 
 
 @dataclass(frozen=True, eq=False)
 class Residual:
-    """Residual (6 k,) of k tools."""
+    """Residual (6 k,) of k tools with its norms.
+
+    ``position_error`` m and ``orientation_error`` rad are the largest over the tools; ``energy`` is half
+    the squared norm of all rows, metres and radians weighted alike.
+    """
 
     values: Array
-
-    @cached_property
-    def position_error(self) -> float:
-        """Largest distance in m of a tool to its target."""
-        x = self.values.tolist()
-        return max(hypot(*x[row : row + 3]) for row in range(0, len(x), _ROWS))
-
-    @cached_property
-    def orientation_error(self) -> float:
-        """Largest angle in rad of a tool to its target."""
-        x = self.values.tolist()
-        return max(hypot(*x[row + 3 : row + 6]) for row in range(0, len(x), _ROWS))
-
-    @cached_property
-    def energy(self) -> float:
-        """Half the squared norm of the residual, metres and radians weighted alike."""
-        return 0.5 * float(self.values.dot(self.values))
+    position_error: float
+    orientation_error: float
+    energy: float
 
 
 class PoseResidual:
@@ -63,12 +53,16 @@ class PoseResidual:
         self._q[BASE_NQ:] = joint_position
         pin.forwardKinematics(model, data, self._q)
         values = np.empty(_ROWS * len(self._targets))
+        position_error = orientation_error = 0.0
         for rows, frame_id, target, place in self._targets:
             tool = pin.updateFramePlacement(model, data, frame_id)
             part = values[rows]
             np.subtract(tool.translation, place, out=part[:3])
             part[3:] = pin.log3(target.actInv(tool).rotation)
-        return Residual(values)
+            x, y, z, *turn = part.tolist()
+            position_error = max(position_error, hypot(x, y, z))
+            orientation_error = max(orientation_error, hypot(*turn))
+        return Residual(values, position_error, orientation_error, 0.5 * float(values.dot(values)))
 
     def jacobian(self, joint_position: Array) -> Array:
         """Return the derivative (6 k, n) of the residual with respect to the joint angles."""
@@ -85,16 +79,16 @@ class PoseResidual:
         return jacobian
 
 
-def manipulability(robot: RobotModel, base_in_world: Pose, joint_position: Array) -> Array:
-    """Return sqrt(det(J J^T)) of every arm with the base locked [Yoshikawa1985], shape (arms,)."""
-    q = robot.configuration(base_in_world, joint_position)
-    pin.computeJointJacobians(robot.pin, robot.data, q)
+def manipulability(robot: RobotModel, joint_position: Array) -> Array:
+    """Return sqrt(det(J J^T)) of every arm with the base locked [Yoshikawa1985], shape (arms,).
+
+    J may have any axes and any point of reference, because twists go from one to another by a matrix of
+    determinant 1: it is the Jacobian that Pinocchio has, in the axes and at the origin of the base.
+    """
+    at_origin = np.concatenate([_BASE_AT_ORIGIN, joint_position])
+    jacobian = pin.computeJointJacobians(robot.pin, robot.data, at_origin)[:, BASE_NV:]
     squares = np.empty((len(robot.arms), _ROWS, _ROWS))
-    for square, arm in zip(squares, robot.arms, strict=True):
-        frame_id, local = robot.tool_frame_id[arm], pin.ReferenceFrame.LOCAL
-        part = robot.arm_joints[arm]
-        body = pin.getFrameJacobian(robot.pin, robot.data, frame_id, local)
-        own = body[:, BASE_NV + part.start : BASE_NV + part.stop]
+    for square, joints in zip(squares, robot.arm_joints.values(), strict=True):
+        own = jacobian[:, joints]
         own.dot(own.T, out=square)
-    measures: Array = np.sqrt(np.maximum(np.linalg.det(squares), 0.0))
-    return measures
+    return np.array([sqrt(max(square, 0.0)) for square in np.linalg.det(squares).tolist()])

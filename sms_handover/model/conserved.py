@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.types import Array, read_only
+from sms_handover.types import Array, frozen
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ def physics_receipt(robot: RobotModel, q: Array, v: Array) -> PhysicsReceipt:
     """
     momentum = pin.computeCentroidalMomentum(robot.pin, robot.data, q, v)
     linear, angular = np.array(momentum.linear), np.array(momentum.angular)
-    centre = np.array(pin.centerOfMass(robot.pin, robot.data, q))
+    centre = np.array(robot.data.com[0])
     inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.LOCAL)
-    energy = 0.5 * float(v @ inertia @ v)
-    return PhysicsReceipt(read_only(linear), read_only(angular), read_only(centre), energy)
+    energy = 0.5 * float(v.dot(inertia).dot(v))
+    return PhysicsReceipt(frozen(linear), frozen(angular), frozen(centre), energy)

@@ -34,7 +34,8 @@ def pose_row(pose: Pose) -> Array:
 
 def twist_of(motion: pin.Motion) -> Twist:
     """Return the linear and angular parts of a spatial velocity."""
-    return Twist(motion.linear, motion.angular)
+    row = frozen(np.array(motion.vector))
+    return Twist(row[:3], row[3:])
 
 
 def pose_distance(a: Pose, b: Pose) -> tuple[float, float]:

@@ -8,14 +8,12 @@ import numpy.typing as npt
 
 from sms_handover.events import RunEvent
 from sms_handover.model.conserved import PhysicsReceipt
-from sms_handover.model.poses import pose_row
 from sms_handover.run_data import RunData
 from sms_handover.types import (
     BASE_NQ,
     BASE_NV,
     Array,
     GraspEvent,
-    IkResult,
     IkStatus,
     JointReference,
     Pose,
@@ -74,7 +72,7 @@ class RunRecorder:
         phase: TaskPhase,
         reference: JointReference,
         targets_in_world: Mapping[str, Pose],
-        ik: IkResult | None,
+        ik: IkStatus | None,
     ) -> None:
         """Add what the trajectory gave in one reference period; :meth:`plant` completes the row."""
         row = self._period
@@ -82,9 +80,9 @@ class RunRecorder:
         self._reference[0, row] = reference.position
         self._reference[1, row] = reference.velocity
         for index, arm in enumerate(self._arms):
-            self._poses[0, index, row] = pose_row(targets_in_world[arm])
+            _put(targets_in_world[arm], self._poses[0, index, row])
         if ik is not None:
-            self._ik_status[row] = IK_STATUS_NUMBER[ik.status]
+            self._ik_status[row] = IK_STATUS_NUMBER[ik]
         self._phases.append(phase)
         self._period += 1
 
@@ -94,11 +92,12 @@ class RunRecorder:
         """Add what the plant gave in one reference period, before :meth:`reference`."""
         row = self._period
         for index, arm in enumerate(self._arms):
-            self._poses[1, index, row] = pose_row(tools_in_world[arm])
-        self._deputy[row] = pose_row(deputy_in_world)
-        self._receipts[row, :3] = receipt.linear_momentum
-        self._receipts[row, 3:6] = receipt.angular_momentum
-        self._receipts[row, 6:] = receipt.kinetic_energy, work
+            _put(tools_in_world[arm], self._poses[1, index, row])
+        _put(deputy_in_world, self._deputy[row])
+        receipts = self._receipts[row]
+        receipts[:3] = receipt.linear_momentum
+        receipts[3:6] = receipt.angular_momentum
+        receipts[6:] = receipt.kinetic_energy, work
 
     def events(self, events: Iterable[GraspEvent]) -> None:
         """Add grasp events."""
@@ -140,6 +139,12 @@ class RunRecorder:
             grasp_events=tuple(self._events),
             run_events=tuple(self._decisions),
         )
+
+
+def _put(pose: Pose, row: Array) -> None:
+    """Write a pose into a row (7,): position, then quaternion x y z w."""
+    row[:3] = pose.position
+    row[3:] = pose.quaternion_xyzw
 
 
 def _longer(array: npt.NDArray[N], size: int, axis: int) -> npt.NDArray[N]:

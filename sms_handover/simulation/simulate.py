@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from sms_handover.control.protocol import CheckedController, Controller, Guidance
 from sms_handover.errors import ConfigurationError
-from sms_handover.ik.levenberg_marquardt import solve_ik
+from sms_handover.ik.levenberg_marquardt import find_joints
 from sms_handover.run_data import RunData
 from sms_handover.simulation.parameters import CommonParameters
 from sms_handover.simulation.recorder import RunRecorder
@@ -56,10 +56,10 @@ def simulate(
             recorder.plant(plant.tools_in_world, deputy.deputy_in_world, plant.receipt, plant.work)
             phase, targets = generator.targets(state, deputy.deputy_in_world)
             request = generator.ik_request(state, targets)
-            solution = solve_ik(robot, request, parameters.ik) if request.tool_in_world else None
+            solution = find_joints(robot, request, parameters.ik) if request.tool_in_world else None
             joints = solution.joint_position if solution else targets.joint_position
             reference, targets_in_world = generator.reference(state, targets, joints)
-            recorder.reference(phase, reference, targets_in_world, solution)
+            recorder.reference(phase, reference, targets_in_world, solution.status if solution else None)
             law.guide(Guidance(phase, reference, targets_in_world))
             events = plant.execute(phase.commands)
             generator.grasped(events)

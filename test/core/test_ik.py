@@ -80,7 +80,7 @@ def test_manipulability_is_the_volume_of_the_velocity_ellipsoid(robot: RobotMode
     """It is the product of the singular values of the arm's Jacobian, in whatever axes."""
     base, joints = draw.pose(), draw.joints()
     q = robot.configuration(base, joints)
-    found = manipulability(robot, base, joints)
+    found = manipulability(robot, joints)
     for index, (arm, part) in enumerate(robot.arm_joints.items()):
         columns = slice(BASE_NV + part.start, BASE_NV + part.stop)
         values = np.linalg.svd(tool_jacobian(robot, q, arm)[:, columns], compute_uv=False)
@@ -90,8 +90,8 @@ def test_manipulability_is_the_volume_of_the_velocity_ellipsoid(robot: RobotMode
 
 def test_a_stretched_arm_has_no_manipulability(robot: RobotModel) -> None:
     """With every joint at zero the arm is straight and cannot move along itself."""
-    stretched = manipulability(robot, _HOME, np.zeros(14))
-    bent = manipulability(robot, _HOME, np.tile([0.0, -0.5, 0.0, -1.7, 0.0, -0.6, 0.0], 2))
+    stretched = manipulability(robot, np.zeros(14))
+    bent = manipulability(robot, np.tile([0.0, -0.5, 0.0, -1.7, 0.0, -0.6, 0.0], 2))
     # the square root of a determinant that is rounding: eps times singular values below 3
     assert np.all(stretched <= np.sqrt(6**3 * _EPS * 3.0**12))
     assert np.all(bent > 1e-3)

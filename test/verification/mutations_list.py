@@ -158,21 +158,21 @@ BREAKS: tuple[Break, ...] = (
     Break(
         "kinetic energy without the rotors",
         "sms_handover/model/conserved.py",
-        "energy = 0.5 * float(v @ inertia @ v)",
+        "energy = 0.5 * float(v.dot(inertia).dot(v))",
         "energy = 0.5 * float(v @ (inertia - np.diag(robot.pin.armature)) @ v)",
         _LAGRANGE,
     ),
     Break(
         "kinetic energy as Pinocchio sums it, rotors of some joints left out",
         "sms_handover/model/conserved.py",
-        "energy = 0.5 * float(v @ inertia @ v)",
+        "energy = 0.5 * float(v.dot(inertia).dot(v))",
         "energy = float(pin.computeKineticEnergy(robot.pin, robot.data, q, v))",
         _LAGRANGE,
     ),
     _core(
         "kinetic energy without its half",
         "model/conserved",
-        "energy = 0.5 * float(v @ inertia @ v)",
+        "energy = 0.5 * float(v.dot(inertia).dot(v))",
         "energy = float(v @ inertia @ v)",
         "robot_model",
     ),
@@ -314,8 +314,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "lever arm of the held deputy with the wrong sign",
         "plant/deputy",
-        "np.cross(tool_twist_in_world.angular, lever)",
-        "np.cross(lever, tool_twist_in_world.angular)",
+        "_cross(tool_twist_in_world.angular, lever)",
+        "_cross(lever, tool_twist_in_world.angular)",
         "deputy",
     ),
     _core(
@@ -328,8 +328,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "speed of a turning grasp frame with the wrong sign",
         "plant/deputy",
-        "np.cross(self._twist.angular, lever)",
-        "np.cross(lever, self._twist.angular)",
+        "_cross(self._twist.angular, lever)",
+        "_cross(lever, self._twist.angular)",
         "deputy",
     ),
     _core(
@@ -442,7 +442,7 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "joint limits not kept",
         "ik/levenberg_marquardt",
-        "candidate = robot.within_limits(q - step)",
+        "candidate = frozen(robot.within_limits(q - step))",
         "candidate = q - step",
         "ik",
     ),
