@@ -22,6 +22,7 @@ from sms_handover.types import Array, frozen
 _STEP, _JOINT_EFFORTS = "step", "joint_efforts"  # names of the C functions
 _TOLERANCE = 1e-9  # [-] of the largest value; rounding leaves 1e-14, another robot's library is far off
 _SEED = 0
+_EXAMPLE_S = 1e-3  # [s] in which even a wrist stays where it is, so that rounding is not blown up
 
 
 class CompiledStepper:
@@ -39,11 +40,13 @@ class CompiledStepper:
         size = robot.n_joints
         self._q, self._v, self._u = np.zeros(BASE_NQ + size), np.zeros(BASE_NV + size), np.zeros(size)
         self._q_next, self._v_next = np.zeros_like(self._q), np.zeros_like(self._v)
-        arguments = (self._q, self._v, self._u, np.array([h]))
+        duration = np.array([_EXAMPLE_S])
+        arguments = (self._q, self._v, self._u, duration)
         self._function = CFunction(library, _STEP, arguments, (self._q_next, self._v_next))
-        q, v, u = _example(robot)
-        theirs = PinocchioStepper(robot, tableau, h).step(q, v, u)
-        _require_equal(library, [*zip(self.step(q, v, u), theirs, strict=True)])
+        example = _example(robot)
+        theirs = PinocchioStepper(robot, tableau, _EXAMPLE_S).step(*example)
+        _require_equal(library, [*zip(self.step(*example), theirs, strict=True)])
+        duration[0] = h
 
     def step(self, q: Array, v: Array, effort: Array) -> tuple[Array, Array]:
         """Return configuration (7 + n,) and velocity (6 + n,) after one step, as read-only arrays."""

@@ -75,6 +75,17 @@ def test_a_step_is_that_of_pinocchio(any_robot: RobotModel, scheme: str) -> None
         assert _off(v_next - v, v_expected - v) < _ROUNDING / _TICK
 
 
+@pytest.mark.parametrize("tick", [1e-6, 0.02])
+def test_a_step_lasts_as_long_as_asked(robot: RobotModel, draw: Draw, tick: float) -> None:
+    """Whatever step the library was tried with first."""
+    q, v, effort = draw.q(), draw.v(0.1), np.zeros(robot.n_joints)
+    found = CompiledStepper(robot, TABLEAUS["rk4"], tick).step(q, v, effort)
+    for ours, theirs in zip(
+        found, PinocchioStepper(robot, TABLEAUS["rk4"], tick).step(q, v, effort), strict=True
+    ):
+        assert _off(ours, theirs) < _ROUNDING
+
+
 @pytest.mark.parametrize("turn", [0.0, 1e-9, 0.0316, 0.0317, 0.5, 3.0])
 def test_a_base_that_turns_far_in_a_step_moves_on_its_screw(robot: RobotModel, turn: float) -> None:
     """On both sides of where the series of the exponential map gives way to its closed form."""
