@@ -36,7 +36,7 @@ def solve_ik(robot: RobotModel, request: IkRequest, parameters: IkParameters) ->
         orientation_error=found.residual.orientation_error,
         limit_margin=float(np.minimum(q - robot.lower, robot.upper - q).min()),
         manipulability=manipulability(robot, q),
-        seed_distance=float(np.abs(q - request.seed).max()),
+        seed_distance=_largest(q - request.seed),
     )
 
 
@@ -56,7 +56,7 @@ def find_joints(robot: RobotModel, request: IkRequest, parameters: IkParameters)
         if _converged(residual, parameters):
             return Solution(q, residual, IkStatus.CONVERGED, iteration)
         q_next, residual_next = _descend(robot, problem, q, residual, parameters.damping_bias)
-        if np.abs(q_next - q).max() <= parameters.stall_step:
+        if _largest(q_next - q) <= parameters.stall_step:
             return Solution(q, residual, IkStatus.STALLED, iteration)
         q, residual = q_next, residual_next
     status = IkStatus.CONVERGED if _converged(residual, parameters) else IkStatus.ITERATION_LIMIT
@@ -95,3 +95,8 @@ def _descend(
         if found.energy < residual.energy:
             return candidate, found
     return q, residual
+
+
+def _largest(step: Array) -> float:
+    """Return the largest absolute value in a joint array; for so few, lists are faster than NumPy."""
+    return float(max(map(abs, step.tolist())))

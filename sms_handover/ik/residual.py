@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import count
 from math import hypot, sqrt
 
 import numpy as np
@@ -40,10 +41,9 @@ class PoseResidual:
         """Fix the base and the targets."""
         self._robot = robot
         self._q = robot.configuration(base_in_world, np.zeros(robot.n_joints))
-        targets = {robot.tool_frame_id[arm]: se3_of(pose) for arm, pose in tool_in_world.items()}
         self._targets = [
-            (slice(_ROWS * index, _ROWS * (index + 1)), frame_id, target, np.array(target.translation))
-            for index, (frame_id, target) in enumerate(targets.items())
+            (slice(row, row + _ROWS), robot.tool_frame_id[arm], se3_of(pose), pose.position)
+            for row, (arm, pose) in zip(count(0, _ROWS), tool_in_world.items(), strict=False)
         ]
         self._to_rows = np.zeros((_ROWS, _ROWS))  # takes a body twist of the tool to rows of the Jacobian
 

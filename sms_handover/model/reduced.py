@@ -69,11 +69,12 @@ def tool_jacobian(robot: RobotModel, q: Array, arm: str) -> Array:
     return jacobian
 
 
-def generalized_jacobian(robot: RobotModel, q: Array, arm: str) -> Array:
-    """Return the generalised Jacobian (6, n) of a tool [Umetani1989].
+def generalized_jacobian(robot: RobotModel, q: Array, *arms: str) -> Array:
+    """Return the generalised Jacobian (6 k, n) of the tools of k arms, one below the other [Umetani1989].
 
-    It maps joint rates to the tool's twist in ``world`` axes with the base's reaction included,
+    It maps joint rates to the tools' twists in ``world`` axes with the base's reaction included,
     for zero momentum: J* = J_m - J_b H_b^-1 H_bm.
     """
-    jacobian = tool_jacobian(robot, q, arm)
-    return jacobian[:, BASE_NV:] + jacobian[:, :BASE_NV] @ base_twist_per_joint_rate(robot, q)
+    reaction = base_twist_per_joint_rate(robot, q)
+    jacobians = [tool_jacobian(robot, q, arm) for arm in arms]
+    return np.concatenate([own[:, BASE_NV:] + own[:, :BASE_NV] @ reaction for own in jacobians])

@@ -1,6 +1,6 @@
 """The Pinocchio model of the free-floating robot, with maps from names to indices."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
@@ -83,16 +83,18 @@ class RobotModel:
         """Return joint angles (n,) rad, each brought inside the limits of its joint."""
         return np.minimum(np.maximum(joint_position, self.lower), self.upper)
 
-    def tools_in_world(self, base_in_world: Pose, joint_position: Array) -> dict[str, Pose]:
-        """Return the pose of every tool frame in ``world``, by forward kinematics."""
-        return self.tools_at(self.configuration(base_in_world, joint_position))
+    def tools_in_world(
+        self, base_in_world: Pose, joint_position: Array, arms: Iterable[str] | None = None
+    ) -> dict[str, Pose]:
+        """Return the pose of the tool frames of some arms in ``world``, by default of all."""
+        return self.tools_at(self.configuration(base_in_world, joint_position), arms)
 
-    def tools_at(self, q: Array) -> dict[str, Pose]:
-        """Return the pose of every tool frame in ``world`` at a configuration (7 + n,)."""
+    def tools_at(self, q: Array, arms: Iterable[str] | None = None) -> dict[str, Pose]:
+        """Return these poses at a configuration (7 + n,), by forward kinematics."""
         pin.forwardKinematics(self.pin, self.data, q)
         return {
-            arm: pose_of(pin.updateFramePlacement(self.pin, self.data, frame_id))
-            for arm, frame_id in self.tool_frame_id.items()
+            arm: pose_of(pin.updateFramePlacement(self.pin, self.data, self.tool_frame_id[arm]))
+            for arm in (self.arms if arms is None else arms)
         }
 
     def links_in_world(self, base_in_world: Pose, joint_position: Array) -> dict[str, Pose]:

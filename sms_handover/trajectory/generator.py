@@ -15,6 +15,7 @@ from sms_handover.trajectory.pose_path import PosePath
 from sms_handover.trajectory.schedule import (
     DeputyDescription,
     GraspFrameTarget,
+    Hold,
     JointTarget,
     Schedule,
     ToolTarget,
@@ -30,6 +31,7 @@ from sms_handover.types import (
     RobotState,
     TaskPhase,
     Twist,
+    frozen,
     read_only,
 )
 from sms_handover.units import ns_to_seconds
@@ -119,12 +121,14 @@ class TrajectoryGenerator:
         joints give. The joint rates bring about the desired tool twists with the reaction of
         the base accounted for: the damped inverse of the generalised Jacobian [Umetani1989].
         """
-        poses = self._robot.tools_in_world(state.base_in_world, joint_position)
-        poses.update(targets.tool_in_world)
-        velocity = np.array(targets.joint_velocity)
-        if any(np.any(t.linear) or np.any(t.angular) for t in targets.tool_twist_in_world.values()):
+        robot, led = self._robot, targets.tool_in_world
+        others = [arm for arm in robot.arms if arm not in led]
+        by_joints = robot.tools_in_world(state.base_in_world, joint_position, others) if others else {}
+        velocity = targets.joint_velocity
+        if any(_moves(twist) for twist in targets.tool_twist_in_world.values()):
             velocity = self._resolve_rates(state, targets, velocity)
-        return JointReference(state.stamp_ns, joint_position, velocity), poses
+        reference = JointReference(state.stamp_ns, joint_position, velocity)
+        return reference, {arm: led[arm] if arm in led else by_joints[arm] for arm in robot.arms}
 
     def _targets_of(self, stage: Stage, state: RobotState, deputy_in_world: Pose) -> Targets:
         """Return the targets of every arm at the time of a state."""
@@ -138,21 +142,21 @@ class TrajectoryGenerator:
         for arm, target in stage.targets.items():
             joints = self._robot.arm_joints[arm]
             start = self._joints_at_start[joints]
-            if isinstance(target, ToolTarget | GraspFrameTarget):
-                goal = goal_in_world(target, self._schedule.deputy, deputy_in_world)
-                poses[arm], twists[arm] = PosePath(self._tools_at_start[arm], goal).at(progress)
-            elif isinstance(target, JointTarget):
-                position[joints], velocity[joints] = _joint_motion(start, target.position, progress)
-            else:
-                position[joints] = start
-        return Targets(state.stamp_ns, poses, twists, position, velocity)
+            match target:
+                case ToolTarget() | GraspFrameTarget():
+                    goal = goal_in_world(target, self._schedule.deputy, deputy_in_world)
+                    poses[arm], twists[arm] = PosePath(self._tools_at_start[arm], goal).at(progress)
+                case JointTarget():
+                    position[joints], velocity[joints] = _joint_motion(start, target.position, progress)
+                case Hold():
+                    position[joints] = start
+        return Targets(state.stamp_ns, poses, twists, frozen(position), frozen(velocity))
 
     def _resolve_rates(self, state: RobotState, targets: Targets, velocity: Array) -> Array:
         """Return the joint rates with those of tool-led arms solved for from the desired twists."""
         robot = self._robot
-        q = state.q
         led = [arm for arm in robot.arms if arm in targets.tool_twist_in_world]
-        jacobian = np.vstack([generalized_jacobian(robot, q, arm) for arm in led])
+        jacobian = generalized_jacobian(robot, state.q, *led)
         twists = [targets.tool_twist_in_world[arm] for arm in led]
         wanted = np.concatenate([part for t in twists for part in (t.linear, t.angular)])
         columns = np.concatenate([np.arange(robot.n_joints)[robot.arm_joints[arm]] for arm in led])
@@ -161,7 +165,7 @@ class TrajectoryGenerator:
         damped = free @ free.T + self._damping**2 * np.eye(rest.size)
         result = np.array(velocity)
         result[columns] = free.T @ np.linalg.solve(damped, rest)
-        return result
+        return frozen(result)
 
 
 def goal_in_world(
@@ -177,3 +181,8 @@ def goal_in_world(
 def _joint_motion(start: Array, end: Array, progress: Progress) -> tuple[Array, Array]:
     """Return joint position and velocity on the straight way between two joint configurations."""
     return start + progress.fraction * (end - start), progress.rate * (end - start)
+
+
+def _moves(twist: Twist) -> bool:
+    """Tell whether a twist is not zero."""
+    return bool(np.count_nonzero(twist.linear) or np.count_nonzero(twist.angular))

@@ -9,6 +9,8 @@ from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.trajectory.time_law import Progress
 from sms_handover.types import Pose, Twist
 
+_AT_REST = Twist(np.zeros(3), np.zeros(3))
+
 
 @dataclass(frozen=True, eq=False)
 class PosePath:
@@ -20,10 +22,10 @@ class PosePath:
     def at(self, progress: Progress) -> tuple[Pose, Twist]:
         """Return pose and twist (of the origin, in ``world`` axes) at a point of the time law."""
         if progress.fraction == 1.0 and progress.rate == 0.0:
-            return self.end, Twist(np.zeros(3), np.zeros(3))
+            return self.end, _AT_REST
         start, end = se3_of(self.start), se3_of(self.end)
-        turn = pin.log3(start.rotation.T @ end.rotation)
-        rotation = start.rotation @ pin.exp3(progress.fraction * turn)
+        turn = pin.log3(start.rotation.T.dot(end.rotation))
+        rotation = start.rotation.dot(pin.exp3(progress.fraction * turn))
         way = end.translation - start.translation
         pose = pose_of(pin.SE3(rotation, start.translation + progress.fraction * way))
-        return pose, Twist(progress.rate * way, start.rotation @ (progress.rate * turn))
+        return pose, Twist(progress.rate * way, start.rotation.dot(progress.rate * turn))

@@ -137,8 +137,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "coupling of base and arms left out of J*",
         "model/reduced",
-        "return jacobian[:, BASE_NV:] + jacobian[:, :BASE_NV] @ base_twist_per_joint_rate(robot, q)",
-        "return jacobian[:, BASE_NV:]",
+        "own[:, BASE_NV:] + own[:, :BASE_NV] @ reaction for own",
+        "own[:, BASE_NV:] for own",
         "reduced_dynamics",
     ),
     _core(
@@ -506,8 +506,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "path turns about the axes of the world",
         "trajectory/pose_path",
-        "start.rotation @ pin.exp3(progress.fraction * turn)",
-        "pin.exp3(progress.fraction * turn) @ start.rotation",
+        "start.rotation.dot(pin.exp3(progress.fraction * turn))",
+        "pin.exp3(progress.fraction * turn).dot(start.rotation)",
         "pose_path",
     ),
     _core(
