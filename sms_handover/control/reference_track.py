@@ -43,11 +43,12 @@ class ReferenceTrack:
     def update(self, reference: JointReference) -> None:
         """Take the next reference."""
         previous = self._last
-        acceleration = np.zeros_like(reference.velocity)
+        motion = np.zeros((3, reference.position.size))
+        motion[0], motion[1] = reference.position, reference.velocity
         if previous is not None and not self._broken:
             period = ns_to_seconds(reference.stamp_ns - previous.stamp_ns)
-            acceleration = (reference.velocity - previous.velocity) / period
-        self._motion = np.array([reference.position, reference.velocity, acceleration])
+            motion[2] = (reference.velocity - previous.velocity) / period
+        self._motion = motion
         self._last = reference
         self._broken = False
 

@@ -1,6 +1,7 @@
 """Levenberg-Marquardt inverse kinematics with the error-dependent damping of Sugihara."""
 
 from dataclasses import dataclass
+from math import inf
 
 import eigenpy
 import numpy as np
@@ -64,9 +65,10 @@ def find_joints(robot: RobotModel, request: IkRequest, parameters: IkParameters)
 
 
 def _converged(residual: Residual, parameters: IkParameters) -> bool:
-    """Tell whether both errors are below their tolerances."""
+    """Tell whether both errors are below their tolerances, and are numbers."""
     return (
-        residual.position_error <= parameters.position_tolerance
+        residual.energy < inf
+        and residual.position_error <= parameters.position_tolerance
         and residual.orientation_error <= parameters.orientation_tolerance
     )
 

@@ -1,9 +1,8 @@
 """Pose residual of the tools and its Jacobian, with the base locked."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from itertools import count
 from math import hypot, sqrt
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -16,8 +15,7 @@ _ROWS = 6  # residual rows per tool: position, orientation
 _BASE_AT_ORIGIN = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])  # position in m, quaternion x y z w
 
 
-@dataclass(frozen=True, eq=False)
-class Residual:
+class Residual(NamedTuple):
     """Residual (6 k,) of k tools with its norms.
 
     ``position_error`` m and ``orientation_error`` rad are the largest over the tools; ``energy`` is half
@@ -42,8 +40,8 @@ class PoseResidual:
         self._robot = robot
         self._q = robot.configuration(base_in_world, np.zeros(robot.n_joints))
         self._targets = [
-            (slice(row, row + _ROWS), robot.tool_frame_id[arm], se3_of(pose), pose.position)
-            for row, (arm, pose) in zip(count(0, _ROWS), tool_in_world.items(), strict=False)
+            (_ROWS * index, robot.tool_frame_id[arm], se3_of(pose), pose.position)
+            for index, (arm, pose) in enumerate(tool_in_world.items())
         ]
         self._to_rows = np.zeros((_ROWS, _ROWS))  # takes a body twist of the tool to rows of the Jacobian
 
@@ -53,16 +51,15 @@ class PoseResidual:
         self._q[BASE_NQ:] = joint_position
         pin.forwardKinematics(model, data, self._q)
         values = np.empty(_ROWS * len(self._targets))
-        position_error = orientation_error = 0.0
-        for rows, frame_id, target, place in self._targets:
+        distances, angles = [0.0], [0.0]
+        for row, frame_id, target, place in self._targets:
             tool = pin.updateFramePlacement(model, data, frame_id)
-            part = values[rows]
-            np.subtract(tool.translation, place, out=part[:3])
-            part[3:] = pin.log3(target.actInv(tool).rotation)
-            x, y, z, *turn = part.tolist()
-            position_error = max(position_error, hypot(x, y, z))
-            orientation_error = max(orientation_error, hypot(*turn))
-        return Residual(values, position_error, orientation_error, 0.5 * float(values.dot(values)))
+            way, turn = tool.translation - place, pin.log3(target.actInv(tool).rotation)
+            values[row : row + 3] = way
+            values[row + 3 : row + _ROWS] = turn
+            distances.append(hypot(*way.tolist()))
+            angles.append(hypot(*turn.tolist()))
+        return Residual(values, max(distances), max(angles), 0.5 * float(values.dot(values)))
 
     def jacobian(self, joint_position: Array) -> Array:
         """Return the derivative (6 k, n) of the residual with respect to the joint angles."""
@@ -70,12 +67,12 @@ class PoseResidual:
         self._q[BASE_NQ:] = joint_position
         pin.computeJointJacobians(model, data, self._q)
         jacobian = np.empty((_ROWS * len(self._targets), self._robot.n_joints))
-        for rows, frame_id, target, _ in self._targets:
+        for row, frame_id, target, _ in self._targets:
             tool = pin.updateFramePlacement(model, data, frame_id)
             to_rows[:3, :3] = tool.rotation
             to_rows[3:, 3:] = pin.Jlog3(target.actInv(tool).rotation)
             body = pin.getFrameJacobian(model, data, frame_id, pin.ReferenceFrame.LOCAL)
-            to_rows.dot(body[:, BASE_NV:], out=jacobian[rows])
+            to_rows.dot(body[:, BASE_NV:], out=jacobian[row : row + _ROWS])
         return jacobian
 
 

@@ -262,6 +262,19 @@ def test_a_stalled_solve_is_at_a_minimum_within_the_limits(robot: RobotModel, dr
     assert stalled >= at_limits > 0
 
 
+@pytest.mark.parametrize("arm", ["arm_a", "arm_b"])
+def test_what_is_no_number_is_not_called_converged(
+    robot: RobotModel, draw: Draw, parameters: IkParameters, arm: str
+) -> None:
+    """One joint whose angle is unknown, in either arm, while both tools were at their targets."""
+    base, joints = draw.pose(), draw.joints()
+    targets = robot.tools_in_world(base, joints)
+    joints[robot.arm_joints[arm].start] = np.nan
+    with np.errstate(invalid="ignore"):
+        result = solve_ik(robot, IkRequest(base, joints, targets), parameters)
+    assert result.status is not IkStatus.CONVERGED
+
+
 def test_the_iteration_limit_is_kept_and_said(
     robot: RobotModel, draw: Draw, parameters: IkParameters
 ) -> None:
