@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.results import Result, Table, publish, row
 from benchmarks.timing import interleaved
-from sms_handover.compiled.dynamics import CompiledInverseDynamics, CompiledStepper
+from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
 from sms_handover.control.controller import JointController
 from sms_handover.control.nmpc import NmpcGains
 from sms_handover.model.robot_model import RobotModel
@@ -57,8 +57,8 @@ def ticks_of(robot: RobotModel, dynamics: str) -> Callable[[], None]:
     stepper = CompiledStepper(robot, TABLEAUS[parameters.integrator], 1e-9 * TICK_NS) if compiled else None
     plant = FreeFloatingPlant(robot, parameters, InitialState(HOME, joints, HOME, {}), TICK_NS, stepper)
     start = robot.configuration(HOME, joints)
-    efforts = CompiledInverseDynamics(robot) if compiled else None
-    controller = JointController(robot, [NmpcGains(1.0, 0)], TICK_NS, start, inverse_dynamics=efforts)
+    efforts = CompiledComputedTorque(robot) if compiled else None
+    controller = JointController(robot, [NmpcGains(1.0, 0)], TICK_NS, start, efforts=efforts)
     controller.track(JointReference(0, joints + 0.1, np.zeros_like(joints)))
 
     def run() -> None:

@@ -12,14 +12,14 @@ import pinocchio as pin
 from sms_handover.compiled.c_function import CFunction
 from sms_handover.compiled.compiler import library_of
 from sms_handover.compiled.tree import Body, body_tree
+from sms_handover.control.computed_torque import ComputedTorque
 from sms_handover.errors import ConfigurationError, MissingDependencyError
-from sms_handover.model.reduced import reduced_inverse_dynamics
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.integrators import Tableau
 from sms_handover.plant.stepper import PinocchioStepper
 from sms_handover.types import Array, frozen
 
-_STEP, _JOINT_EFFORTS = "step", "joint_efforts"  # names of the C functions
+_STEP, _COMPUTED_TORQUE = "step", "computed_torque"  # names of the C functions
 _TOLERANCE = 1e-9  # [-] of the largest value; rounding leaves 1e-14, another robot's library is far off
 _SEED = 0
 _EXAMPLE_S = 1e-3  # [s] in which even a wrist stays where it is, so that rounding is not blown up
@@ -57,8 +57,8 @@ class CompiledStepper:
         return frozen(self._q_next.copy()), frozen(self._v_next.copy())
 
 
-class CompiledInverseDynamics:
-    """Joint efforts for joint accelerations, as :func:`~sms_handover.model.reduced.reduced_inverse_dynamics`.
+class CompiledComputedTorque:
+    """Joint efforts as :class:`~sms_handover.control.computed_torque.ComputedTorque` gives them.
 
     An instance owns work space, so it is not to be shared between threads.
     """
@@ -67,23 +67,27 @@ class CompiledInverseDynamics:
         """Compile it unless that is done, and hold it against Pinocchio; raises ConfigurationError."""
         bodies = body_tree(robot)
         library = library_of(
-            _JOINT_EFFORTS,
+            _COMPUTED_TORQUE,
             _identity(bodies, ""),
-            lambda: _writer().joint_efforts_source(_JOINT_EFFORTS, bodies),
+            lambda: _writer().computed_torque_source(_COMPUTED_TORQUE, bodies),
         )
         size = robot.n_joints
-        self._angles, self._v, self._wanted = np.zeros(size), np.zeros(BASE_NV + size), np.zeros(size)
+        self._q, self._v = np.zeros(BASE_NQ + size), np.zeros(BASE_NV + size)
+        self._desired, self._feedback = np.zeros((3, size)), np.zeros(2)
         self._efforts = np.zeros(size)
-        arguments = (self._angles, self._v, self._wanted)
-        self._function = CFunction(library, _JOINT_EFFORTS, arguments, (self._efforts,))
-        example = _example(robot)
-        _require_equal(library, [(self(*example), reduced_inverse_dynamics(robot, *example))])
+        arguments = (self._q, self._v, self._desired, self._feedback)
+        self._function = CFunction(library, _COMPUTED_TORQUE, arguments, (self._efforts,))
+        q, v, wanted = _example(robot)
+        desired = np.array([0.9 * q[BASE_NQ:], 0.9 * v[BASE_NV:], wanted])
+        example = (q, v, desired, np.array([2.0, 3.0]))
+        _require_equal(library, [(self(*example), ComputedTorque(robot)(*example))])
 
-    def __call__(self, q: Array, v: Array, joint_acceleration: Array) -> Array:
-        """Return the joint efforts (n,) N m at q (7 + n,), v (6 + n,) for accelerations (n,) rad/s^2."""
-        self._angles[:] = q[BASE_NQ:]
+    def __call__(self, q: Array, v: Array, desired: Array, feedback: Array) -> Array:
+        """Return the joint efforts (n,) N m, without a limit."""
+        self._q[:] = q
         self._v[:] = v
-        self._wanted[:] = joint_acceleration
+        self._desired[:] = desired
+        self._feedback[:] = feedback
         self._function()
         efforts: Array = self._efforts.copy()
         return efforts

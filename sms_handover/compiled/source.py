@@ -8,7 +8,7 @@ import casadi as ca
 from sms_handover.compiled.rigid_bodies import RigidBodies
 from sms_handover.compiled.step import step_function
 from sms_handover.compiled.tree import Body
-from sms_handover.model.robot_model import BASE_NV
+from sms_handover.model.robot_model import BASE_NQ, BASE_NV
 from sms_handover.plant.integrators import Tableau
 
 
@@ -20,17 +20,21 @@ def step_source(name: str, bodies: Sequence[Body], tableau: Tableau) -> str:
     return _code(step_function(name, acceleration, tableau, len(bodies) - 1))
 
 
-def joint_efforts_source(name: str, bodies: Sequence[Body]) -> str:
-    """Return C code of a function that maps joint angles, v and joint accelerations to joint efforts."""
-    angles, v, joint_acceleration = _symbols(bodies)
-    found = ca.cse(RigidBodies(bodies, angles, v).joint_efforts(joint_acceleration))
-    return _code(ca.Function(name, [angles, v, joint_acceleration], [found]))
+def computed_torque_source(name: str, bodies: Sequence[Body]) -> str:
+    """Return C code of a function that maps q, v, the desired motion (3, n) and two gains to efforts."""
+    angles, v, _ = _symbols(bodies)
+    base, feedback = ca.SX.sym("base", BASE_NQ), ca.SX.sym("feedback", 2)
+    desired = ca.SX.sym("desired", len(bodies) - 1, 3)  # CasADi has columns where NumPy has rows
+    error, error_rate = angles - desired[:, 0], v[BASE_NV:] - desired[:, 1]
+    wanted = desired[:, 2] - feedback[0] * error - feedback[1] * error_rate
+    found = ca.cse(RigidBodies(bodies, angles, v).joint_efforts(wanted))
+    return _code(ca.Function(name, [ca.vertcat(base, angles), v, desired, feedback], [found]))
 
 
 def _symbols(bodies: Sequence[Body]) -> tuple[Any, Any, Any]:
-    """Return joint angles (n,), velocity (6 + n,) and one more value per joint."""
+    """Return joint angles (n,), velocity (6 + n,) and joint efforts (n,)."""
     joints = len(bodies) - 1
-    return ca.SX.sym("angles", joints), ca.SX.sym("v", BASE_NV + joints), ca.SX.sym("x", joints)
+    return ca.SX.sym("angles", joints), ca.SX.sym("v", BASE_NV + joints), ca.SX.sym("u", joints)
 
 
 def _code(function: Any) -> str:

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from sms_handover.control.base import ControlLaw
-from sms_handover.control.nmpc import InverseDynamics, NmpcGains, NmpcLaw
+from sms_handover.control.computed_torque import TrackingEfforts
+from sms_handover.control.nmpc import NmpcGains, NmpcLaw
 from sms_handover.control.pid import PidGains, PidLaw
 from sms_handover.control.protocol import Guidance
 from sms_handover.control.reference_track import ReferenceTrack
@@ -30,27 +31,27 @@ class JointController:
         tick_ns: int,
         base_configuration: Array,
         longest_ns: int | None = None,
-        inverse_dynamics: InverseDynamics | None = None,
+        efforts: TrackingEfforts | None = None,
     ) -> None:
         """Set up the law of the gains' kind, and check every gain set at the start configuration.
 
         ``gains_by_phase`` has one entry per phase of the schedule, all of one kind;
         ``base_configuration`` is q (7 + n,) at the start. A reference older than ``longest_ns`` is no
-        longer carried on: the desired joints stand still. A law that needs ``inverse_dynamics`` takes
-        them, or works them out itself. Raises UnstableLoopError.
+        longer carried on: the desired joints stand still. A law of computed torque has its
+        equation worked out by ``efforts``, by default by Pinocchio. Raises UnstableLoopError.
         """
         self._robot = robot
-        self._inverse_dynamics = inverse_dynamics
+        self._efforts = efforts
         self._gains_by_phase = tuple(gains_by_phase)
         self._dt = ns_to_seconds(tick_ns)
-        self._law = make_law(robot, self._gains_by_phase[0], inverse_dynamics)
+        self._law = make_law(robot, self._gains_by_phase[0], efforts)
         self._track = ReferenceTrack(longest_ns)
         self._entry = (0, 1, PhaseState.ACTIVE)
         check_stability(robot, self._gains_by_phase, self._dt, base_configuration)
 
     def reset(self) -> None:
         """Go back to the start of the run."""
-        self._law = make_law(self._robot, self._gains_by_phase[0], self._inverse_dynamics)
+        self._law = make_law(self._robot, self._gains_by_phase[0], self._efforts)
         self._track.reset()
         self._entry = (0, 1, PhaseState.ACTIVE)
 
@@ -86,12 +87,10 @@ class JointController:
         return frozen(self._law.effort(q, v, self._track.at(stamp_ns), self._dt))
 
 
-def make_law(
-    robot: RobotModel, gains: Gains, inverse_dynamics: InverseDynamics | None = None
-) -> ControlLaw[Any]:
+def make_law(robot: RobotModel, gains: Gains, efforts: TrackingEfforts | None = None) -> ControlLaw[Any]:
     """Return the law that these gains belong to."""
     if isinstance(gains, NmpcGains):
-        return NmpcLaw(robot, gains, inverse_dynamics)
+        return NmpcLaw(robot, gains, efforts)
     return PidLaw(robot, gains)
 
 

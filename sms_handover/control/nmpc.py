@@ -1,20 +1,16 @@
 """Closed-form nonlinear model predictive control of the reduced dynamics."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from sms_handover.control.base import ControlLaw, LinearFeedback
-from sms_handover.model.reduced import reduced_inverse_dynamics
+from sms_handover.control.computed_torque import ComputedTorque, TrackingEfforts
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.parameters import parameter
-from sms_handover.types import BASE_NQ, BASE_NV, Array
+from sms_handover.types import Array
 
 MAX_CONTROL_ORDER = 3
-
-InverseDynamics = Callable[[Array, Array, Array], Array]  # joint efforts (n,) of q, v, joint accelerations
 
 
 @dataclass(frozen=True)
@@ -46,14 +42,10 @@ class NmpcLaw(ControlLaw[NmpcGains]):
     a perfect model and unlimited efforts.
     """
 
-    def __init__(
-        self, robot: RobotModel, gains: NmpcGains, inverse_dynamics: InverseDynamics | None = None
-    ) -> None:
-        """Set up the law for a robot, by default with :func:`reduced_inverse_dynamics`."""
+    def __init__(self, robot: RobotModel, gains: NmpcGains, efforts: TrackingEfforts | None = None) -> None:
+        """Set up the law for a robot; ``efforts`` works its equation out, by default Pinocchio does."""
         self._robot = robot
-        self._inverse_dynamics = inverse_dynamics or partial(reduced_inverse_dynamics, robot)
-        self._errors = np.zeros((2, robot.n_joints))  # rows e, e'
-        self._error, self._error_rate = self._errors
+        self._efforts = efforts or ComputedTorque(robot)
         self.use(gains)
 
     def reset(self) -> None:
@@ -66,10 +58,7 @@ class NmpcLaw(ControlLaw[NmpcGains]):
 
     def effort(self, q: Array, v: Array, desired: Array, dt: float) -> Array:
         """Return the joint efforts (n,) N m, limited to what the joints can give; ``dt`` plays no part."""
-        np.subtract(q[BASE_NQ:], desired[0], out=self._error)
-        np.subtract(v[BASE_NV:], desired[1], out=self._error_rate)
-        wanted = desired[2] - self._feedback.dot(self._errors)  # q_d'' - A_1 e - A_2 e'
-        return self._robot.limited(self._inverse_dynamics(q, v, wanted))
+        return self._robot.limited(self._efforts(q, v, desired, self._feedback))
 
     def linearised(self, inertia: Array) -> LinearFeedback:
         """Return K_e = A_1 H*, K_v = A_2 H*, K_z = 0."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sms_handover.compiled.dynamics import CompiledInverseDynamics, CompiledStepper
+from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
 from sms_handover.control.controller import Gains, JointController
 from sms_handover.control.nmpc import NmpcGains
 from sms_handover.control.parameters import LAWS, ControllerParameters, gains_of
@@ -64,8 +64,8 @@ def make_controller(
     longest_ns = longest_reference_ns(common, parameters)
     gains = gains_by_phase(schedule, parameters)
     compiled = common.dynamics == COMPILED and isinstance(gains[0], NmpcGains)
-    inverse_dynamics = CompiledInverseDynamics(robot) if compiled else None
-    return JointController(robot, gains, common.tick_ns, start, longest_ns, inverse_dynamics)
+    efforts = CompiledComputedTorque(robot) if compiled else None
+    return JointController(robot, gains, common.tick_ns, start, longest_ns, efforts)
 
 
 def longest_reference_ns(common: CommonParameters, parameters: ControllerParameters) -> int:

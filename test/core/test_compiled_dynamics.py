@@ -12,7 +12,7 @@ import pytest
 
 from sms_handover.compiled import dynamics
 from sms_handover.compiled.compiler import library_of
-from sms_handover.compiled.dynamics import CompiledInverseDynamics, CompiledStepper
+from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
 from sms_handover.errors import ConfigurationError, MissingDependencyError, UnknownNameError
 from sms_handover.model.conserved import physics_receipt
 from sms_handover.model.description import load_robot
@@ -98,34 +98,42 @@ def test_a_base_that_turns_far_in_a_step_moves_on_its_screw(robot: RobotModel, t
     assert np.abs(compiled.step(q, v, effort)[0] - ours.step(q, v, effort)[0])[:BASE_NQ].max() < 1e-12
 
 
+def _desired(draw: Draw) -> Array:
+    return np.array([draw.joints(), *draw.random.uniform(-1.0, 1.0, (2, draw.robot.n_joints))])
+
+
 def test_joint_efforts_are_those_of_the_free_base(any_robot: RobotModel) -> None:
     """Against Pinocchio by two ways: eliminating the base from the forces, and from the matrix."""
-    draw, compiled = Draw(any_robot, seed=5), CompiledInverseDynamics(any_robot)
+    draw, compiled = Draw(any_robot, seed=5), CompiledComputedTorque(any_robot)
     for _ in range(20):
-        q, v, wanted = draw.q(), draw.v(), draw.vector(any_robot.n_joints)
-        found, reduced = compiled(q, v, wanted), reduced_dynamics(any_robot, q, v)
+        q, v, desired, gains = draw.q(), draw.v(), _desired(draw), np.array([7.0, 3.0])
+        error, error_rate = q[BASE_NQ:] - desired[0], v[BASE_NV:] - desired[1]
+        wanted = desired[2] - gains[0] * error - gains[1] * error_rate
+        found, reduced = compiled(q, v, desired, gains), reduced_dynamics(any_robot, q, v)
         assert _off(found, reduced_inverse_dynamics(any_robot, q, v, wanted)) < _ROUNDING
         assert _off(found, reduced.inertia @ wanted + reduced.bias) < _ROUNDING
 
 
 def test_joint_efforts_bring_about_what_was_asked_for(robot: RobotModel) -> None:
-    """The two libraries undo each other: rates grow by the accelerations asked for."""
+    """The two libraries undo each other: without an error rates grow by the accelerations desired."""
     draw, h = Draw(robot, seed=6), 1e-7  # s
-    efforts, stepper = CompiledInverseDynamics(robot), CompiledStepper(robot, TABLEAUS["rk4"], h)
+    efforts, stepper = CompiledComputedTorque(robot), CompiledStepper(robot, TABLEAUS["rk4"], h)
     for _ in range(5):
         q, v, wanted = draw.q(), draw.v(), draw.vector(robot.n_joints)
-        _, v_next = stepper.step(q, v, efforts(q, v, wanted))
+        desired = np.array([q[BASE_NQ:], v[BASE_NV:], wanted])
+        _, v_next = stepper.step(q, v, efforts(q, v, desired, np.array([1e3, 1e2])))
         assert (v_next - v)[BASE_NV:] / h == pytest.approx(wanted, abs=1e-4)
 
 
 def test_the_results_of_a_call_are_its_own(robot: RobotModel, draw: Draw) -> None:
     """What one tick gave does not change with the next, and cannot be changed."""
-    stepper, inverse = CompiledStepper(robot, TABLEAUS["rk4"], _TICK), CompiledInverseDynamics(robot)
+    stepper, torque = CompiledStepper(robot, TABLEAUS["rk4"], _TICK), CompiledComputedTorque(robot)
     q, v, effort = draw.q(), draw.v(), np.zeros(robot.n_joints)
-    first, efforts = stepper.step(q, v, effort), inverse(q, v, effort)
+    desired, gains = _desired(draw), np.ones(2)
+    first, efforts = stepper.step(q, v, effort), torque(q, v, desired, gains)
     kept = [array.copy() for array in (*first, efforts)]
     stepper.step(*first, effort)
-    inverse(*first, effort)
+    torque(*first, desired, gains)
     assert all(np.array_equal(a, b) for a, b in zip((*first, efforts), kept, strict=True))
     assert not any(array.flags.writeable for array in first)
 
@@ -163,9 +171,9 @@ def test_a_library_is_made_once(
 ) -> None:
     """That takes long enough to be told. Another run finds it and makes none."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    CompiledInverseDynamics(robot)
+    CompiledComputedTorque(robot)
     assert [record.message.split(":")[0] for record in caplog.records] == [
-        "compiling the joint efforts of this robot"
+        "compiling the computed torque of this robot"
     ]
     (library,) = (tmp_path / "sms_handover").iterdir()
     made = library.stat()
@@ -175,11 +183,11 @@ def test_a_library_is_made_once(
         raise AssertionError("asked for again")
 
     monkeypatch.setattr(dynamics, "_writer", refuse)
-    CompiledInverseDynamics(robot)
+    CompiledComputedTorque(robot)
     assert len(caplog.records) == 1
     assert (library.stat().st_ino, library.stat().st_mtime_ns) == (made.st_ino, made.st_mtime_ns)
     with pytest.raises(AssertionError, match="asked for again"):
-        CompiledInverseDynamics(_one_armed())
+        CompiledComputedTorque(_one_armed())
 
 
 def test_a_library_of_another_robot_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -193,15 +201,15 @@ def test_a_library_of_another_robot_is_not_used(monkeypatch: pytest.MonkeyPatch)
         return libraries[0]
 
     monkeypatch.setattr(dynamics, "library_of", remember)
-    CompiledInverseDynamics(wrong)
-    with pytest.raises(ConfigurationError, match=r"joint_efforts-\w+\.so are off Pinocchio's by .*: remove"):
-        CompiledInverseDynamics(RobotModel.load())
+    CompiledComputedTorque(wrong)
+    with pytest.raises(ConfigurationError, match=r"torque-\w+\.so are off Pinocchio's by .*: remove"):
+        CompiledComputedTorque(RobotModel.load())
 
 
 def test_without_a_compiler(robot: RobotModel, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CC", "no-such-compiler -m64")
     with pytest.raises(ConfigurationError, match="'no-such-compiler': install one, set CC to it, or take"):
-        CompiledInverseDynamics(robot)
+        CompiledComputedTorque(robot)
 
 
 def test_a_compiler_that_fails(robot: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -211,7 +219,7 @@ def test_a_compiler_that_fails(robot: RobotModel, tmp_path: Path, monkeypatch: p
     monkeypatch.setenv("CC", str(compiler))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     with pytest.raises(ConfigurationError, match=r"cc -O2 .* failed: no room left"):
-        CompiledInverseDynamics(robot)
+        CompiledComputedTorque(robot)
     assert [*(tmp_path / "sms_handover").iterdir()] == []
 
 
@@ -223,7 +231,7 @@ def test_without_casadi(robot: RobotModel, tmp_path: Path, monkeypatch: pytest.M
     with pytest.raises(
         MissingDependencyError, match=r"compiled dynamics need casadi.*sms_handover\[compiled\]"
     ):
-        CompiledInverseDynamics(robot)
+        CompiledComputedTorque(robot)
 
 
 def test_a_folder_that_others_can_write_to_is_not_used(
@@ -235,7 +243,7 @@ def test_a_folder_that_others_can_write_to_is_not_used(
     folder.mkdir()
     folder.chmod(0o777)
     with pytest.raises(ConfigurationError, match=r"has mode drwxrwxrwx: .* allowed is a folder of your own"):
-        CompiledInverseDynamics(robot)
+        CompiledComputedTorque(robot)
 
 
 def test_another_kind_of_dynamics_is_unknown() -> None:

@@ -221,6 +221,13 @@ BREAKS: tuple[Break, ...] = (
         "compiled_dynamics",
     ),
     _core(
+        "compiled: velocity error with the wrong gain",
+        "compiled/source",
+        "feedback[1] * error_rate",
+        "feedback[0] * error_rate",
+        "compiled_dynamics",
+    ),
+    _core(
         "compiled: a library is not held against Pinocchio",
         "compiled/dynamics",
         "if not apart <= _TOLERANCE:",
@@ -356,23 +363,23 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "NMPC error q_d - q",
-        "control/nmpc",
+        "control/computed_torque",
         "np.subtract(q[BASE_NQ:], desired[0], out",
         "np.subtract(desired[0], q[BASE_NQ:], out",
         "nmpc",
     ),
     _core(
         "desired acceleration left out",
-        "control/nmpc",
-        "wanted = desired[2] - self",
-        "wanted = 0.0 * desired[2] - self",
+        "control/computed_torque",
+        "wanted = desired[2] - feedback",
+        "wanted = 0.0 * desired[2] - feedback",
         "nmpc",
     ),
     _core(
         "NMPC efforts not limited",
         "control/nmpc",
-        "return self._robot.limited(self._inverse_dynamics(q, v, wanted))",
-        "return self._inverse_dynamics(q, v, wanted)",
+        "return self._robot.limited(self._efforts(q, v, desired, self._feedback))",
+        "return self._efforts(q, v, desired, self._feedback)",
         "nmpc",
     ),
     _core(

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sms_handover.compiled.dynamics import CompiledInverseDynamics, CompiledStepper
+from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
 from sms_handover.model.conserved import physics_receipt
 from sms_handover.model.description import load_robot
 from sms_handover.model.reduced import (
@@ -21,7 +21,7 @@ from sms_handover.model.reduced import (
     reduced_inverse_dynamics,
     tool_jacobian,
 )
-from sms_handover.model.robot_model import BASE_NV, RobotModel
+from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.integrators import Tableau
 from sms_handover.types import Array
 from test.core.robots import someone_else
@@ -181,7 +181,7 @@ def test_compiled_dynamics(
     """The C code solves the same equations: v' from one step of Euler's scheme, and the efforts of NMPC."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     h = 1.0  # [s] v' is then what v grows by
-    stepper, efforts = CompiledStepper(pair.robot, _EULER_SCHEME, h), CompiledInverseDynamics(pair.robot)
+    stepper, efforts = CompiledStepper(pair.robot, _EULER_SCHEME, h), CompiledComputedTorque(pair.robot)
     random = np.random.default_rng(4)
     worst_cond = 0.0
 
@@ -193,7 +193,8 @@ def test_compiled_dynamics(
         right = np.concatenate([np.zeros(BASE_NV), torque]) - motion.bias
         expected = np.asarray(np.linalg.solve(motion.inertia, right), dtype=np.float64)
         found = (stepper.step(q_pin, v, torque)[1] - v) / h
-        effort = efforts(q_pin, v, expected[BASE_NV:])
+        desired = np.array([q_pin[BASE_NQ:], v[BASE_NV:], expected[BASE_NV:]])  # no error of tracking
+        effort = efforts(q_pin, v, desired, np.ones(2))
         worst_cond = max(worst_cond, _cond(motion.inertia))
         return _relative(found / weights, expected / weights), _relative(effort, torque)
 
