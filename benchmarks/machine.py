@@ -6,7 +6,18 @@ from collections.abc import Iterable
 from importlib import metadata
 from pathlib import Path
 
-PACKAGES = ("numpy", "pin", "mcap", "rosbags", "ros-jazzy-rclpy", "mujoco", "mink", "drake", "pin-pink")
+PACKAGES = (
+    "numpy",
+    "pin",
+    "casadi",
+    "mcap",
+    "rosbags",
+    "ros-jazzy-rclpy",
+    "mujoco",
+    "mink",
+    "drake",
+    "pin-pink",
+)
 
 
 def machine() -> list[str]:
