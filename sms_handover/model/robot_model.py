@@ -115,6 +115,13 @@ class RobotModel:
         )
         return twist_of(motion)
 
+    def tool_motion(self, q: Array, v: Array, arm: str) -> tuple[Pose, Twist]:
+        """Return pose and twist of a tool in ``world`` by one forward kinematics."""
+        pin.forwardKinematics(self.pin, self.data, q, v)
+        frame_id, aligned = self.tool_frame_id[arm], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        placement = pin.updateFramePlacement(self.pin, self.data, frame_id)
+        return pose_of(placement), twist_of(pin.getFrameVelocity(self.pin, self.data, frame_id, aligned))
+
     def integrate_base(self, base_in_world: Pose, twist_base_in_base: Array, duration: float) -> Pose:
         """Return the base pose after a constant body twist (6,) over ``duration`` s."""
         return pose_of(se3_of(base_in_world) * pin.exp6(pin.Motion(twist_base_in_base * duration)))

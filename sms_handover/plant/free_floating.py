@@ -163,8 +163,7 @@ class FreeFloatingPlant:
         """Bring a held deputy to where its tool is now."""
         holder = self._deputy.holder
         if holder:
-            twist = self._robot.tool_twist_in_world(self.q, self.v, holder)
-            self._deputy.follow(self.tools_in_world[holder], twist)
+            self._deputy.follow(*self._robot.tool_motion(self.q, self.v, holder))
 
     def _check_start(self) -> None:
         """Raise ConfigurationError where a joint starts outside its limits."""
