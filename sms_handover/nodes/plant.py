@@ -217,7 +217,7 @@ class PlantNode(GraphNode[PlantParameters]):
         """
         with_reference = self._plant.tick % self._per_reference == 0
         self._needed = _PHASE_AND_COMMAND if with_reference else _COMMAND
-        self._outputs.publish_loop(self._plant, with_reference=with_reference)
+        self._outputs.publish_loop(self._plant, with_reference=with_reference, lockstep=self.lockstep)
         self._loop_clock.published()
         self._outputs.publish_rest(self._plant, with_reference=with_reference)
 
@@ -229,7 +229,8 @@ class PlantNode(GraphNode[PlantParameters]):
         tick = self._plant.tick
         waiting = self.active and tick == self._silent_tick and not self._ahead_of_recorder
         if waiting and not self._control.holds:
-            self._outputs.publish_loop(self._plant, with_reference=self._needed is _PHASE_AND_COMMAND)
+            with_reference = self._needed is _PHASE_AND_COMMAND
+            self._outputs.publish_loop(self._plant, with_reference=with_reference, lockstep=self.lockstep)
         self._silent_tick = tick
 
     def _look_for_answer(self) -> None:

@@ -41,20 +41,27 @@ class PlantOutputs:
         self._pose_wire, self._vector_wire = PoseWire(WORLD), vector_wire(WORLD)
         self._energy_wire = energy_wire(WORLD)
 
-    def publish_loop(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
+    def publish_loop(self, plant: FreeFloatingPlant, *, with_reference: bool, lockstep: bool) -> None:
         """Publish what the other nodes of the loop wait for.
 
-        At a reference period what the trajectory waits for goes first, because more has to be done with it.
+        At a reference period in lock step what the trajectory waits for goes first, because more has to be
+        done with it. In real time the controller is the one who must not wait.
         """
         publish = self._publish
         joints, odometry = self._state_wire.pack_arrays(plant.stamp_ns, plant.q, plant.v, plant.joint_effort)
-        if with_reference:
-            deputy = pose_row(plant.deputy.deputy_in_world)
-            publish[SAMPLED_JOINT_STATES](joints)
-            publish[SAMPLED_BASE_ODOMETRY](odometry)
-            publish[DEPUTY_POSE](self._pose_wire.pack(plant.stamp_ns, deputy))
+        if with_reference and lockstep:
+            self._publish_sample(plant, joints, odometry)
         publish[JOINT_STATES](joints)
         publish[BASE_ODOMETRY](odometry)
+        if with_reference and not lockstep:
+            self._publish_sample(plant, joints, odometry)
+
+    def _publish_sample(self, plant: FreeFloatingPlant, joints: bytes, odometry: bytes) -> None:
+        """Publish what the trajectory waits for: the state of a reference period, and the deputy."""
+        publish = self._publish
+        publish[SAMPLED_JOINT_STATES](joints)
+        publish[SAMPLED_BASE_ODOMETRY](odometry)
+        publish[DEPUTY_POSE](self._pose_wire.pack(plant.stamp_ns, pose_row(plant.deputy.deputy_in_world)))
 
     def publish_rest(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
         """Publish what nobody in the loop waits for: tools, momenta, energy, the clock."""
