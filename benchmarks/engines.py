@@ -122,7 +122,7 @@ def draw(points: Mapping[str, list[Point]]) -> None:
         ylabel="largest error of a joint in 60 s [rad]",
     )
     axes.grid(True, which="major", alpha=0.3)
-    axes.legend()
+    axes.legend(loc="center right", bbox_to_anchor=(1.0, 0.7))  # where no label is
     DIAGRAMS.mkdir(parents=True, exist_ok=True)
     figure.savefig(DIAGRAMS / DIAGRAM, metadata={"Date": None}, bbox_inches="tight")
 
