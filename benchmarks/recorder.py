@@ -20,6 +20,8 @@ from sms_handover.topics import TF, graph_topics
 
 COUNT = 60_000  # messages, as of one topic of a whole run
 ROUNDS = 5
+TOPICS = (1, 10, 100)
+BARE = "mcap.writer.Writer, one topic"
 _TICK_NS = 1_000_000
 _TYPE = "sensor_msgs/msg/JointState"
 
@@ -48,12 +50,18 @@ def bare(path: Path, data: list[bytes]) -> None:
         writer.finish()  # type: ignore[no-untyped-call]
 
 
-def recorded(path: Path, data: list[bytes]) -> None:
-    """Record as the recorder node does: stamps read, losses booked, nothing held back longer than 20 ms."""
+def recorded(path: Path, data: list[bytes], topics: int) -> None:
+    """Record as the recorder node does: stamps read, losses booked, nothing held back longer than 20 ms.
+
+    Each tick brings a message of every topic; there are as many messages in all, whatever their number.
+    """
+    names = [f"/joint_states_{number}" for number in range(topics)]
     with Recording(path) as recording:
-        recording.add_topic("/joint_states", _TYPE, (), _TICK_NS)
-        for message in data:
-            recording.receive("/joint_states", message, 0)
+        for name in names:
+            recording.add_topic(name, _TYPE, (), _TICK_NS)
+        for message in data[: COUNT // topics]:
+            for name in names:
+                recording.receive(name, message, 0)
     assert recording.ledger.complete
 
 
@@ -67,24 +75,25 @@ def cpu(write: Callable[[], None]) -> float:
 def main() -> None:
     """Measure and publish."""
     data = messages()
-    times: dict[str, list[float]] = {"mcap.writer.Writer": [], "our recording": []}
+    ours = {f"our recording, topics: {topics}": topics for topics in TOPICS}
+    times: dict[str, list[float]] = {name: [] for name in (BARE, *ours)}
     with TemporaryDirectory() as folder:
         for number in range(ROUNDS):
-            file, bag = Path(folder) / f"{number}.mcap", Path(folder) / f"{number}"
-            times["mcap.writer.Writer"].append(cpu(partial(bare, file, data)))
-            times["our recording"].append(cpu(partial(recorded, bag, data)))
-        written = sum(1 for _ in read_messages(bag, {"/joint_states"}))
-    assert written == COUNT
-    least = min(times["mcap.writer.Writer"])
+            times[BARE].append(cpu(partial(bare, Path(folder) / f"{number}.mcap", data)))
+            for name, topics in ours.items():
+                bag = Path(folder) / f"{number}_{topics}"
+                times[name].append(cpu(partial(recorded, bag, data, topics)))
+                assert sum(1 for _ in read_messages(bag)) == COUNT
+    least = min(times[BARE])
     rows = [row(n, 1e6 * min(each), 1.0 / min(each), min(each) / least) for n, each in times.items()]
-    topics = len(graph_topics(("arm_a", "arm_b"))) + 1
+    in_graph = len(graph_topics(("arm_a", "arm_b"))) + 1
     publish(
         Result(
             name="recorder",
             question="What does recording cost?",
             notes=[
                 f"{COUNT} JointState messages of {len(data[0])} bytes, the least CPU time of {ROUNDS} "
-                f"rounds in turn. The bag of the graph has {topics} topics, {TF} among them."
+                f"rounds in turn. The bag of the graph has {in_graph} topics, {TF} among them."
             ],
             tables=[Table(("writer", "CPU per message [us]", "messages/s", "times the bare one"), rows)],
         )
