@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sms_handover.errors import ConfigurationError
 from sms_handover.types import Array
 
 _SIZES = 4  # that a generated function tells: arguments, results, integers and numbers of work space
@@ -21,14 +22,18 @@ class CFunction:
     def __init__(
         self, library: Path, name: str, arguments: Sequence[Array], results: Sequence[Array]
     ) -> None:
-        """Load the library; raises OSError or AttributeError if it has no such function."""
-        loaded = ctypes.PyDLL(str(library))
+        """Load the library; raises ConfigurationError if it has no such function."""
+        try:
+            loaded = ctypes.PyDLL(str(library))
+            call, work_space = loaded[name], loaded[f"{name}_work"]
+        except (OSError, AttributeError) as error:
+            raise ConfigurationError(f"cannot load {library}: {error}; remove the file") from error
         sizes = [ctypes.c_longlong() for _ in range(_SIZES)]
-        loaded[f"{name}_work"](*(ctypes.byref(size) for size in sizes))
+        work_space(*(ctypes.byref(size) for size in sizes))
         n_arguments, n_results, _, n_work = (size.value for size in sizes)
         work = np.zeros(max(1, n_work))
         self._kept = (*arguments, *results, work)
-        self._call = loaded[name]
+        self._call = call
         self._arguments = (ctypes.c_void_p * n_arguments)(*(array.ctypes.data for array in arguments))
         self._results = (ctypes.c_void_p * n_results)(*(array.ctypes.data for array in results))
         self._work = ctypes.c_void_p(work.ctypes.data)

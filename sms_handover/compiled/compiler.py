@@ -17,7 +17,7 @@ from sms_handover.errors import ConfigurationError
 _LOG = logging.getLogger(__name__)
 # No fused or reordered operations: what machines then differ in is what their sine and cosine round.
 _FLAGS = ("-O2", "-march=native", "-ffp-contract=off", "-fPIC", "-shared")
-_TIMEOUT_S = 600.0  # [s] a robot of 4 arms takes 10
+_TIMEOUT_S = 600.0  # [s] for a compiler that hangs; it takes a few seconds
 _TELLING = ("model name", "flags", "CPU part", "Features")  # of /proc/cpuinfo, on x86 and on ARM
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
@@ -60,9 +60,7 @@ def _machine(command: list[str]) -> str:
         cpu = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").partition("\n\n")[0]
     except (OSError, subprocess.SubprocessError):
         return platform.platform()
-    kept = (
-        line for line in cpu.splitlines() if line.startswith(("model name", "flags", "Features", "CPU part"))
-    )
+    kept = (line for line in cpu.splitlines() if line.startswith(_TELLING))
     return "\n".join((platform.platform(), version, *kept))
 
 
@@ -85,18 +83,18 @@ def _own_folder() -> Path:
 
 def _compile(command: list[str], source: str, library: Path) -> None:
     """Make a library and put it into its place at once, so that nobody meets half of one."""
-    with tempfile.TemporaryDirectory(dir=library.parent) as scratch:
-        code, made = Path(scratch) / "dynamics.c", Path(scratch) / "dynamics.so"
-        code.write_text(source, encoding="ascii")
-        call = [*command, *_FLAGS, str(code), "-o", str(made), "-lm"]
-        try:
+    try:
+        with tempfile.TemporaryDirectory(dir=library.parent) as scratch:
+            code, made = Path(scratch) / "dynamics.c", Path(scratch) / "dynamics.so"
+            code.write_text(source, encoding="ascii")
+            call = [*command, *_FLAGS, str(code), "-o", str(made), "-lm"]
             done = _run(call)
-        except (OSError, subprocess.SubprocessError) as error:
-            raise ConfigurationError(f"{shlex.join(call)} failed: {error}") from error
-        if done.returncode:
-            reason = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[0]
-            raise ConfigurationError(f"{shlex.join(call)} failed: {reason}")
-        made.replace(library)
+            if done.returncode:
+                reason = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[0]
+                raise ConfigurationError(f"{shlex.join(call)} failed: {reason}")
+            made.replace(library)
+    except (OSError, subprocess.SubprocessError) as error:
+        raise ConfigurationError(f"cannot make {library}: {error}") from error
 
 
 def _run(command: list[str]) -> "subprocess.CompletedProcess[str]":

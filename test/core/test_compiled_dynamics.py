@@ -206,6 +206,25 @@ def test_a_library_of_another_robot_is_not_used(monkeypatch: pytest.MonkeyPatch)
         CompiledComputedTorque(RobotModel.load())
 
 
+def test_a_damaged_library_is_named(
+    robot: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    library = tmp_path / "damaged.so"
+    library.write_bytes(b"none")
+    monkeypatch.setattr(dynamics, "library_of", lambda *arguments: library)
+    with pytest.raises(ConfigurationError, match=r"cannot load .*damaged\.so: .*; remove the file"):
+        CompiledComputedTorque(robot)
+
+
+def test_a_folder_that_cannot_be_written_to(
+    robot: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "sms_handover").write_text("a file", encoding="ascii")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with pytest.raises(ConfigurationError, match=r"cannot keep compiled dynamics in .*: File exists"):
+        CompiledComputedTorque(robot)
+
+
 def test_without_a_compiler(robot: RobotModel, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CC", "no-such-compiler -m64")
     with pytest.raises(ConfigurationError, match="'no-such-compiler': install one, set CC to it, or take"):
