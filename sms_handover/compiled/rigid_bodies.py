@@ -41,6 +41,7 @@ class RigidBodies:
     def __init__(self, bodies: Sequence[Body], angles: Expression, v: Expression) -> None:
         """Work out the frames of the bodies and their twists."""
         self._bodies = bodies
+        self._rigids = [_Rigid(body.mass, ca.SX(body.first_moment), ca.SX(body.inertia)) for body in bodies]
         self._rates = [v[BASE_NV + joint] for joint in range(len(bodies) - 1)]
         self._rotations = [ca.SX.eye(3)]  # of each body in its parent
         self._twists = [(v[:3], v[3:BASE_NV])]
@@ -84,9 +85,7 @@ class RigidBodies:
 
     def _composed(self) -> list[_Rigid]:
         """Return for each body what it and all that it carries have as one."""
-        composites = [
-            _Rigid(body.mass, ca.SX(body.first_moment), ca.SX(body.inertia)) for body in self._bodies
-        ]
+        composites = list(self._rigids)
         for index in range(len(self._bodies) - 1, 0, -1):
             body, own, rotation = self._bodies[index], composites[index], self._rotations[index]
             below, place = composites[body.parent], ca.SX(body.place)
@@ -112,7 +111,7 @@ class RigidBodies:
                 moved += ca.cross(linear, axis) * rate
                 turned += ca.cross(angular, axis) * rate + axis * joint_acceleration[index - 1]
                 accelerations.append((moved, turned))
-            rigid = _Rigid(body.mass, ca.SX(body.first_moment), ca.SX(body.inertia))
+            rigid = self._rigids[index]
             momentum, spin = rigid.wrench(linear, angular)
             force, moment = rigid.wrench(*accelerations[index])
             force += ca.cross(angular, momentum)

@@ -7,7 +7,7 @@ import casadi as ca
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV
 from sms_handover.plant.integrators import Tableau
 
-_SMALL = 1e-3  # [rad^2] below, four terms of a series leave less than rounding
+_SMALL = 1e-3  # [rad^2] below, five terms of a series leave less than rounding
 
 
 def step_function(name: str, acceleration: Any, tableau: Tableau, joints: int) -> Any:
@@ -31,7 +31,7 @@ def step_function(name: str, acceleration: Any, tableau: Tableau, joints: int) -
         motion = h * _sum(row, velocities)
         pose, angles = move(pose, motion[:BASE_NV]), angles + motion[BASE_NV:]
     total = [sum(weights) for weights in zip(*tableau.b, strict=True)]
-    return ca.Function("step", [q, v, u, h], [ca.vertcat(pose, angles), v + h * _sum(total, accelerations)])
+    return ca.Function(name, [q, v, u, h], [ca.vertcat(pose, angles), v + h * _sum(total, accelerations)])
 
 
 def _sum(weights: Any, values: list[Any]) -> Any:
