@@ -165,7 +165,7 @@ class PlantNode(GraphNode[PlantParameters]):
         """Make publishers, subscriptions and services."""
         names = [GRASP_EVENT, ROBOT_DESCRIPTION, DEPUTY_MARKER, RUN_STATE, LOOP_TIMING]
         self._publish = {name: self.endpoints.publisher(name) for name in names}
-        self._outputs = PlantOutputs(self.robot, self.endpoints.publisher)
+        self._outputs = PlantOutputs(self.robot, self.endpoints.publisher, lockstep=self.lockstep)
         self.receive(TASK_PHASE, self._on_phase, self._phase_wire.checked)
         self.receive(JOINT_COMMAND, self._on_command, self._command_wire.checked)
         self.receive(RUN_RECORDED, self._on_recorded, stamped)
@@ -217,7 +217,7 @@ class PlantNode(GraphNode[PlantParameters]):
         """
         with_reference = self._plant.tick % self._per_reference == 0
         self._needed = _PHASE_AND_COMMAND if with_reference else _COMMAND
-        self._outputs.publish_loop(self._plant, with_reference=with_reference, lockstep=self.lockstep)
+        self._outputs.publish_loop(self._plant, with_reference=with_reference)
         self._loop_clock.published()
         self._outputs.publish_rest(self._plant, with_reference=with_reference)
 
@@ -229,8 +229,7 @@ class PlantNode(GraphNode[PlantParameters]):
         tick = self._plant.tick
         waiting = self.active and tick == self._silent_tick and not self._ahead_of_recorder
         if waiting and not self._control.holds:
-            with_reference = self._needed is _PHASE_AND_COMMAND
-            self._outputs.publish_loop(self._plant, with_reference=with_reference, lockstep=self.lockstep)
+            self._outputs.publish_loop(self._plant, with_reference=self._needed is _PHASE_AND_COMMAND)
         self._silent_tick = tick
 
     def _look_for_answer(self) -> None:

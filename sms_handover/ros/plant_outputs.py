@@ -33,15 +33,18 @@ _PERIOD = (LINEAR_MOMENTUM, ANGULAR_MOMENTUM, ENERGY)
 class PlantOutputs:
     """The publishers of the plant's state, and the layout of their messages."""
 
-    def __init__(self, robot: RobotModel, publisher: Callable[[str], CountedPublisher]) -> None:
+    def __init__(
+        self, robot: RobotModel, publisher: Callable[[str], CountedPublisher], *, lockstep: bool
+    ) -> None:
         """Make the publishers; ``publisher`` returns the one of a topic."""
+        self._lockstep = lockstep
         names = (*_LOOP, *_PERIOD, CLOCK, *(tool_pose(arm) for arm in robot.arms))
         self._publish: dict[str, Callable[[Any], None]] = {name: publisher(name).publish for name in names}
         self._state_wire = StateWire(robot.joint_names, WORLD, BASE)
         self._pose_wire, self._vector_wire = PoseWire(WORLD), vector_wire(WORLD)
         self._energy_wire = energy_wire(WORLD)
 
-    def publish_loop(self, plant: FreeFloatingPlant, *, with_reference: bool, lockstep: bool) -> None:
+    def publish_loop(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
         """Publish what the other nodes of the loop wait for.
 
         At a reference period in lock step what the trajectory waits for goes first, because more has to be
@@ -49,11 +52,11 @@ class PlantOutputs:
         """
         publish = self._publish
         joints, odometry = self._state_wire.pack_arrays(plant.stamp_ns, plant.q, plant.v, plant.joint_effort)
-        if with_reference and lockstep:
+        if with_reference and self._lockstep:
             self._publish_sample(plant, joints, odometry)
         publish[JOINT_STATES](joints)
         publish[BASE_ODOMETRY](odometry)
-        if with_reference and not lockstep:
+        if with_reference and not self._lockstep:
             self._publish_sample(plant, joints, odometry)
 
     def _publish_sample(self, plant: FreeFloatingPlant, joints: bytes, odometry: bytes) -> None:

@@ -45,9 +45,8 @@ def test_who_is_told_first(lockstep: bool, with_reference: bool, expected: list[
 
         return SimpleNamespace(publish=publish)
 
-    PlantOutputs(scenario.robot, publisher).publish_loop(
-        plant, with_reference=with_reference, lockstep=lockstep
-    )
+    outputs = PlantOutputs(scenario.robot, publisher, lockstep=lockstep)
+    outputs.publish_loop(plant, with_reference=with_reference)
     assert order == expected
     if with_reference:
         assert told[JOINT_STATES] == told[SAMPLED_JOINT_STATES]
