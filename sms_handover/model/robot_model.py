@@ -107,16 +107,8 @@ class RobotModel:
             if frame.type == pin.FrameType.BODY
         }
 
-    def tool_twist_in_world(self, q: Array, v: Array, arm: str) -> Twist:
-        """Return the twist of a tool: of its origin, in the axes of ``world``."""
-        pin.forwardKinematics(self.pin, self.data, q, v)
-        motion = pin.getFrameVelocity(
-            self.pin, self.data, self.tool_frame_id[arm], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        )
-        return twist_of(motion)
-
     def tool_motion(self, q: Array, v: Array, arm: str) -> tuple[Pose, Twist]:
-        """Return pose and twist of a tool in ``world`` by one forward kinematics."""
+        """Return pose and twist of a tool: of its origin, in the axes of ``world``."""
         pin.forwardKinematics(self.pin, self.data, q, v)
         frame_id, aligned = self.tool_frame_id[arm], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         placement = pin.updateFramePlacement(self.pin, self.data, frame_id)

@@ -125,8 +125,9 @@ class FreeFloatingPlant:
         if not commands:
             return ()
         self._deputy_follow()
-        tools = self.tools_in_world
-        twists = {arm: self._robot.tool_twist_in_world(self.q, self.v, arm) for arm in tools}
+        motions = {arm: self._robot.tool_motion(self.q, self.v, arm) for arm in self._robot.arms}
+        tools = {arm: pose for arm, (pose, _) in motions.items()}
+        twists = {arm: twist for arm, (_, twist) in motions.items()}
         return tuple(
             answer(command, self._deputy, tools, twists, self._tolerance, self.stamp_ns)
             for command in commands

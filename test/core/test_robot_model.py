@@ -170,7 +170,7 @@ def test_tool_twist_is_the_rate_of_its_pose(robot: RobotModel, draw: Draw) -> No
     """The linear part moves the tool's origin, the angular part turns its axes, both in ``world`` axes."""
     for arm in robot.arms:
         q, v = draw.q(), draw.v()
-        twist = robot.tool_twist_in_world(q, v, arm)
+        _, twist = robot.tool_motion(q, v, arm)
         before = _walk(robot, _along(robot, q, v, -FD_STEP))[1][arm]
         after = _walk(robot, _along(robot, q, v, FD_STEP))[1][arm]
         rate = (after - before) / (2.0 * FD_STEP)
