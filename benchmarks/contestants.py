@@ -11,11 +11,8 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 
 from benchmarks.handover_task import HandoverTask, NmpcTracker, State
 from benchmarks.mujoco_model import MujocoRobot, rotation_matrix
-from sms_handover.compiled.dynamics import CompiledStepper
 from sms_handover.plant.integrators import Tableau
-from sms_handover.plant.stepper import PinocchioStepper
-from sms_handover.simulation.parameters import COMPILED
-from sms_handover.simulation.wiring import make_controller, make_plant
+from sms_handover.simulation.wiring import make_controller, make_plant, make_stepper
 from sms_handover.types import BASE_NQ, BASE_NV, Array
 
 
@@ -26,10 +23,9 @@ class Ours:
         """Integrate each tick by a scheme in some steps."""
         parameters, robot, schedule = task.scenario.parameters, task.scenario.robot, task.scenario.schedule
         common = replace(parameters.common, dynamics=dynamics)
-        stepper = CompiledStepper if dynamics == COMPILED else PinocchioStepper
         short = replace(common, tick=task.tick_s / steps)
         self._plant = make_plant(robot, schedule, short, parameters.plant)
-        self._plant._stepper = stepper(robot, tableau, short.tick)
+        self._plant._stepper = make_stepper(robot, dynamics, tableau, short.tick)
         self._controller = make_controller(robot, schedule, common, parameters.controller)
         self._task, self._steps = task, steps
         self._ticks, self._tick_ns = parameters.common.ticks_per_reference, parameters.common.tick_ns

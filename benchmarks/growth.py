@@ -9,17 +9,18 @@ import numpy as np
 
 from benchmarks.results import Result, Table, publish, row
 from benchmarks.timing import interleaved
-from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
 from sms_handover.control.controller import JointController
 from sms_handover.control.nmpc import NmpcGains
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
 from sms_handover.plant.integrators import TABLEAUS
 from sms_handover.share import config_file
-from sms_handover.simulation.parameters import COMPILED, DYNAMICS
+from sms_handover.simulation.parameters import DYNAMICS
 from sms_handover.simulation.scenario import load_parameters, load_scenario
 from sms_handover.simulation.simulate import simulate
+from sms_handover.simulation.wiring import make_efforts, make_stepper
 from sms_handover.types import JointReference, Pose
+from sms_handover.units import ns_to_seconds
 
 ROUNDS = 25
 TICKS = 50  # per round and robot
@@ -53,11 +54,10 @@ def robot_with(arms: int, folder: Path) -> RobotModel:
 def ticks_of(robot: RobotModel, dynamics: str) -> Callable[[], None]:
     """Return what lets a robot under NMPC go through ticks of 1 ms towards a reference."""
     joints, parameters = np.tile(BENT, len(robot.arms)), load_parameters().plant
-    compiled = dynamics == COMPILED
-    stepper = CompiledStepper(robot, TABLEAUS[parameters.integrator], 1e-9 * TICK_NS) if compiled else None
+    stepper = make_stepper(robot, dynamics, TABLEAUS[parameters.integrator], ns_to_seconds(TICK_NS))
     plant = FreeFloatingPlant(robot, parameters, InitialState(HOME, joints, HOME, {}), TICK_NS, stepper)
     start = robot.configuration(HOME, joints)
-    efforts = CompiledComputedTorque(robot) if compiled else None
+    efforts = make_efforts(robot, dynamics)
     controller = JointController(robot, [NmpcGains(1.0, 0)], TICK_NS, start, efforts=efforts)
     controller.track(JointReference(0, joints + 0.1, np.zeros_like(joints)))
 

@@ -3,14 +3,16 @@
 import numpy as np
 
 from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
+from sms_handover.control.computed_torque import ComputedTorque, TrackingEfforts
 from sms_handover.control.controller import Gains, JointController
 from sms_handover.control.nmpc import NmpcGains
 from sms_handover.control.parameters import LAWS, ControllerParameters, gains_of
 from sms_handover.errors import UnknownNameError
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
-from sms_handover.plant.integrators import TABLEAUS
+from sms_handover.plant.integrators import TABLEAUS, Tableau
 from sms_handover.plant.parameters import PlantParameters
+from sms_handover.plant.stepper import PinocchioStepper, Stepper
 from sms_handover.simulation.parameters import COMPILED, CommonParameters
 from sms_handover.trajectory.schedule import Schedule
 from sms_handover.types import Array
@@ -35,10 +37,20 @@ def make_plant(
         schedule.deputy.deputy_in_world,
         dict(schedule.deputy.grasp_frames),
     )
-    stepper = None
-    if common.dynamics == COMPILED:
-        stepper = CompiledStepper(robot, TABLEAUS[parameters.integrator], ns_to_seconds(common.tick_ns))
+    tableau = TABLEAUS[parameters.integrator]
+    stepper = make_stepper(robot, common.dynamics, tableau, ns_to_seconds(common.tick_ns))
     return FreeFloatingPlant(robot, parameters, initial, common.tick_ns, stepper)
+
+
+def make_stepper(robot: RobotModel, dynamics: str, tableau: Tableau, h: float) -> Stepper:
+    """Return what advances the robot by steps of ``h`` s; raises ConfigurationError."""
+    kind = CompiledStepper if dynamics == COMPILED else PinocchioStepper
+    return kind(robot, tableau, h)
+
+
+def make_efforts(robot: RobotModel, dynamics: str) -> TrackingEfforts:
+    """Return what works out computed torque; raises ConfigurationError."""
+    return CompiledComputedTorque(robot) if dynamics == COMPILED else ComputedTorque(robot)
 
 
 def gains_by_phase(schedule: Schedule, parameters: ControllerParameters) -> tuple[Gains, ...]:
@@ -63,8 +75,7 @@ def make_controller(
     start = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
     longest_ns = longest_reference_ns(common, parameters)
     gains = gains_by_phase(schedule, parameters)
-    compiled = common.dynamics == COMPILED and isinstance(gains[0], NmpcGains)
-    efforts = CompiledComputedTorque(robot) if compiled else None
+    efforts = make_efforts(robot, common.dynamics) if isinstance(gains[0], NmpcGains) else None
     return JointController(robot, gains, common.tick_ns, start, longest_ns, efforts)
 
 
