@@ -117,18 +117,24 @@ def inputs(rest: Rest, stamp: int, seed: int) -> tuple[RobotState, JointReferenc
     return state, reference, TaskPhase(stamp, index, rest.scenario.schedule.phases[index].name)
 
 
+def answered_as(rest: Rest, expected: JointController, number: int, *order: str) -> RobotState:
+    """Send all inputs of a stamp; the command is what a controller called by hand gives, bit for bit."""
+    state, reference, phase = inputs(rest, number * REFERENCE_NS, number)
+    rest.send(rest.messages(state, reference, phase), *order)
+    rest.wait_for(number + 1)
+    expected.enter(phase)
+    expected.track(reference)
+    assert rest.efforts()[-1].tobytes() == expected.step(state).effort.tobytes()
+    return state
+
+
 @pytest.mark.parametrize("law", ["nmpc", "pid"])
 def test_any_order_of_arrival_gives_the_same_command(bench: Bench, law: str) -> None:
     """Each stamp in another of the 24 orders, from the first to the last phase."""
     rest = Rest(bench, law=law)
     expected = rest.by_hand()
     for number, order in enumerate(permutations(INPUTS)):
-        state, reference, phase = inputs(rest, number * REFERENCE_NS, number)
-        rest.send(rest.messages(state, reference, phase), *order)
-        rest.wait_for(number + 1)
-        expected.enter(phase)
-        expected.track(reference)
-        assert rest.efforts()[-1].tobytes() == expected.step(state).effort.tobytes()
+        state = answered_as(rest, expected, number, *order)
         assert stamp_ns(rest.commands[-1]) == state.stamp_ns
     assert len(rest.commands) == 24
     assert rest.node.diagnostic_values() == {"law": law, "answered": 24, "late": 0}
@@ -203,12 +209,7 @@ def test_a_first_reference_that_comes_again_late_changes_nothing(bench: Bench) -
     rest = Rest(bench, law="pid")
     expected = rest.by_hand()
     for number in range(4):
-        state, reference, phase = inputs(rest, number * REFERENCE_NS, number)
-        rest.send(rest.messages(state, reference, phase), *INPUTS)
-        rest.wait_for(number + 1)
-        expected.enter(phase)
-        expected.track(reference)
-        assert rest.efforts()[-1].tobytes() == expected.step(state).effort.tobytes()
+        answered_as(rest, expected, number, *INPUTS)
         rest.send(rest.messages(*inputs(rest, 0, 0)), TASK_PHASE, JOINT_REFERENCE)
 
 
