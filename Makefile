@@ -5,6 +5,7 @@ RUNS ?= runs
 FIGURES ?= figures
 REPORT ?= report
 FUZZ_SECONDS ?= 600
+TEST_SECONDS ?= 600
 MEASURED := build/verification
 SITE := build/docs/html
 
@@ -35,8 +36,8 @@ report: install  ## write an HTML page on the runs of `make handover`
 simulate: install  ## the same handover in one process, without DDS or a recording
 	$(BIN)/sms-handover simulate
 
-test: lint  ## check style and types, then run every test but those of verify
-	$(BIN)/python -m pytest
+test: lint  ## check style and types, then run every test but those of verify, none longer than TEST_SECONDS
+	$(BIN)/python -m pytest --timeout $(TEST_SECONDS) --durations 20
 
 verify: $(VENV)/.verify  ## measure against independent answers, break every law on purpose, write docs/verification.md
 	@mkdir -p $(MEASURED)

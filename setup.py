@@ -95,6 +95,7 @@ setup(
             "playwright>=1.50,<2",  # drives a Chromium that the machine has
             "pyarrow>=18,<27",
             "pytest>=8.4",
+            "pytest-timeout>=2.4,<3",
             "rerun-sdk>=0.41,<0.42",  # another reader of our bags
             "ruff>=0.6",
             "types-PyYAML",

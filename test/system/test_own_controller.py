@@ -19,7 +19,7 @@ from sms_handover.simulation.simulate import simulate
 from sms_handover.types import GraspStatus
 
 from .conftest import TICKS
-from .runs import Ended, running, sms_handover
+from .runs import DEADLINE_S, Ended, running, sms_handover
 
 pytestmark = pytest.mark.system
 
@@ -128,8 +128,10 @@ def test_it_can_be_started_by_hand(schedule: Path, tmp_path: Path) -> None:
         by_hand = subprocess.Popen([sys.executable, "-m", NODES["bare"]], env=environment)
         try:
             assert run.end() == 0, run.text
-        finally:
             by_hand.terminate()
+            assert by_hand.wait(DEADLINE_S) == 0
+        finally:
+            by_hand.kill()
             by_hand.wait()
     assert read_run(tmp_path / "mine" / "bag").tick_ns.size == 101
 

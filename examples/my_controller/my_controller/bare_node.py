@@ -14,7 +14,7 @@ import pinocchio as pin
 import rclpy
 from geometry_msgs.msg import Point, PoseStamped, Quaternion, Vector3
 from nav_msgs.msg import Odometry
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
@@ -24,6 +24,7 @@ Array = npt.NDArray[np.float64]
 
 ARMS = ("arm_a", "arm_b")
 REFERENCE_NS = 20_000_000  # [ns] every 20 ms there are new targets
+PATIENCE_S = 0.5  # [s] of wall time in which a signal is seen at the latest
 LAW = {
     "law": "task_space_pd_bare",  # the parameter of this name is what reports call the law
     "stiffness": 5.0,  # N/m
@@ -140,11 +141,18 @@ def _numbers(*parts: Point | Quaternion | Vector3) -> Array:
 
 
 def main(args: list[str] | None = None) -> None:
-    """Run the node until a signal ends it."""
+    """Run the node until a signal ends it.
+
+    Not by ``rclpy.spin``, which waits without an end: rclpy wakes it before it shuts the context down, and a
+    node that looks in between sleeps on. Here it looks again, PATIENCE_S later at most.
+    """
     rclpy.init(args=args)
     node = BareController()
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
     try:
-        rclpy.spin(node)
+        while rclpy.ok():
+            executor.spin_once(timeout_sec=PATIENCE_S)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
