@@ -45,7 +45,11 @@ class Display:
 
     def event(self, event: GraspEvent | RunEvent) -> None:
         """Show an event in a line of its own."""
-        self._line.show(grasp_line(event) if isinstance(event, GraspEvent) else str(event))
+        self.tell(grasp_line(event) if isinstance(event, GraspEvent) else str(event))
+
+    def tell(self, text: str) -> None:
+        """Show a text in a line of its own."""
+        self._line.show(text)
         self._line.stay()
 
 

@@ -15,7 +15,7 @@ from sms_handover_interfaces.msg import RunState
 
 from sms_handover.cli.display import Display
 from sms_handover.cli.interrupts import Interrupts, let_go_of_closed_output
-from sms_handover.cli.patience import Suspended, WatchedTime
+from sms_handover.cli.patience import Delay, Suspended, WatchedTime
 from sms_handover.cli.processes import Death, NodeProcesses
 from sms_handover.cli.shared_memory import SharedMemory
 from sms_handover.errors import GraphError
@@ -213,6 +213,7 @@ class _Watch:
         deadline = inf if by_hand else self._time.seconds + patience_s
         interrupted = inf
         asked = False
+        delay = Delay()
         while self._monitor.progress.state == RunState.WAITING:
             self._driver.look()
             self._look()
@@ -224,9 +225,11 @@ class _Watch:
                 asked = asked or self._monitor.ask_to_finish()  # it may run, and only the news be late
                 if self._time.seconds - interrupted > _BEGUN_PATIENCE_S:
                     raise KeyboardInterrupt
+            why = self._driver.waiting_for or self._monitor.waiting_for()
             if self._time.seconds > deadline:
-                why = self._driver.waiting_for or self._monitor.waiting_for()
                 raise GraphError(f"the run has not begun after {patience_s:g} s: {why}")
+            if told := delay.note(self._time.seconds, why):
+                self._display.tell(told)
         self._display.start(self._monitor.progress.stamp_ns)
 
     def _wait_for_end(self) -> None:

@@ -10,6 +10,7 @@ SUSPENDED_NOTICE_S = 5.0  # [s] of wall time that a node is suspended before tha
 SUSPENDED_PATIENCE_S = 20.0  # [s] of wall time that a node is suspended before the run is given up
 
 _LONGEST_LOOK_S = 1.0  # [s] of wall time between two looks; what is longer, the launcher itself was suspended
+_DELAY_S = 10.0  # [s] of wall time between two lines on what is waited for
 
 
 class WatchedTime:
@@ -58,3 +59,18 @@ class Suspended:
                     f"'kill -CONT {suspended[name]}' lets it go on",
                     file=sys.stderr,
                 )
+
+
+class Delay:
+    """Tells what something that has not begun waits for: after a while, and again when the reason changes."""
+
+    def __init__(self) -> None:
+        """Have told nothing."""
+        self._told, self._next_s = "", _DELAY_S
+
+    def note(self, seconds: float, reason: str) -> str:
+        """Return a line for the user, "" for none; ``seconds`` is how long it has been waited for."""
+        if seconds < self._next_s or reason == self._told:
+            return ""
+        self._told, self._next_s = reason, seconds + _DELAY_S
+        return f"the run has not begun after {seconds:.0f} s: {reason}"

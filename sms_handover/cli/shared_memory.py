@@ -5,15 +5,20 @@ A participant makes a segment, ``fastrtps_<16 hexadecimal digits>``, and reads f
 lives and removes all of it at its end. Of a process that was killed they stay: a later process that needs
 the same port clears it, but nobody ever removes the segment (0.5 MB each).
 
-A run writes down, in a file beside them, the names that its processes hold locks on. What is in its list
-and no longer locked is of the dead, and is removed at the end of the run; if the launcher was killed too,
-by the next run of this user. Nothing that is not in such a list is ever touched.
+A run writes down, in a file beside them, the names that its processes hold locks on, each with the inode of
+the lock. What is in its list and no longer locked is of the dead, and is removed at the end of the run; if
+the launcher was killed too, by the next run of this user. Nothing that is not in such a list is ever touched.
+
+The name of a segment is never used twice. That of a port is, by whoever needs one next, on any domain: only
+one whose lock has the inode of the list is of the dead. Even to try the lock of a port that another process
+is about to take makes Fast DDS believe that the port is not free; then two nodes of that graph do not hear
+each other. So a port that has lost its lock is left to whoever needs it next.
 """
 
 import fcntl
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from secrets import token_hex
@@ -24,7 +29,9 @@ FOLDER = Path("/dev/shm")  # of Linux; elsewhere there is nothing to do here
 
 _LIST = "sms_handover_"
 _LOCK = "_el"
-_NAME = re.compile(r"fastrtps_([0-9a-f]{16}|port[0-9]{1,5})")
+_PORT = "fastrtps_port"
+_NAME = re.compile(rf"fastrtps_[0-9a-f]{{16}}|{_PORT}[0-9]{{1,5}}")
+_LINE = re.compile(rf"({_NAME.pattern}) ([0-9]{{1,20}})\n")
 
 
 class SharedMemory:
@@ -34,7 +41,7 @@ class SharedMemory:
         """Make nothing yet."""
         self._folder = folder
         self._list: TextIO | None = None
-        self._names: set[str] = set()
+        self._held: dict[str, int] = {}
 
     def __enter__(self) -> "SharedMemory":
         """Remove what dead runs have left, and begin a list."""
@@ -51,7 +58,7 @@ class SharedMemory:
     ) -> None:
         """Remove what is left of this run; the list stays while somebody still holds something of it."""
         if self._list is not None:
-            if not _remove_unlocked(self._folder, self._names):
+            if not _remove_unlocked(self._folder, self._held):
                 Path(self._list.name).unlink(missing_ok=True)
             self._list.close()
 
@@ -59,10 +66,10 @@ class SharedMemory:
         """Write down what processes of this run hold locks on; look often while they start."""
         if self._list is None:
             return
-        held = {name for pid in pids for name in _held_by(pid, self._folder)}
-        if new := held - self._names:
-            self._names |= new
-            self._list.write("".join(f"{name}\n" for name in sorted(new)))
+        held = {name: lock for pid in pids for name, lock in _held_by(pid, self._folder)}
+        if new := held.items() - self._held.items():
+            self._held.update(new)
+            self._list.write("".join(f"{name} {lock}\n" for name, lock in sorted(new)))
             self._list.flush()
 
 
@@ -71,15 +78,15 @@ def _private(path: str, flags: int) -> int:
     return os.open(path, flags, 0o600)
 
 
-def _held_by(pid: int, folder: Path) -> Iterator[str]:
-    """Return the names that a process holds locks on, none if it is gone."""
+def _held_by(pid: int, folder: Path) -> Iterator[tuple[str, int]]:
+    """Return the names that a process holds locks on, with the inodes of the locks; none if it is gone."""
     with suppress(OSError):
         for entry in os.scandir(f"/proc/{pid}/fd"):
             with suppress(OSError):
                 target = Path(os.readlink(entry.path))
                 name = target.name.removesuffix(_LOCK)
                 if target.parent == folder and target.name.endswith(_LOCK) and _NAME.fullmatch(name):
-                    yield name
+                    yield name, os.stat(entry.path).st_ino
 
 
 def _clear_after(left: Path) -> None:
@@ -88,24 +95,33 @@ def _clear_after(left: Path) -> None:
         if os.fstat(file.fileno()).st_uid != os.geteuid():
             return
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        names = {line.strip() for line in file}
-        if not _remove_unlocked(left.parent, {name for name in names if _NAME.fullmatch(name)}):
+        found = [match.groups() for line in file if (match := _LINE.fullmatch(line))]
+        held = {name: int(lock) for name, lock in found}
+        if not _remove_unlocked(left.parent, held):
             left.unlink(missing_ok=True)
 
 
-def _remove_unlocked(folder: Path, names: Iterable[str]) -> list[str]:
+def _remove_unlocked(folder: Path, noted: Mapping[str, int]) -> list[str]:
     """Remove what nobody holds a lock on; return the names that somebody does."""
     held = []
-    for name in sorted(names):
-        lock, others = folder / f"{name}{_LOCK}", (folder / name, folder / f"sem.{name}_mutex")
-        if not any(file.exists() for file in (lock, *others)):
+    for name, inode in sorted(noted.items()):
+        lock, memory = folder / f"{name}{_LOCK}", folder / name
+        if not (_inode(lock) == inode if name.startswith(_PORT) else lock.exists() or memory.exists()):
             continue
-        with suppress(OSError), lock.open("ab") as file:  # made if only the rest is left
+        with suppress(OSError), lock.open("ab") as file:  # made if only the memory is left
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 held.append(name)
                 continue
-            for left in (*others, lock):
+            for left in (memory, folder / f"sem.{name}_mutex", lock):
                 left.unlink(missing_ok=True)
     return held
+
+
+def _inode(file: Path) -> int:
+    """Return the inode of a file, 0 if there is none."""
+    try:
+        return file.stat().st_ino
+    except OSError:
+        return 0

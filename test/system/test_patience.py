@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sms_handover.cli.patience import Suspended, WatchedTime
+from sms_handover.cli.patience import Delay, Suspended, WatchedTime
 from sms_handover.cli.processes import Death, NodeProcesses
 from sms_handover.errors import GraphError
 
@@ -22,6 +22,16 @@ def test_time_in_which_nobody_looked_does_not_count() -> None:
     now[0] += 3600.0  # suspended by Ctrl-Z for an hour
     time.look()
     assert 2.5 < time.seconds <= 3.5
+
+
+def test_what_a_run_waits_for_is_told_after_a_while_and_when_it_changes() -> None:
+    delay = Delay()
+    reasons = ["plant is waiting for a"] * 25 + ["ik is waiting for b"] * 15
+    told = {second: line for second, why in enumerate(reasons) if (line := delay.note(float(second), why))}
+    assert told == {
+        10: "the run has not begun after 10 s: plant is waiting for a",
+        25: "the run has not begun after 25 s: ik is waiting for b",
+    }
 
 
 def test_a_suspended_node_is_told_once_and_then_given_up(capsys: pytest.CaptureFixture[str]) -> None:

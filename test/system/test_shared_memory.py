@@ -50,6 +50,13 @@ def participant(folder: Path, *names: str) -> Iterator["subprocess.Popen[str]"]:
             process.kill()
 
 
+def made_anew(folder: Path, *names: str) -> None:
+    """Put new files in the place of old ones; those are kept, so that their inodes are not given again."""
+    for name in names:
+        (folder / name).rename(folder / f"old_{name}")
+        (folder / name).touch()
+
+
 def files(folder: Path) -> set[str]:
     return {file.name for file in folder.iterdir()}
 
@@ -97,14 +104,27 @@ def test_the_next_run_removes_what_is_left_when_everything_was_killed(tmp_path: 
     assert files(tmp_path) == set()
 
 
-def test_a_port_whose_reader_has_let_go_is_removed(tmp_path: Path) -> None:
-    """So it is left when the reader ended in order and a writer was killed."""
+def test_a_port_whose_reader_has_let_go_stays(tmp_path: Path) -> None:
+    """It is left when the reader ended in order and a writer goes on; who needs it next may be locking it."""
     with SharedMemory(tmp_path) as memory, participant(tmp_path, PORT) as process:
         memory.note([process.pid])
         process.kill()
         process.wait()
         (tmp_path / f"{PORT}_el").unlink()
-    assert files(tmp_path) == set()
+    assert files(tmp_path) == {PORT, f"sem.{PORT}_mutex"}
+
+
+def test_a_port_that_another_graph_has_taken_since_is_not_even_tried(tmp_path: Path) -> None:
+    """It is about to take the lock: a lock tried here would make it believe that the port is not free."""
+    with SharedMemory(tmp_path) as memory:
+        with participant(tmp_path, PORT) as process:
+            memory.note([process.pid])
+            process.kill()
+            process.wait()
+        made_anew(tmp_path, *of(PORT))
+        before = (tmp_path / f"{PORT}_el").stat()
+    assert files(tmp_path) >= of(PORT)
+    assert (tmp_path / f"{PORT}_el").stat() == before
 
 
 def test_the_list_of_a_run_that_goes_on_is_left_alone(tmp_path: Path) -> None:
@@ -113,7 +133,9 @@ def test_the_list_of_a_run_that_goes_on_is_left_alone(tmp_path: Path) -> None:
     assert files(tmp_path) == set()
 
 
-@pytest.mark.parametrize("line", ["../../etc/passwd", "lttng-ust-wait-6", "sem.other", ""])
+@pytest.mark.parametrize(
+    "line", ["../../etc/passwd", "lttng-ust-wait-6 1 2", "sem.other 1 2", "fastrtps_port7411 1", ""]
+)
 def test_a_list_that_was_tampered_with_removes_nothing_else(line: str, tmp_path: Path) -> None:
     folder = tmp_path / "shm"
     folder.mkdir()
