@@ -5,14 +5,15 @@ A participant makes a segment, ``fastrtps_<16 hexadecimal digits>``, and reads f
 lives and removes all of it at its end. Of a process that was killed they stay: a later process that needs
 the same port clears it, but nobody ever removes the segment (0.5 MB each).
 
-A run writes down, in a file beside them, the names that its processes hold locks on, each with the inode of
-the lock. What is in its list and no longer locked is of the dead, and is removed at the end of the run; if
-the launcher was killed too, by the next run of this user. Nothing that is not in such a list is ever touched.
+A run writes down, in a file beside them, the names that its processes hold locks on, each with the inodes
+of lock and memory. What is in its list and no longer locked is of the dead, and is removed at the end of the
+run; if the launcher was killed too, by the next run of this user. Nothing that is not in such a list is ever
+touched.
 
-The name of a segment is never used twice. That of a port is, by whoever needs one next, on any domain: only
-one whose lock has the inode of the list is of the dead. Even to try the lock of a port that another process
-is about to take makes Fast DDS believe that the port is not free; then two nodes of that graph do not hear
-each other. So a port that has lost its lock is left to whoever needs it next.
+The name of a segment is never used twice. That of a port is, by whoever needs one next, on any domain. Even
+to try the lock of a port that another process is about to take makes Fast DDS believe that the port is not
+free; then two nodes of that graph do not hear each other. So ports are looked at only where a segment tells
+that somebody was killed, and only those that have the inodes of the list.
 """
 
 import fcntl
@@ -23,7 +24,7 @@ from contextlib import suppress
 from pathlib import Path
 from secrets import token_hex
 from types import TracebackType
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
 FOLDER = Path("/dev/shm")  # of Linux; elsewhere there is nothing to do here
 
@@ -31,7 +32,23 @@ _LIST = "sms_handover_"
 _LOCK = "_el"
 _PORT = "fastrtps_port"
 _NAME = re.compile(rf"fastrtps_[0-9a-f]{{16}}|{_PORT}[0-9]{{1,5}}")
-_LINE = re.compile(rf"({_NAME.pattern}) ([0-9]{{1,20}})\n")
+_LINE = re.compile(rf"({_NAME.pattern}) ([0-9]{{1,20}}) ([0-9]{{1,20}})\n")
+
+
+class _Inodes(NamedTuple):
+    """What stands behind a name: the inodes of its lock and of its memory, 0 for what is not there."""
+
+    lock: int
+    memory: int
+
+    @classmethod
+    def of(cls, folder: Path, name: str) -> "_Inodes":
+        """Return what is there now."""
+        return cls(_inode(folder / f"{name}{_LOCK}"), _inode(folder / name))
+
+    def stayed(self, now: "_Inodes") -> bool:
+        """Tell whether what is there now is still the same: the lock or, without one, the memory."""
+        return self.lock == now.lock if now.lock else self.memory == now.memory
 
 
 class SharedMemory:
@@ -41,7 +58,7 @@ class SharedMemory:
         """Make nothing yet."""
         self._folder = folder
         self._list: TextIO | None = None
-        self._held: dict[str, int] = {}
+        self._held: dict[str, _Inodes] = {}
 
     def __enter__(self) -> "SharedMemory":
         """Remove what dead runs have left, and begin a list."""
@@ -66,10 +83,10 @@ class SharedMemory:
         """Write down what processes of this run hold locks on; look often while they start."""
         if self._list is None:
             return
-        held = {name: lock for pid in pids for name, lock in _held_by(pid, self._folder)}
+        held = {name: inodes for pid in pids for name, inodes in _held_by(pid, self._folder)}
         if new := held.items() - self._held.items():
             self._held.update(new)
-            self._list.write("".join(f"{name} {lock}\n" for name, lock in sorted(new)))
+            self._list.write("".join(f"{name} {lock} {memory}\n" for name, (lock, memory) in sorted(new)))
             self._list.flush()
 
 
@@ -78,15 +95,15 @@ def _private(path: str, flags: int) -> int:
     return os.open(path, flags, 0o600)
 
 
-def _held_by(pid: int, folder: Path) -> Iterator[tuple[str, int]]:
-    """Return the names that a process holds locks on, with the inodes of the locks; none if it is gone."""
+def _held_by(pid: int, folder: Path) -> Iterator[tuple[str, _Inodes]]:
+    """Return the names that a process holds locks on, with the inodes; none if it is gone."""
     with suppress(OSError):
         for entry in os.scandir(f"/proc/{pid}/fd"):
             with suppress(OSError):
                 target = Path(os.readlink(entry.path))
                 name = target.name.removesuffix(_LOCK)
                 if target.parent == folder and target.name.endswith(_LOCK) and _NAME.fullmatch(name):
-                    yield name, os.stat(entry.path).st_ino
+                    yield name, _Inodes.of(folder, name)
 
 
 def _clear_after(left: Path) -> None:
@@ -96,24 +113,26 @@ def _clear_after(left: Path) -> None:
             return
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         found = [match.groups() for line in file if (match := _LINE.fullmatch(line))]
-        held = {name: int(lock) for name, lock in found}
+        held = {name: _Inodes(int(lock), int(memory)) for name, lock, memory in found}
         if not _remove_unlocked(left.parent, held):
             left.unlink(missing_ok=True)
 
 
-def _remove_unlocked(folder: Path, noted: Mapping[str, int]) -> list[str]:
+def _remove_unlocked(folder: Path, noted: Mapping[str, _Inodes]) -> list[str]:
     """Remove what nobody holds a lock on; return the names that somebody does."""
-    held = []
-    for name, inode in sorted(noted.items()):
-        lock, memory = folder / f"{name}{_LOCK}", folder / name
-        if not (_inode(lock) == inode if name.startswith(_PORT) else lock.exists() or memory.exists()):
+    held, killed = [], False
+    for name, inodes in sorted(noted.items()):  # segments before ports
+        port, now = name.startswith(_PORT), _Inodes.of(folder, name)
+        if not any(now) or (port and not (killed and inodes.stayed(now))):
             continue
+        memory, lock = folder / name, folder / f"{name}{_LOCK}"
         with suppress(OSError), lock.open("ab") as file:  # made if only the memory is left
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 held.append(name)
                 continue
+            killed = True
             for left in (memory, folder / f"sem.{name}_mutex", lock):
                 left.unlink(missing_ok=True)
     return held

@@ -104,27 +104,53 @@ def test_the_next_run_removes_what_is_left_when_everything_was_killed(tmp_path: 
     assert files(tmp_path) == set()
 
 
-def test_a_port_whose_reader_has_let_go_stays(tmp_path: Path) -> None:
-    """It is left when the reader ended in order and a writer goes on; who needs it next may be locking it."""
-    with SharedMemory(tmp_path) as memory, participant(tmp_path, PORT) as process:
+def test_a_port_whose_reader_has_let_go_is_removed(tmp_path: Path) -> None:
+    """So it is left when the reader ended in order and a writer was killed."""
+    with SharedMemory(tmp_path) as memory, participant(tmp_path, SEGMENT, PORT) as process:
         memory.note([process.pid])
         process.kill()
         process.wait()
         (tmp_path / f"{PORT}_el").unlink()
-    assert files(tmp_path) == {PORT, f"sem.{PORT}_mutex"}
+    assert files(tmp_path) == set()
 
 
-def test_a_port_that_another_graph_has_taken_since_is_not_even_tried(tmp_path: Path) -> None:
+def test_a_port_stays_where_nobody_was_killed(tmp_path: Path) -> None:
+    """A writer goes on, and who needs the port next may be locking it at this moment."""
+    with SharedMemory(tmp_path) as memory, participant(tmp_path, SEGMENT, PORT) as process:
+        memory.note([process.pid])
+        process.kill()
+        process.wait()
+        for name in of(SEGMENT) | {f"{PORT}_el"}:
+            (tmp_path / name).unlink()
+    assert files(tmp_path) == of(PORT) - {f"{PORT}_el"}
+
+
+@pytest.mark.parametrize("taken", [(PORT, f"{PORT}_el"), (f"{PORT}_el",)], ids=["made anew", "taken over"])
+def test_a_port_that_another_graph_has_taken_since_is_not_even_tried(
+    taken: tuple[str, ...], tmp_path: Path
+) -> None:
     """It is about to take the lock: a lock tried here would make it believe that the port is not free."""
     with SharedMemory(tmp_path) as memory:
-        with participant(tmp_path, PORT) as process:
+        with participant(tmp_path, SEGMENT, PORT) as process:
             memory.note([process.pid])
             process.kill()
             process.wait()
-        made_anew(tmp_path, *of(PORT))
+        made_anew(tmp_path, *taken)
         before = (tmp_path / f"{PORT}_el").stat()
     assert files(tmp_path) >= of(PORT)
     assert (tmp_path / f"{PORT}_el").stat() == before
+
+
+def test_a_port_that_another_graph_has_just_made_stays(tmp_path: Path) -> None:
+    """The memory is made first, the lock after it."""
+    with SharedMemory(tmp_path) as memory:
+        with participant(tmp_path, SEGMENT, PORT) as process:
+            memory.note([process.pid])
+            process.kill()
+            process.wait()
+        made_anew(tmp_path, PORT)
+        (tmp_path / f"{PORT}_el").unlink()
+    assert files(tmp_path) >= {PORT}
 
 
 def test_the_list_of_a_run_that_goes_on_is_left_alone(tmp_path: Path) -> None:
@@ -134,7 +160,15 @@ def test_the_list_of_a_run_that_goes_on_is_left_alone(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "line", ["../../etc/passwd", "lttng-ust-wait-6 1 2", "sem.other 1 2", "fastrtps_port7411 1", ""]
+    "line",
+    [
+        "../../etc/passwd",
+        "lttng-ust-wait-6 1 2",
+        "sem.other 1 2",
+        "fastrtps_port7411 1 2",
+        "fastrtps_port7411 1",
+        "",
+    ],
 )
 def test_a_list_that_was_tampered_with_removes_nothing_else(line: str, tmp_path: Path) -> None:
     folder = tmp_path / "shm"
