@@ -257,17 +257,22 @@ class RecorderNode(GraphNode[RecorderParameters]):
             return lambda data, sent_ns, publisher: receive(data, sent_ns)
 
         def deliver(data: bytes, sent_ns: int, publisher: bytes) -> None:
-            if publisher in sender.own or self._is_own(topic, sender, publisher):
+            if publisher in sender.own or self._is_own(topic, sender, publisher, data):
                 receive(data, sent_ns)
             else:
                 self._record_refused(topic, data, sent_ns)
 
         return deliver
 
-    def _is_own(self, topic: Topic, sender: Sender, publisher: bytes) -> bool:
-        """Tell whether a message of this publisher is from the topic's own."""
+    def _is_own(self, topic: Topic, sender: Sender, publisher: bytes, data: bytes) -> bool:
+        """Tell whether a message is from the topic's own publishers.
+
+        One that comes before discovery tells whose it is passes for that only if it is of the topic's type.
+        """
         try:
             sender.require(publisher)
+            if publisher and publisher not in sender.own:
+                decoded(data, message_class(topic.type))
         except MessageError as error:
             self.refusals.add(topic.name, error)
             return False

@@ -9,6 +9,7 @@ import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
+from rclpy.serialization import serialize_message
 from sms_handover_interfaces.msg import PublishedCounts, RunState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -41,6 +42,7 @@ from sms_handover.topics import (
     NODES,
     PLANT,
     RECORDER,
+    REFUSED_TOPIC,
     RUN_PUBLISHED,
     RUN_RECORDED,
     RUN_STATE,
@@ -341,6 +343,36 @@ def test_what_is_missing_is_counted_and_told(
     assert ledger.complete is (code == EXIT_OK)
     (row,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("/joint_states"))
     assert row.split()[1:4] == [str(len(ticks)), str(told), str(missing)]
+
+
+@pytest.mark.parametrize(("length", "apart"), [(None, 0), (12, 1)], ids=["whole", "cut short"])
+def test_what_is_malformed_from_one_not_yet_known_is_recorded_apart(
+    bench: Bench,
+    lone: tuple[RecorderNode, FakePlant],
+    monkeypatch: pytest.MonkeyPatch,
+    length: int | None,
+    apart: int,
+) -> None:
+    """Whoever is not discovered yet may be a node of the run; what does not decode would spoil the topic."""
+    recorder, plant = lone
+    discovered = recorder.get_publishers_info_by_topic
+    monkeypatch.setattr(
+        recorder,
+        "get_publishers_info_by_topic",
+        lambda topic: [there for there in discovered(topic) if there.node_name != "intruder"],
+    )
+    publisher = bench.plain("intruder").create_publisher(PublishedCounts, RUN_PUBLISHED, LATCHED)
+    bench.until(publisher.get_subscription_count, "the match of the intruder")
+    counts = PublishedCounts(node="nobody", topics=["/nothing"], counts=[1])
+    publisher.publish(serialize_message(counts)[:length])
+    plant.run([0, 1, 2, 3], 4)
+    never: Any = Stop()
+    assert recorder.run(bench.executor, never) == EXIT_OK
+    topics = read_info(bench.folder / "bag").topics
+    assert topics["/run/published"].message_count == 2 - apart
+    assert (f"/run/published{REFUSED_TOPIC}" in topics) is bool(apart)
+    found = check(bench.folder / "bag").findings
+    assert not [finding for finding in found if finding.text.startswith("/run/published cannot be decoded")]
 
 
 def test_a_folder_that_exists_is_refused(bench: Bench, tmp_path: Path) -> None:
