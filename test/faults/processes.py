@@ -122,9 +122,13 @@ def named_or_done(victim: str, trial: Trial, ended: Ended) -> Kept:
     return _what_there_is(trial, ended)
 
 
-def ended_or_done(trial: Trial, ended: Ended) -> Kept:
-    """Require that a launcher ended in order or was killed, and a bag that is closed, or none."""
-    exit_code(ended, 0, 130, -signal.SIGKILL)
+def ended_or_done(number: signal.Signals, trial: Trial, ended: Ended) -> Kept:
+    """Require that a launcher ended in order or was killed, and a bag that is closed, or none.
+
+    Behind its last words, while the interpreter exits, a signal does what it does to any program.
+    """
+    over = "the whole run is done" in ended.out
+    exit_code(ended, 0, 130, -signal.SIGKILL, *([-number] if over else []))
     for pid in list(trial.remaining()):
         trial.wait_for(pid)
     return _what_there_is(trial, ended)
@@ -247,7 +251,7 @@ def _at_any_moment() -> list[Fault[Ended]]:
             injected=f"{number.name} to the launcher at any moment of a short run",
             promise="no process is left, a bag opens if one was begun, exit code 0 only if the run was over",
             inject=partial(at_any_moment, _LAUNCHER, number),
-            check=ended_or_done,
+            check=partial(ended_or_done, number),
             seeded=True,
         )
         for number in (signal.SIGKILL, signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
