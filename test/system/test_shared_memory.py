@@ -50,6 +50,14 @@ def participant(folder: Path, *names: str) -> Iterator["subprocess.Popen[str]"]:
             process.kill()
 
 
+def killed(memory: SharedMemory, folder: Path) -> None:
+    """Let a process of the run, with a segment and a port, be killed."""
+    with participant(folder, SEGMENT, PORT) as process:
+        memory.note([process.pid])
+        process.kill()
+        process.wait()
+
+
 def made_anew(folder: Path, *names: str) -> None:
     """Put new files in the place of old ones; those are kept, so that their inodes are not given again."""
     for name in names:
@@ -67,10 +75,8 @@ def of(name: str) -> set[str]:
 
 def test_what_a_killed_process_leaves_is_removed_at_the_end_of_its_run(tmp_path: Path) -> None:
     with participant(tmp_path, OTHER) as stranger:
-        with SharedMemory(tmp_path) as memory, participant(tmp_path, SEGMENT, PORT) as process:
-            memory.note([process.pid])
-            process.kill()
-            process.wait()
+        with SharedMemory(tmp_path) as memory:
+            killed(memory, tmp_path)
             assert files(tmp_path) >= of(SEGMENT) | of(PORT)
         assert files(tmp_path) == of(OTHER)
         stranger.kill()
@@ -106,20 +112,16 @@ def test_the_next_run_removes_what_is_left_when_everything_was_killed(tmp_path: 
 
 def test_a_port_whose_reader_has_let_go_is_removed(tmp_path: Path) -> None:
     """So it is left when the reader ended in order and a writer was killed."""
-    with SharedMemory(tmp_path) as memory, participant(tmp_path, SEGMENT, PORT) as process:
-        memory.note([process.pid])
-        process.kill()
-        process.wait()
+    with SharedMemory(tmp_path) as memory:
+        killed(memory, tmp_path)
         (tmp_path / f"{PORT}_el").unlink()
     assert files(tmp_path) == set()
 
 
 def test_a_port_stays_where_nobody_was_killed(tmp_path: Path) -> None:
     """A writer goes on, and who needs the port next may be locking it at this moment."""
-    with SharedMemory(tmp_path) as memory, participant(tmp_path, SEGMENT, PORT) as process:
-        memory.note([process.pid])
-        process.kill()
-        process.wait()
+    with SharedMemory(tmp_path) as memory:
+        killed(memory, tmp_path)
         for name in of(SEGMENT) | {f"{PORT}_el"}:
             (tmp_path / name).unlink()
     assert files(tmp_path) == of(PORT) - {f"{PORT}_el"}
@@ -131,10 +133,7 @@ def test_a_port_that_another_graph_has_taken_since_is_not_even_tried(
 ) -> None:
     """It is about to take the lock: a lock tried here would make it believe that the port is not free."""
     with SharedMemory(tmp_path) as memory:
-        with participant(tmp_path, SEGMENT, PORT) as process:
-            memory.note([process.pid])
-            process.kill()
-            process.wait()
+        killed(memory, tmp_path)
         made_anew(tmp_path, *taken)
         before = (tmp_path / f"{PORT}_el").stat()
     assert files(tmp_path) >= of(PORT)
@@ -144,10 +143,7 @@ def test_a_port_that_another_graph_has_taken_since_is_not_even_tried(
 def test_a_port_that_another_graph_has_just_made_stays(tmp_path: Path) -> None:
     """The memory is made first, the lock after it."""
     with SharedMemory(tmp_path) as memory:
-        with participant(tmp_path, SEGMENT, PORT) as process:
-            memory.note([process.pid])
-            process.kill()
-            process.wait()
+        killed(memory, tmp_path)
         made_anew(tmp_path, PORT)
         (tmp_path / f"{PORT}_el").unlink()
     assert files(tmp_path) >= {PORT}
