@@ -20,7 +20,7 @@ from threading import Timer
 from time import monotonic
 
 from sms_handover.cli.main import main as sms_handover
-from sms_handover.ros.parent import LAUNCHER_PID
+from sms_handover.ros.process.launcher_process import LAUNCHER_PID
 
 _LONGEST_S = 4.0  # [s] of wall time until an interrupt; a cycle takes about that
 _LEARNED = 4  # cycles after which all libraries are loaded, whichever way a run ends

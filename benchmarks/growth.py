@@ -9,12 +9,12 @@ import numpy as np
 
 from benchmarks.results import Result, Table, publish, row
 from benchmarks.timing import interleaved
+from sms_handover.configuration.package_files import config_file
 from sms_handover.control.controller import JointController
 from sms_handover.control.nmpc import NmpcGains
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
 from sms_handover.plant.integrators import TABLEAUS
-from sms_handover.share import config_file
 from sms_handover.simulation.parameters import DYNAMICS
 from sms_handover.simulation.scenario import load_parameters, load_scenario
 from sms_handover.simulation.simulate import simulate

@@ -15,15 +15,22 @@ import rclpy
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 
-from sms_handover.bag.stamp import stamp_ns
-from sms_handover.cli.domain import reserved_domain
 from sms_handover.frames import BASE, WORLD
-from sms_handover.ros.direct_inputs import DirectInputs
-from sms_handover.ros.endpoints import Endpoints
-from sms_handover.ros.inputs import Deliver
-from sms_handover.ros.reach import settle_reach
-from sms_handover.ros.wire import JointStateWire, OdometryWire
-from sms_handover.topics import BASE_ODOMETRY, CONTROLLER, JOINT_COMMAND, JOINT_STATES, PLANT, graph_topics
+from sms_handover.graph.topics import (
+    BASE_ODOMETRY,
+    CONTROLLER,
+    JOINT_COMMAND,
+    JOINT_STATES,
+    PLANT,
+    graph_topics,
+)
+from sms_handover.launcher.domain import reserved_domain
+from sms_handover.messages.stamps import stamp_ns
+from sms_handover.ros.codecs.loop_messages import JointStateWire, OdometryWire
+from sms_handover.ros.node.endpoints import Endpoints
+from sms_handover.ros.process.network_scope import settle_reach
+from sms_handover.ros.transport.direct import DirectInputs
+from sms_handover.ros.transport.inputs import Deliver
 
 _ARMS = ("arm_a", "arm_b")
 NAMES = [f"{arm}_joint_{number}" for arm in _ARMS for number in range(1, 8)]

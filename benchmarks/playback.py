@@ -13,8 +13,8 @@ from tempfile import TemporaryDirectory
 from benchmarks.results import Result, Table, publish, row
 from sms_handover.bag.info import read_info
 from sms_handover.bag.time_order import messages_by_time
-from sms_handover.cli.domain import reserved_domain
-from sms_handover.cli.folders import bag_of
+from sms_handover.launcher.domain import reserved_domain
+from sms_handover.launcher.run_folder import bag_of
 from sms_handover.units import ns_to_seconds
 
 RATES = (1.0, 5.0, 100.0)

@@ -15,8 +15,8 @@ from typing import Any
 
 from benchmarks.results import Result, Table, publish, row
 from sms_handover.bag.files import read_messages
-from sms_handover.bag.message_types import MessageTypes
-from sms_handover.topics import JOINT_STATES, LOOP_TIMING
+from sms_handover.graph.topics import JOINT_STATES, LOOP_TIMING
+from sms_handover.messages.message_types import MessageTypes
 
 TICK_NS = 1_000_000  # [ns]
 DURATION_S = 60.0  # s of simulated and of wall time per case

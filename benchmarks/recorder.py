@@ -12,11 +12,11 @@ from mcap.writer import CompressionType, Writer
 from benchmarks.ping_pong import NAMES
 from benchmarks.results import Result, Table, publish, row
 from sms_handover.bag.files import read_messages
-from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.recording import Recording
 from sms_handover.bag.writer import CHUNK_SIZE
-from sms_handover.ros.wire import JointStateWire
-from sms_handover.topics import TF, graph_topics
+from sms_handover.graph.topics import TF, graph_topics
+from sms_handover.messages.message_types import MessageTypes
+from sms_handover.ros.codecs.loop_messages import JointStateWire
 
 COUNT = 60_000  # messages, as of one topic of a whole run
 ROUNDS = 5

@@ -24,16 +24,16 @@ from rclpy.node import Node
 
 from benchmarks.results import FOLDER, Result, Table, publish
 from sms_handover.bag.ledger import TopicLedger
-from sms_handover.bag.reader import read_run
-from sms_handover.bag.recover import recover
-from sms_handover.bag.recovery import Recovery
-from sms_handover.bag.stamp import stamp_ns
+from sms_handover.bag.repair.recover import recover
+from sms_handover.bag.repair.recovery import Recovery
+from sms_handover.bag.run.reader import read_run
 from sms_handover.errors import BagError
-from sms_handover.ros.direct_inputs import DirectInputs
+from sms_handover.graph.topics import BASE_ODOMETRY, JOINT_STATES
+from sms_handover.messages.stamps import stamp_ns
 from sms_handover.ros.message_types import message_class
-from sms_handover.ros.parent import LAUNCHER_PID
+from sms_handover.ros.process.launcher_process import LAUNCHER_PID
 from sms_handover.ros.qos import LOSSLESS
-from sms_handover.topics import BASE_ODOMETRY, JOINT_STATES
+from sms_handover.ros.transport.direct import DirectInputs
 from sms_handover.units import NS_PER_S
 
 _NS_PER_MS = 1e6

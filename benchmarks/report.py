@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 from benchmarks.results import ROOT, Result, Table, publish, row
 from benchmarks.timing import interleaved
-from sms_handover.cli.recorded import read_all
+from sms_handover.cli.recorded_runs import read_all
 from sms_handover.report.animation import animation
 from sms_handover.report.engine import plotly_script
 from sms_handover.report.page import report_page

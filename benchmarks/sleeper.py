@@ -7,7 +7,7 @@ import json
 import sys
 from time import monotonic, sleep
 
-from sms_handover.ros.process import exact_timers
+from sms_handover.ros.process.realtime import exact_timers
 
 TICK_S = 1e-3  # [s]
 

@@ -27,10 +27,10 @@ from benchmarks.machine import load_average, machine
 from benchmarks.process_samples import Sample, growth, sample
 from benchmarks.results import DIAGRAMS, ROOT, Table, bullets, number
 from benchmarks.soak_schedule import write_schedule
-from sms_handover.bag.check import check
-from sms_handover.bag.findings import Severity
 from sms_handover.bag.info import read_info
-from sms_handover.ros.parent import LAUNCHER_PID
+from sms_handover.bag.repair.check import check
+from sms_handover.bag.repair.findings import Severity
+from sms_handover.ros.process.launcher_process import LAUNCHER_PID
 from sms_handover.units import NS_PER_S
 
 PAGE, FIGURE = ROOT / "docs" / "soak.md", DIAGRAMS / "soak.svg"

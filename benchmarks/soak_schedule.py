@@ -5,7 +5,7 @@ from typing import Any
 
 import yaml
 
-from sms_handover.share import config_file
+from sms_handover.configuration.package_files import config_file
 
 _PHASE_S = 15.0  # [s] of a phase in which the arms meet or part
 _MOTION_S = 11.0  # [s] of it in motion

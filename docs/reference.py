@@ -6,8 +6,9 @@ from pathlib import Path
 from docs.commands import commands_page
 from docs.messages import messages_page
 from docs.tables import WRITTEN_BY, table
-from sms_handover.ros.contents import contents_of
-from sms_handover.ros.reference import (
+from sms_handover.graph.services import SERVICES
+from sms_handover.graph.topics import CONTROLLER, NODES, RECORDER, graph_topics
+from sms_handover.ros.reference.interfaces import (
     ANY_ARM,
     COMMON_GROUP,
     OWN_GROUPS,
@@ -17,8 +18,7 @@ from sms_handover.ros.reference import (
     qos_text,
     subscribers_of,
 )
-from sms_handover.services import SERVICES
-from sms_handover.topics import CONTROLLER, NODES, RECORDER, graph_topics
+from sms_handover.ros.reference.topic_descriptions import contents_of
 
 DOCS = Path(__file__).resolve().parent
 

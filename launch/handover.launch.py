@@ -13,9 +13,9 @@ from launch.events.process import ProcessExited
 from launch_ros.actions import Node
 
 from sms_handover.errors import GraphError
-from sms_handover.ros.launch_arguments import ARGUMENTS, launch_processes
-from sms_handover.ros.parent import LAUNCHER_PID
-from sms_handover.topics import CONTAINER
+from sms_handover.graph.topics import CONTAINER
+from sms_handover.ros.launching.launch_arguments import ARGUMENTS, launch_processes
+from sms_handover.ros.process.launcher_process import LAUNCHER_PID
 
 PACKAGE = "sms_handover"
 OWN_ARGUMENTS = (

@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from sms_handover.events import RunEvent
+from sms_handover.graph.events import RunEvent
 from sms_handover.types import GraspEvent, TaskPhase
 
 Array = npt.NDArray[np.float64]

@@ -16,10 +16,10 @@ from my_controller.task_space_pd import TaskSpaceGains
 
 from docs.commands import sub_parsers
 from sms_handover.cli.main import _COMMANDS
-from sms_handover.ros.launch_arguments import ARGUMENTS
-from sms_handover.ros.reference import COMMON_GROUP, OWN_GROUPS, groups_of
-from sms_handover.services import SERVICES
-from sms_handover.topics import CONTROLLER, TF, graph_topics
+from sms_handover.graph.services import SERVICES
+from sms_handover.graph.topics import CONTROLLER, TF, graph_topics
+from sms_handover.ros.launching.launch_arguments import ARGUMENTS
+from sms_handover.ros.reference.interfaces import COMMON_GROUP, OWN_GROUPS, groups_of
 
 from .documents import DOCUMENTS, SHELL, Block, anchors, blocks, commands, inline_code, links
 from .workspace import PACKAGE, ROOT, executables

@@ -10,8 +10,8 @@ from sms_handover.analysis.records import Record, records_of
 from sms_handover.analysis.signals import Signal, signals_of
 from sms_handover.analysis.summary import summary
 from sms_handover.analysis.table import comparison_table, render
-from sms_handover.bag.loop import LoopRecord, read_loop
-from sms_handover.bag.reader import read_run
+from sms_handover.bag.run.loop_record import LoopRecord, read_loop
+from sms_handover.bag.run.reader import read_run
 from sms_handover.run_data import RunData
 
 __all__ = [

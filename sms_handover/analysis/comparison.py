@@ -8,7 +8,7 @@ from types import MappingProxyType
 from sms_handover.analysis.base_motion import BaseMotion
 from sms_handover.analysis.claims import Claim, judge
 from sms_handover.analysis.metrics import RunMetrics, common_settling, measure
-from sms_handover.bag.loop import LoopRecord
+from sms_handover.bag.run.loop_record import LoopRecord
 from sms_handover.errors import UnknownNameError
 from sms_handover.run_data import RunData
 

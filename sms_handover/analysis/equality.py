@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from sms_handover.events import MESSAGE_REFUSED
+from sms_handover.graph.events import MESSAGE_REFUSED
+from sms_handover.graph.topics import TRAJECTORY
 from sms_handover.run_data import RunData
-from sms_handover.topics import TRAJECTORY
 
 _PER_TICK = (
     "tick_ns",

@@ -6,7 +6,7 @@ from math import nan, sqrt
 import numpy as np
 
 from sms_handover.analysis.numbers import largest
-from sms_handover.bag.loop import LoopRecord
+from sms_handover.bag.run.loop_record import LoopRecord
 from sms_handover.units import NS_PER_S, ns_to_seconds
 
 _TAIL = 99.0  # [%] of the periods are no longer than the one that is told

@@ -6,14 +6,14 @@ from math import isnan, nan
 from types import MappingProxyType
 
 from sms_handover.analysis.base_motion import UNKNOWN_MOTION, BaseMotion, base_motion
+from sms_handover.analysis.conservation import IkOutcomes, PhysicsResiduals, ik_outcomes, physics_residuals
 from sms_handover.analysis.loop_timing import LoopTiming, loop_timing
 from sms_handover.analysis.numbers import largest
 from sms_handover.analysis.phases import PhaseSpan, phase_spans
-from sms_handover.analysis.receipts import IkOutcomes, PhysicsResiduals, ik_outcomes, physics_residuals
 from sms_handover.analysis.torque import JointTorque, joint_torque
 from sms_handover.analysis.tracking import ToolTracking, tool_tracking
 from sms_handover.analysis.work import JointWork, joint_work
-from sms_handover.bag.loop import LoopRecord
+from sms_handover.bag.run.loop_record import LoopRecord
 from sms_handover.run_data import RunData
 
 

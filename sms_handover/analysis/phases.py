@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from sms_handover.events import GRASP_FAILED
+from sms_handover.graph.events import GRASP_FAILED
 from sms_handover.run_data import RunData
 from sms_handover.types import TaskPhase
 from sms_handover.units import ns_to_seconds

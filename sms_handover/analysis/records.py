@@ -5,10 +5,10 @@ from typing import Any, NamedTuple, TypeVar
 
 from sms_handover.analysis.base_motion import BaseMotion
 from sms_handover.analysis.comparison import Comparison
+from sms_handover.analysis.conservation import IkOutcomes, PhysicsResiduals
 from sms_handover.analysis.loop_timing import LoopTiming
 from sms_handover.analysis.metrics import PhaseMetrics, RunMetrics
 from sms_handover.analysis.numbers import largest, lengths
-from sms_handover.analysis.receipts import IkOutcomes, PhysicsResiduals
 from sms_handover.analysis.torque import JointTorque
 from sms_handover.analysis.tracking import ToolTracking
 from sms_handover.analysis.work import JointWork

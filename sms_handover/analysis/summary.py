@@ -15,7 +15,7 @@ from sms_handover.analysis.metrics import PhaseMetrics, RunMetrics
 from sms_handover.analysis.torque import JointTorque
 from sms_handover.analysis.tracking import ToolTracking
 from sms_handover.analysis.work import JointWork
-from sms_handover.events import RunEvent
+from sms_handover.graph.events import RunEvent
 from sms_handover.types import GraspEvent
 from sms_handover.units import ns_to_seconds
 

@@ -15,7 +15,7 @@ from sms_handover.analysis.loop_timing import LoopTiming
 from sms_handover.analysis.metrics import PhaseMetrics, RunMetrics
 from sms_handover.analysis.numbers import largest, lengths
 from sms_handover.analysis.tracking import Motion, ToolTracking
-from sms_handover.events import Severity
+from sms_handover.graph.events import Severity
 from sms_handover.run_data import RunData
 from sms_handover.types import GraspAction, GraspCommand, GraspEvent
 from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds

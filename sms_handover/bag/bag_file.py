@@ -7,7 +7,7 @@ from io import BufferedWriter
 
 from mcap.writer import CompressionType, Writer
 
-from sms_handover.bag.scan import Source
+from sms_handover.bag.mcap.scan import Source
 
 LIBRARY = "sms_handover"  # what the header of our bags names
 

@@ -10,9 +10,9 @@ from typing import NamedTuple
 import zstandard
 from mcap.exceptions import McapError
 
-from sms_handover.bag.damage import Damage
-from sms_handover.bag.framing import MAGIC
-from sms_handover.bag.scan import FileScan, Found, ScannedMessage
+from sms_handover.bag.mcap.damage import Damage
+from sms_handover.bag.mcap.resync import MAGIC
+from sms_handover.bag.mcap.scan import FileScan, Found, ScannedMessage
 from sms_handover.errors import BagError
 
 _CONVERSIONS = {  # by the end of a file's name, what a user can do

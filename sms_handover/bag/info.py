@@ -9,11 +9,11 @@ from mcap.reader import make_reader
 from mcap.records import Schema, Statistics
 from mcap.summary import Summary
 
-from sms_handover.bag.contents import PARAMETERS_FILE, ROBOT_FILE, SCHEDULE_FILE, parameters_from_json
+from sms_handover.bag.attachments import PARAMETERS_FILE, ROBOT_FILE, SCHEDULE_FILE, parameters_from_json
 from sms_handover.bag.files import bag_files, damage_reported
 from sms_handover.bag.ledger import LEDGER_RECORD, Ledger
+from sms_handover.bag.mcap.summary import file_summary
 from sms_handover.bag.provenance import PROVENANCE_RECORD
-from sms_handover.bag.summary import file_summary
 
 
 @dataclass(frozen=True)

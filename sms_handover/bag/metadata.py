@@ -7,8 +7,8 @@ from typing import Any
 
 import yaml
 
+from sms_handover.configuration.yaml_reader import load, read_text
 from sms_handover.errors import BagError
-from sms_handover.yaml_files import load, read_text
 
 METADATA_FILE = "metadata.yaml"
 ROSBAG2_KEY = "rosbag2_bagfile_information"

@@ -5,7 +5,7 @@ from dataclasses import asdict
 
 from sms_handover.bag.info import BagInfo
 from sms_handover.errors import BagError
-from sms_handover.topics import CONTROLLER, PLANT
+from sms_handover.graph.topics import CONTROLLER, PLANT
 
 
 def overview(info: BagInfo) -> dict[str, object]:

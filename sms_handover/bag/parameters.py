@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from sms_handover.bag.split import Split
 from sms_handover.bag.topic_choice import TopicChoice
-from sms_handover.parameters import parameter
+from sms_handover.configuration.parameters import parameter
 from sms_handover.units import seconds_to_ns
 
 _BYTES_PER_MB = 1e6

@@ -5,17 +5,17 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
-from sms_handover.bag.contents import PARAMETERS_FILE, ROBOT_FILE, SCHEDULE_FILE, parameters_json
-from sms_handover.bag.counting import LedgerKeeper
+from sms_handover.bag.attachments import PARAMETERS_FILE, ROBOT_FILE, SCHEDULE_FILE, parameters_json
 from sms_handover.bag.ledger import LEDGER_RECORD, PERIODS_RECORD, Ledger
-from sms_handover.bag.message_types import MessageTypes
+from sms_handover.bag.ledger_keeper import LedgerKeeper
 from sms_handover.bag.provenance import PROVENANCE_RECORD
 from sms_handover.bag.qos import Qos
 from sms_handover.bag.split import Split
-from sms_handover.bag.stamp import stamp_ns
 from sms_handover.bag.writer import BagWriter
 from sms_handover.errors import BagError
-from sms_handover.topics import is_refused
+from sms_handover.graph.topics import is_refused
+from sms_handover.messages.message_types import MessageTypes
+from sms_handover.messages.stamps import stamp_ns
 
 PUBLISHED_COUNTS = "sms_handover_interfaces/msg/PublishedCounts"
 

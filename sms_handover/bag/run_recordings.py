@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from sms_handover.bag.ledger import Ledger
-from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.qos import Qos
 from sms_handover.bag.recording import Recording
 from sms_handover.bag.split import Split
+from sms_handover.messages.message_types import MessageTypes
 
 
 class _Topic(NamedTuple):

@@ -6,7 +6,7 @@ from mcap.records import Schema
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
 
-from sms_handover.bag.scan import Source
+from sms_handover.bag.mcap.scan import Source
 from sms_handover.errors import BagError
 
 Field = tuple[str, Any]  # name, and what it holds as rosbags describes it

@@ -15,7 +15,7 @@ from types import TracebackType
 from mcap.records import Schema as McapSchema
 
 from sms_handover.bag.bag_file import BagFile
-from sms_handover.bag.message_types import MessageTypes
+from sms_handover.bag.mcap.scan import Source
 from sms_handover.bag.metadata import (
     METADATA_FILE,
     ROSBAG2_KEY,
@@ -27,9 +27,9 @@ from sms_handover.bag.metadata import (
     to_yaml,
 )
 from sms_handover.bag.qos import Qos, profiles_of
-from sms_handover.bag.scan import Source
 from sms_handover.bag.split import Split
 from sms_handover.errors import BagError
+from sms_handover.messages.message_types import MessageTypes
 
 CHUNK_SIZE = 64 * 1024  # [byte] of uncompressed messages held back at most
 FLUSH_PERIOD_NS = 20_000_000  # [ns] of log time held back at most

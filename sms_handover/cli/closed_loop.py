@@ -14,20 +14,20 @@ from rclpy.signals import SignalHandlerOptions
 
 from sms_handover.analysis.deviation import LargestDeviation, StateDeviation
 from sms_handover.bag.info import read_info
-from sms_handover.bag.ticks import recorded_ticks
-from sms_handover.cli.display import Display
-from sms_handover.cli.domain import reserved_domain
-from sms_handover.cli.launcher import LaunchPlan, graph_environment
-from sms_handover.cli.processes import NodeProcesses
+from sms_handover.bag.run.ticks import recorded_ticks
 from sms_handover.cli.reproduce import scenario_in
 from sms_handover.errors import BagError, ConfigurationError, GraphError
+from sms_handover.graph.topics import CONTROLLER, PLANT
+from sms_handover.launcher.command_replay import PEERS, CommandReplay
+from sms_handover.launcher.display import Display
+from sms_handover.launcher.domain import reserved_domain
+from sms_handover.launcher.launcher import LaunchPlan, graph_environment
+from sms_handover.launcher.processes import NodeProcesses
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.ros.command_replay import PEERS, CommandReplay
 from sms_handover.ros.parameters import as_arguments
-from sms_handover.ros.reach import reach_to
+from sms_handover.ros.process.network_scope import reach_to
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import COMMON, Scenario
-from sms_handover.topics import CONTROLLER, PLANT
 from sms_handover.units import ns_to_seconds
 
 EXIT_SAME, EXIT_DEVIATES = 0, 1

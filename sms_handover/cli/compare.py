@@ -10,7 +10,7 @@ from sms_handover.analysis.comparison import compare
 from sms_handover.analysis.records import Record, records_of
 from sms_handover.analysis.summary import summary
 from sms_handover.analysis.table import render
-from sms_handover.cli.recorded import read_all
+from sms_handover.cli.recorded_runs import read_all
 from sms_handover.errors import ConfigurationError
 from sms_handover.report.recorded_run import common_tolerance
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from sms_handover.events import GRASP_FAILED, RunEvent
+from sms_handover.graph.events import GRASP_FAILED, RunEvent
 from sms_handover.types import GraspEvent, GraspStatus
 
 EXIT_OK = 0

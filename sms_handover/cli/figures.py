@@ -5,11 +5,11 @@ from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from pathlib import Path
 
 from sms_handover.analysis.figure_catalogue import FIGURES, chosen_figures, chosen_formats
-from sms_handover.cli.recorded import read_all
+from sms_handover.cli.recorded_runs import read_all
 from sms_handover.control.parameters import LAWS
 from sms_handover.errors import BagError, ConfigurationError, SmsHandoverError
 from sms_handover.report.recorded_run import RecordedRun
-from sms_handover.scene.read import deputy_size_in
+from sms_handover.scene.recorded_scene import deputy_size_in
 from sms_handover.scene.scene import Scene, make_scene
 
 _SNAPSHOTS = "snapshots"  # the one figure that needs a scene

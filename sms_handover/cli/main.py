@@ -8,7 +8,7 @@ from importlib import import_module
 
 from sms_handover import __version__
 from sms_handover.errors import ConfigurationError, SmsHandoverError
-from sms_handover.ros.transports import avoid_full_shared_memory, require_shared_memory
+from sms_handover.ros.process.shared_memory_check import avoid_full_shared_memory, require_shared_memory
 
 _COMMANDS = {
     "run": "run the handover as a graph of ROS 2 nodes and record it",

@@ -4,8 +4,8 @@ import os
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping, Sequence
 
-from sms_handover.cli.domain import LAST_DOMAIN
 from sms_handover.errors import ConfigurationError
+from sms_handover.launcher.domain import LAST_DOMAIN
 from sms_handover.ros.parameters import as_arguments
 
 

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import yaml
 
-from sms_handover import yaml_files
 from sms_handover.bag.parameters import RecorderParameters
+from sms_handover.configuration import yaml_reader as yaml_files
+from sms_handover.configuration.package_files import config_file
+from sms_handover.configuration.parameters import build, read_parameter_files
 from sms_handover.control.parameters import LAWS
 from sms_handover.errors import ConfigurationError
-from sms_handover.parameters import build, read_parameter_files
-from sms_handover.share import config_file
+from sms_handover.graph.topics import CONTROLLER, RECORDER, TRAJECTORY
 from sms_handover.simulation.parameters import DYNAMICS, MODES
 from sms_handover.simulation.scenario import COMMON, Scenario, load_scenario
-from sms_handover.topics import CONTROLLER, RECORDER, TRAJECTORY
 from sms_handover.trajectory.time_law import TIME_LAWS
 
 Overrides = dict[str, dict[str, object]]

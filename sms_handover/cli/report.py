@@ -5,7 +5,7 @@ import sys
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from pathlib import Path
 
-from sms_handover.cli.recorded import read_all
+from sms_handover.cli.recorded_runs import read_all
 from sms_handover.errors import ConfigurationError
 from sms_handover.report.page import report_page
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 from sms_handover.analysis.equality import before, compare_runs
 from sms_handover.bag.info import BagInfo, read_info
-from sms_handover.bag.reader import read_run
-from sms_handover.cli.folders import bags_of
+from sms_handover.bag.run.reader import read_run
 from sms_handover.errors import BagError, ConfigurationError
+from sms_handover.graph.topics import CONTROLLER, IK, PLANT, TRAJECTORY
+from sms_handover.launcher.run_folder import bags_of
 from sms_handover.simulation.parameters import CommonParameters
 from sms_handover.simulation.scenario import COMMON, Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
-from sms_handover.topics import CONTROLLER, IK, PLANT, TRAJECTORY
 from sms_handover.units import ns_to_seconds
 
 _NODES = (PLANT, TRAJECTORY, IK, CONTROLLER)

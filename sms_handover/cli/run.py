@@ -9,20 +9,20 @@ from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 
-from sms_handover.cli.domain import reservation
 from sms_handover.cli.exit_codes import task_code
-from sms_handover.cli.folders import BAG, LOGS, locked_logs
-from sms_handover.cli.launcher import LaunchPlan, launch
 from sms_handover.cli.options import add_scenario_options, scenario_of
 from sms_handover.errors import ConfigurationError
-from sms_handover.events import graver_in_words
-from sms_handover.ros.composition import listed, placed
-from sms_handover.ros.main import EXIT_LOSS
-from sms_handover.ros.reach import reach_to
+from sms_handover.graph.events import graver_in_words
+from sms_handover.graph.topics import CONTROLLER, NODES, RECORDER
+from sms_handover.launcher.domain import reservation
+from sms_handover.launcher.launcher import LaunchPlan, launch
+from sms_handover.launcher.run_folder import BAG, LOGS, locked_logs
+from sms_handover.ros.launching.composition import listed, placed
+from sms_handover.ros.process.main import EXIT_LOSS
+from sms_handover.ros.process.network_scope import reach_to
 from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.parameters import LOCKSTEP, REALTIME
 from sms_handover.simulation.scenario import Scenario
-from sms_handover.topics import CONTROLLER, NODES, RECORDER
 
 EXIT_INTERRUPTED = 130
 

@@ -7,10 +7,10 @@ from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from importlib import import_module
 from pathlib import Path
 
-from sms_handover.cli.folders import bag_of
 from sms_handover.errors import BagError, ConfigurationError
+from sms_handover.launcher.run_folder import bag_of
 from sms_handover.scene.page import animation_html
-from sms_handover.scene.read import read_scene
+from sms_handover.scene.recorded_scene import read_scene
 from sms_handover.scene.scene import FRAME_RATE, Scene
 
 

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sms_handover.configuration.parameters import parameter
 from sms_handover.control.base import ControlLaw, LinearFeedback
 from sms_handover.control.computed_torque import ComputedTorque, TrackingEfforts
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.parameters import parameter
 from sms_handover.types import Array
 
 MAX_CONTROL_ORDER = 3

@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 
+from sms_handover.configuration.parameters import build, parameter
 from sms_handover.control.nmpc import MAX_CONTROL_ORDER, NmpcGains
 from sms_handover.control.pid import PidGains
 from sms_handover.errors import UnknownNameError
-from sms_handover.parameters import build, parameter
 
 LAWS = ("nmpc", "pid")
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sms_handover.configuration.parameters import parameter
 from sms_handover.control.base import ControlLaw, LinearFeedback
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.parameters import parameter
 from sms_handover.types import BASE_NQ, BASE_NV, Array
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sms_handover.bag.info import BagInfo, read_info
-from sms_handover.bag.reader import holds_run, read_run
+from sms_handover.bag.run.reader import holds_run, read_run
 from sms_handover.errors import BagError, ConfigurationError
 from sms_handover.export.csv_files import CsvFormat
 from sms_handover.export.output import Tables

@@ -6,7 +6,7 @@ from typing import Any
 
 from sms_handover.bag.files import bag_files, strict_scan
 from sms_handover.bag.info import BagInfo
-from sms_handover.bag.scan import FileScan, ScannedMessage, Source
+from sms_handover.bag.mcap.scan import FileScan, ScannedMessage, Source
 from sms_handover.bag.schemas import SchemaTypes, types_of
 from sms_handover.errors import BagError
 from sms_handover.export.flatten import Flattener

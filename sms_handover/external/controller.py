@@ -10,14 +10,14 @@ from rcl_interfaces.msg import ParameterDescriptor
 
 from sms_handover.control.protocol import CheckedController, Controller, Guidance
 from sms_handover.frames import WORLD
+from sms_handover.graph.topics import CONTROLLER, target_pose
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.nodes.controller import Answering, AnsweringNode
-from sms_handover.ros.door import Read
-from sms_handover.ros.graph_node import P
-from sms_handover.ros.help import own_parameters_help
-from sms_handover.ros.main import EXIT_OK, run_node
-from sms_handover.ros.wire import PoseWire, Stamped
-from sms_handover.topics import CONTROLLER, target_pose
+from sms_handover.ros.codecs.loop_messages import PoseWire, Stamped
+from sms_handover.ros.node.graph_node import P
+from sms_handover.ros.node.message_filter import Read
+from sms_handover.ros.process.main import EXIT_OK, run_node
+from sms_handover.ros.reference.help import own_parameters_help
 from sms_handover.trajectory.schedule import Schedule
 from sms_handover.types import Array, JointReference, Pose, TaskPhase
 
@@ -28,9 +28,10 @@ def run_controller(law: str, make: Make[P], group: type[P], args: Sequence[str] 
     """Run a controller as the node of the graph that answers states; return the exit code.
 
     ``law`` is what reports call it. ``make`` gets the robot and the parameters: a frozen dataclass
-    ``group``, each field made by :func:`sms_handover.parameters.parameter` with a default. They become
-    ROS parameters of the node, checked as those of this package are. Everything else is done here:
-    matching, the start and end of a run, what to answer when, counts, diagnostics, signals.
+    ``group``, each field made by :func:`sms_handover.configuration.parameters.parameter` with a
+    default. They become ROS parameters of the node, checked as those of this package are. Everything
+    else is done here: matching, the start and end of a run, what to answer when, counts, diagnostics,
+    signals.
     """
     arguments = list(sys.argv if args is None else args)
     if {"-h", "--help"} & set(arguments[1:]):

@@ -3,13 +3,13 @@
 from dataclasses import replace
 from pathlib import Path
 
+from sms_handover.configuration.parameters import read_yaml
 from sms_handover.errors import RobotDescriptionError
 from sms_handover.frames import joint_name
 from sms_handover.model.assembly import link_name
 from sms_handover.model.parts import Inertia, JointDescription, LinkDescription, Origin
 from sms_handover.model.sections import Section, at, naming, read_list, read_origin, read_section
 from sms_handover.model.validation import number, vector
-from sms_handover.parameters import read_yaml
 
 
 def read_arm_file(file: Path, arm: str) -> tuple[list[JointDescription], list[LinkDescription], Origin]:

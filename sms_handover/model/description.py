@@ -3,6 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
+from sms_handover.configuration.package_files import config_file
+from sms_handover.configuration.parameters import read_yaml
 from sms_handover.frames import BASE
 from sms_handover.model.arm_file import override_limits, read_arm_file
 from sms_handover.model.assembly import ArmDescription, Base, Panel, RobotDescription, gripper_name
@@ -17,8 +19,6 @@ from sms_handover.model.parts import (
 )
 from sms_handover.model.sections import at, naming, read_list, read_origin, read_section, read_text, unknown
 from sms_handover.model.validation import number, positive, positive_vector, vector
-from sms_handover.parameters import read_yaml
-from sms_handover.share import config_file
 
 __all__ = [
     "ArmDescription",

@@ -5,10 +5,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from sms_handover.configuration.yaml_reader import line_in
 from sms_handover.errors import RobotDescriptionError, UnknownNameError
 from sms_handover.model.parts import Origin
 from sms_handover.model.validation import vector
-from sms_handover.yaml_files import line_in
 
 Section = Mapping[str, object]
 

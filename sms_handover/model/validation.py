@@ -5,8 +5,8 @@ from math import isfinite, sqrt
 
 import numpy as np
 
+from sms_handover.configuration.parameters import as_float
 from sms_handover.errors import RobotDescriptionError
-from sms_handover.parameters import as_float
 from sms_handover.types import Array
 
 _AXIS_TOLERANCE = 1e-9  # [-] on the length of a joint axis

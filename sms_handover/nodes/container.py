@@ -4,13 +4,13 @@ import sys
 from collections.abc import Callable, Sequence
 from itertools import takewhile
 
+from sms_handover.graph.topics import CONTAINER, CONTROLLER, IK, PLANT, TRAJECTORY
 from sms_handover.nodes.controller import ControllerNode
 from sms_handover.nodes.ik import IkNode
 from sms_handover.nodes.plant import PlantNode
 from sms_handover.nodes.trajectory import TrajectoryNode
-from sms_handover.ros.help import show_container_help
-from sms_handover.ros.main import EXIT_OK, RunnableNode, run_nodes
-from sms_handover.topics import CONTAINER, CONTROLLER, IK, PLANT, TRAJECTORY
+from sms_handover.ros.process.main import EXIT_OK, RunnableNode, run_nodes
+from sms_handover.ros.reference.help import show_container_help
 
 _NODES: dict[str, Callable[[], RunnableNode]] = {
     PLANT: PlantNode,

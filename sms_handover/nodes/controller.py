@@ -5,18 +5,8 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from sms_handover.control.parameters import ControllerParameters
-from sms_handover.control.reference_watch import ReferenceWatch
 from sms_handover.frames import BASE, WORLD
-from sms_handover.ros.door import Read, Receive
-from sms_handover.ros.graph_node import GraphNode, P
-from sms_handover.ros.main import run_node
-from sms_handover.ros.phase_wire import PhaseWire
-from sms_handover.ros.stamp_sync import StampOrder, StampSync
-from sms_handover.ros.wire import JointStateWire, Stamped, StateWire, coordinates
-from sms_handover.simulation.parameters import LOCKSTEP
-from sms_handover.simulation.scenario import load_task
-from sms_handover.simulation.wiring import longest_reference_ns, make_controller
-from sms_handover.topics import (
+from sms_handover.graph.topics import (
     BASE_ODOMETRY,
     CONTROLLER,
     JOINT_COMMAND,
@@ -24,6 +14,16 @@ from sms_handover.topics import (
     JOINT_STATES,
     TASK_PHASE,
 )
+from sms_handover.nodes.parts.reference_watch import ReferenceWatch
+from sms_handover.ros.codecs.loop_messages import JointStateWire, Stamped, StateWire, coordinates
+from sms_handover.ros.codecs.task_phase import PhaseWire
+from sms_handover.ros.node.graph_node import GraphNode, P
+from sms_handover.ros.node.message_filter import Read, Receive
+from sms_handover.ros.process.main import run_node
+from sms_handover.ros.transport.stamp_sync import StampOrder, StampSync
+from sms_handover.simulation.parameters import LOCKSTEP
+from sms_handover.simulation.scenario import load_task
+from sms_handover.simulation.wiring import longest_reference_ns, make_controller
 from sms_handover.trajectory.schedule import Schedule
 from sms_handover.types import Array, JointReference, TaskPhase
 from sms_handover.units import NS_PER_S

@@ -6,21 +6,21 @@ from typing import Any
 import numpy as np
 from sms_handover_interfaces.srv import SolveIK
 
-from sms_handover.checks import check_finite
 from sms_handover.errors import GraphError, SmsHandoverError
 from sms_handover.frames import WORLD
+from sms_handover.graph.topics import IK, SOLVE_IK
 from sms_handover.ik.levenberg_marquardt import solve_ik
 from sms_handover.ik.parameters import IkParameters
-from sms_handover.ros.convert import (
+from sms_handover.ros.codecs.convert import (
     joints_in_order,
     pose_of_message,
     set_ik_status,
     set_joint_positions,
     stamp_ns_of,
 )
-from sms_handover.ros.graph_node import GraphNode
-from sms_handover.ros.main import run_node
-from sms_handover.topics import IK, SOLVE_IK
+from sms_handover.ros.codecs.validation import check_finite
+from sms_handover.ros.node.graph_node import GraphNode
+from sms_handover.ros.process.main import run_node
 from sms_handover.types import IkRequest, IkStatus, Pose
 
 

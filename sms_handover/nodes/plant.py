@@ -11,23 +11,7 @@ from sms_handover_interfaces.msg import RunState
 from std_msgs.msg import String
 
 from sms_handover.errors import MessageError, Reason
-from sms_handover.plant.answer_watch import AnswerWatch
-from sms_handover.plant.command_watch import CommandWatch
-from sms_handover.plant.parameters import PlantParameters
-from sms_handover.ros.convert import event_message, header
-from sms_handover.ros.graph_node import GraphNode
-from sms_handover.ros.loop_clock import LoopClock
-from sms_handover.ros.main import run_node
-from sms_handover.ros.marker import deputy_marker
-from sms_handover.ros.phase_wire import PhaseWire
-from sms_handover.ros.plant_outputs import PlantOutputs
-from sms_handover.ros.run_control import RunControl
-from sms_handover.ros.stamp_sync import StampOrder, StampSync
-from sms_handover.ros.wire import JointStateWire, Stamped, stamped
-from sms_handover.simulation.parameters import LOCKSTEP
-from sms_handover.simulation.scenario import load_task
-from sms_handover.simulation.wiring import make_plant
-from sms_handover.topics import (
+from sms_handover.graph.topics import (
     DEPUTY_MARKER,
     GRASP_EVENT,
     JOINT_COMMAND,
@@ -40,6 +24,22 @@ from sms_handover.topics import (
     RUN_STATE,
     TASK_PHASE,
 )
+from sms_handover.nodes.parts.answer_watch import AnswerWatch
+from sms_handover.nodes.parts.command_watch import CommandWatch
+from sms_handover.nodes.parts.marker import deputy_marker
+from sms_handover.nodes.parts.plant_outputs import PlantOutputs
+from sms_handover.nodes.parts.run_control import RunControl
+from sms_handover.plant.parameters import PlantParameters
+from sms_handover.ros.codecs.convert import event_message, header
+from sms_handover.ros.codecs.loop_messages import JointStateWire, Stamped, stamped
+from sms_handover.ros.codecs.task_phase import PhaseWire
+from sms_handover.ros.node.graph_node import GraphNode
+from sms_handover.ros.process.main import run_node
+from sms_handover.ros.transport.loop_clock import LoopClock
+from sms_handover.ros.transport.stamp_sync import StampOrder, StampSync
+from sms_handover.simulation.parameters import LOCKSTEP
+from sms_handover.simulation.scenario import load_task
+from sms_handover.simulation.wiring import make_plant
 from sms_handover.types import Array, JointCommand, TaskPhase
 
 _COMMAND = (JOINT_COMMAND,)

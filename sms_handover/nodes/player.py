@@ -11,19 +11,19 @@ from rosgraph_msgs.msg import Clock
 
 from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.errors import BagError, ConfigurationError, GraphError
-from sms_handover.playback.keyboard import Key, Keyboard
+from sms_handover.graph.topics import CLOCK, PLAYER
+from sms_handover.nodes.parts.bag_publishers import BagPublisher, make_publishers, without_subscriber
+from sms_handover.nodes.parts.playback_services import offer_services
 from sms_handover.playback.parameters import PlayerParameters
 from sms_handover.playback.qos import read_overrides
 from sms_handover.playback.report import closing_line, progress_line
 from sms_handover.playback.schedule import PlaybackOptions, PlaybackSchedule
 from sms_handover.playback.source import PlaybackSource, span_of
-from sms_handover.ros.bag_publishers import BagPublisher, make_publishers, without_subscriber
-from sms_handover.ros.convert import time_message
-from sms_handover.ros.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, RunnableNode, Stop, run_node
+from sms_handover.ros.codecs.convert import time_message
 from sms_handover.ros.parameters import declare, refuse_unknown
-from sms_handover.ros.playback_services import offer_services
-from sms_handover.status_line import StatusLine
-from sms_handover.topics import CLOCK, PLAYER
+from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, RunnableNode, Stop, run_node
+from sms_handover.terminal.keyboard import Key, Keyboard
+from sms_handover.terminal.status_line import StatusLine
 from sms_handover.units import NS_PER_S
 
 KEYS = "space: pause or go on   right: next message   up, down: faster, slower by 10 %"

@@ -17,24 +17,9 @@ from sms_handover.bag.parameters import RecorderParameters
 from sms_handover.bag.provenance import provenance
 from sms_handover.bag.recording import Recording
 from sms_handover.bag.run_recordings import RunRecordings
-from sms_handover.bag.transforms import TF_TYPE, TransformsWire
 from sms_handover.errors import BagError, ConfigurationError, MessageError, SmsHandoverError
 from sms_handover.frames import BASE, DEPUTY, WORLD
-from sms_handover.model.link_tree import LinkTree
-from sms_handover.ros.convert import time_message
-from sms_handover.ros.door import Read, Receive
-from sms_handover.ros.graph_node import GraphNode
-from sms_handover.ros.inputs import Deliver
-from sms_handover.ros.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, Stop, run_node
-from sms_handover.ros.message_types import message_class
-from sms_handover.ros.peer_parameters import PeerParameters
-from sms_handover.ros.qos import LOSSLESS, profile_of, stored, weakest
-from sms_handover.ros.sender import Sender
-from sms_handover.ros.stamp_sync import StampSync
-from sms_handover.ros.wire import PoseWire, Stamped, StateWire, decoded, stamped, state_of
-from sms_handover.simulation.parameters import LOCKSTEP
-from sms_handover.simulation.scenario import load_task
-from sms_handover.topics import (
+from sms_handover.graph.topics import (
     CLOCK_PERIOD_NS,
     DEPUTY_POSE,
     JOINT_STATES,
@@ -49,6 +34,21 @@ from sms_handover.topics import (
     Rate,
     Topic,
 )
+from sms_handover.messages.transforms import TF_TYPE, TransformsWire
+from sms_handover.model.link_tree import LinkTree
+from sms_handover.nodes.parts.peer_parameters import PeerParameters
+from sms_handover.ros.codecs.convert import time_message
+from sms_handover.ros.codecs.loop_messages import PoseWire, Stamped, StateWire, decoded, stamped, state_of
+from sms_handover.ros.message_types import message_class
+from sms_handover.ros.node.graph_node import GraphNode
+from sms_handover.ros.node.message_filter import Read, Receive
+from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, Stop, run_node
+from sms_handover.ros.qos import LOSSLESS, profile_of, stored, weakest
+from sms_handover.ros.transport.inputs import Deliver
+from sms_handover.ros.transport.publisher_identity import Sender
+from sms_handover.ros.transport.stamp_sync import StampSync
+from sms_handover.simulation.parameters import LOCKSTEP
+from sms_handover.simulation.scenario import load_task
 
 _POLL_S = 0.005  # [s] of wall time between two batches: long enough to be cheap, short enough to lose little
 _LOCKSTEP_POLL_S = 0.002  # [s] where the plant would run out of what it may be ahead, and wait

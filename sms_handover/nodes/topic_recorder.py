@@ -12,13 +12,13 @@ from rclpy.executors import Executor
 from sms_handover.bag.parameters import TopicRecorderParameters
 from sms_handover.bag.writer import BagWriter
 from sms_handover.errors import BagError, ConfigurationError, SmsHandoverError
-from sms_handover.ros.direct_inputs import DirectInputs
-from sms_handover.ros.main import EXIT_FAILED, EXIT_OK, RunnableNode, Stop, run_node
+from sms_handover.graph.topics import TOPIC_RECORDER
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.parameters import declare, refuse_unknown
+from sms_handover.ros.process.main import EXIT_FAILED, EXIT_OK, RunnableNode, Stop, run_node
 from sms_handover.ros.qos import stored, weakest
-from sms_handover.status_line import StatusLine
-from sms_handover.topics import TOPIC_RECORDER
+from sms_handover.ros.transport.direct import DirectInputs
+from sms_handover.terminal.status_line import StatusLine
 
 _POLL_S = 0.005  # [s] of wall time between two batches
 _LOOK_S = 0.1  # [s] of wall time between two looks for new topics

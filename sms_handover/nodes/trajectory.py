@@ -10,32 +10,7 @@ from sms_handover_interfaces.srv import SolveIK
 
 from sms_handover.errors import GraphError
 from sms_handover.frames import BASE, WORLD
-from sms_handover.model.poses import pose_row
-from sms_handover.ros.convert import (
-    joints_in_order,
-    set_joint_positions,
-    set_pose,
-    stamp_ns_of,
-)
-from sms_handover.ros.door import Receive
-from sms_handover.ros.endpoints import CountedPublisher
-from sms_handover.ros.event_wire import read_grasp_event
-from sms_handover.ros.graph_node import GraphNode
-from sms_handover.ros.main import run_node
-from sms_handover.ros.phase_wire import PhaseWire
-from sms_handover.ros.stamp_sync import StampSync
-from sms_handover.ros.wire import (
-    JointStateWire,
-    PoseWire,
-    Stamped,
-    StateWire,
-    stamped,
-    state_of,
-)
-from sms_handover.simulation.feasibility import check_feasibility
-from sms_handover.simulation.parameters import LOCKSTEP
-from sms_handover.simulation.scenario import ParameterSet, Scenario, load_parameters, load_task
-from sms_handover.topics import (
+from sms_handover.graph.topics import (
     DEPUTY_POSE,
     GRASP_EVENT,
     IK_STATUS,
@@ -47,6 +22,31 @@ from sms_handover.topics import (
     TRAJECTORY,
     target_pose,
 )
+from sms_handover.model.poses import pose_row
+from sms_handover.ros.codecs.convert import (
+    joints_in_order,
+    set_joint_positions,
+    set_pose,
+    stamp_ns_of,
+)
+from sms_handover.ros.codecs.events import read_grasp_event
+from sms_handover.ros.codecs.loop_messages import (
+    JointStateWire,
+    PoseWire,
+    Stamped,
+    StateWire,
+    stamped,
+    state_of,
+)
+from sms_handover.ros.codecs.task_phase import PhaseWire
+from sms_handover.ros.node.endpoints import CountedPublisher
+from sms_handover.ros.node.graph_node import GraphNode
+from sms_handover.ros.node.message_filter import Receive
+from sms_handover.ros.process.main import run_node
+from sms_handover.ros.transport.stamp_sync import StampSync
+from sms_handover.simulation.feasibility import check_feasibility
+from sms_handover.simulation.parameters import LOCKSTEP
+from sms_handover.simulation.scenario import ParameterSet, Scenario, load_parameters, load_task
 from sms_handover.trajectory.generator import Targets, TrajectoryGenerator
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.types import Array, RobotState, TaskPhase

@@ -11,21 +11,7 @@ from rclpy.qos import QoSDurabilityPolicy, QoSProfile, QoSReliabilityPolicy
 
 from sms_handover.errors import SmsHandoverError
 from sms_handover.frames import BASE, WORLD
-from sms_handover.model.poses import pose_row
-from sms_handover.ros.door import Read, Receive, Refusals
-from sms_handover.ros.event_wire import read_grasp_event
-from sms_handover.ros.main import EXIT_OK, RunnableNode, Stop, run_node
-from sms_handover.ros.message_types import message_class
-from sms_handover.ros.parameters import declare, refuse_unknown
-from sms_handover.ros.phase_wire import PhaseWire
-from sms_handover.ros.qos import LATCHED
-from sms_handover.ros.stamp_sync import StampSync
-from sms_handover.ros.wire import PoseWire, Stamped, StateWire, stamped, state_of
-from sms_handover.scene.live import LiveFrame, LiveScene
-from sms_handover.scene.parameters import ViewerParameters
-from sms_handover.scene.server import SceneServer
-from sms_handover.simulation.parameters import CommonParameters
-from sms_handover.topics import (
+from sms_handover.graph.topics import (
     DEPUTY_MARKER,
     DEPUTY_POSE,
     GRASP_EVENT,
@@ -37,6 +23,20 @@ from sms_handover.topics import (
     graph_topics,
     target_pose,
 )
+from sms_handover.model.poses import pose_row
+from sms_handover.ros.codecs.events import read_grasp_event
+from sms_handover.ros.codecs.loop_messages import PoseWire, Stamped, StateWire, stamped, state_of
+from sms_handover.ros.codecs.task_phase import PhaseWire
+from sms_handover.ros.message_types import message_class
+from sms_handover.ros.node.message_filter import Read, Receive, Refusals
+from sms_handover.ros.parameters import declare, refuse_unknown
+from sms_handover.ros.process.main import EXIT_OK, RunnableNode, Stop, run_node
+from sms_handover.ros.qos import LATCHED
+from sms_handover.ros.transport.stamp_sync import StampSync
+from sms_handover.scene.live import LiveFrame, LiveScene
+from sms_handover.scene.parameters import ViewerParameters
+from sms_handover.scene.server import SceneServer
+from sms_handover.simulation.parameters import CommonParameters
 from sms_handover.types import GraspEvent, TaskPhase
 
 T = TypeVar("T")

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from sms_handover.parameters import parameter
+from sms_handover.configuration.parameters import parameter
 from sms_handover.plant.deputy import GraspTolerance
 from sms_handover.plant.integrators import TABLEAUS
 

@@ -4,8 +4,8 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
 from sms_handover.bag.info import TopicInfo
-from sms_handover.bag.message_types import MessageTypes
 from sms_handover.errors import BagError
+from sms_handover.messages.message_types import MessageTypes
 
 
 def same_definition(topic: TopicInfo, types: MessageTypes) -> bool:

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from sms_handover.bag.topic_choice import TopicChoice
+from sms_handover.configuration.parameters import parameter
 from sms_handover.errors import ConfigurationError
-from sms_handover.parameters import parameter
 
 
 @dataclass(frozen=True)

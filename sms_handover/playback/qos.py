@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from sms_handover.bag.qos import Durability, History, Reliability, profiles_of
+from sms_handover.configuration.parameters import read_yaml
 from sms_handover.errors import ConfigurationError, UnknownNameError
-from sms_handover.parameters import read_yaml
 from sms_handover.units import NS_PER_S
 
 E = TypeVar("E", bound=Enum)

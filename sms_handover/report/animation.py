@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from sms_handover.errors import SmsHandoverError
 from sms_handover.report.recorded_run import RecordedRun
 from sms_handover.scene.page import animation_html
-from sms_handover.scene.read import deputy_size_in
+from sms_handover.scene.recorded_scene import deputy_size_in
 from sms_handover.scene.scene import Scene, make_scene
 
 

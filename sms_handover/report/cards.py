@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from sms_handover.analysis.highlights import succeeded
 from sms_handover.bag.ledger import Ledger, ledger_table
-from sms_handover.events import graver_in_words
+from sms_handover.graph.events import graver_in_words
 from sms_handover.report.recorded_run import RecordedRun
 from sms_handover.report.styles import RunStyle
 from sms_handover.units import ns_to_seconds

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from sms_handover.analysis.phases import phase_spans
-from sms_handover.events import Severity
+from sms_handover.graph.events import Severity
 from sms_handover.report.plots import Plot, PlotGroup
 from sms_handover.report.styles import RunStyle
 from sms_handover.run_data import RunData

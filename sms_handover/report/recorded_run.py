@@ -6,12 +6,12 @@ from functools import cached_property
 from pathlib import Path
 
 from sms_handover.bag.info import BagInfo, read_info
-from sms_handover.bag.loop import LoopRecord, read_loop
-from sms_handover.bag.reader import read_run
+from sms_handover.bag.run.loop_record import LoopRecord, read_loop
+from sms_handover.bag.run.reader import read_run
 from sms_handover.errors import BagError, ConfigurationError
+from sms_handover.graph.topics import CONTROLLER, PLANT
 from sms_handover.plant.deputy import GraspTolerance
 from sms_handover.run_data import RunData
-from sms_handover.topics import CONTROLLER, PLANT
 
 UNKNOWN_LAW = "unknown"
 

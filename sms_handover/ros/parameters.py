@@ -10,9 +10,15 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from sms_handover.configuration.package_files import config_file
+from sms_handover.configuration.parameters import (
+    ParameterSpec,
+    build,
+    defaults_of,
+    read_parameter_files,
+    spec_of,
+)
 from sms_handover.errors import ConfigurationError, UnknownNameError
-from sms_handover.parameters import ParameterSpec, build, defaults_of, read_parameter_files, spec_of
-from sms_handover.share import config_file
 
 T = TypeVar("T")
 

@@ -15,7 +15,7 @@ from rclpy.qos import (
 )
 
 from sms_handover.bag.qos import Durability, History, Qos, Reliability
-from sms_handover.topics import Topic
+from sms_handover.graph.topics import Topic
 
 # said in full, so that a profile can be held against one that discovery tells of
 _UNTIMED: dict[str, Any] = {

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from sms_handover.parameters import parameter
+from sms_handover.configuration.parameters import parameter
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,10 @@
 """Everything that can be wrong with a scenario, found before anything moves."""
 
 from sms_handover.control.controller import check_stability
+from sms_handover.graph.topics import CONTROLLER
 from sms_handover.simulation.feasibility import PhasePrediction, check_feasibility
 from sms_handover.simulation.scenario import Scenario
 from sms_handover.simulation.wiring import gains_by_phase, make_controller, make_plant
-from sms_handover.topics import CONTROLLER
 from sms_handover.units import ns_to_seconds
 
 

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
+from sms_handover.configuration.parameters import parameter
 from sms_handover.errors import ConfigurationError, UnknownNameError
-from sms_handover.parameters import parameter
-from sms_handover.topics import CONTROLLER, NODES
+from sms_handover.graph.topics import CONTROLLER, NODES
 from sms_handover.units import seconds_to_ns
 
 LOCKSTEP, REALTIME = "lockstep", "realtime"

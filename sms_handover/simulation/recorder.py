@@ -6,7 +6,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from sms_handover.events import RunEvent
+from sms_handover.graph.events import RunEvent
 from sms_handover.model.conserved import PhysicsReceipt
 from sms_handover.run_data import RunData
 from sms_handover.types import (

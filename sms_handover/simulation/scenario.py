@@ -6,19 +6,19 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TypeVar
 
+from sms_handover.configuration.package_files import config_file
+from sms_handover.configuration.parameters import EVERY_NODE, build, read_parameter_files, read_yaml
+from sms_handover.configuration.yaml_reader import line_in
 from sms_handover.control.parameters import ControllerParameters
 from sms_handover.errors import UnknownNameError
+from sms_handover.graph.topics import CONTROLLER, IK, NODES, PLANT, PLAYER, TOPIC_RECORDER, TRAJECTORY, VIEWER
 from sms_handover.ik.parameters import IkParameters
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.parameters import EVERY_NODE, build, read_parameter_files, read_yaml
 from sms_handover.plant.parameters import PlantParameters
-from sms_handover.share import config_file
 from sms_handover.simulation.parameters import CommonParameters
-from sms_handover.topics import CONTROLLER, IK, NODES, PLANT, PLAYER, TOPIC_RECORDER, TRAJECTORY, VIEWER
 from sms_handover.trajectory.load import load_schedule
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.schedule import Schedule
-from sms_handover.yaml_files import line_in
 
 T = TypeVar("T")
 

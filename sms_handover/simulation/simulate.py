@@ -4,13 +4,13 @@ from collections.abc import Callable
 
 from sms_handover.control.protocol import CheckedController, Controller, Guidance
 from sms_handover.errors import ConfigurationError
+from sms_handover.graph.topics import CONTROLLER
 from sms_handover.ik.levenberg_marquardt import find_joints
 from sms_handover.run_data import RunData
 from sms_handover.simulation.parameters import CommonParameters
 from sms_handover.simulation.recorder import RunRecorder
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.wiring import make_controller, make_plant
-from sms_handover.topics import CONTROLLER
 from sms_handover.trajectory.generator import TrajectoryGenerator
 from sms_handover.types import IkStatus, TaskPhase
 

@@ -6,14 +6,14 @@ from types import MappingProxyType
 
 import numpy as np
 
-from sms_handover.events import RunEvent
+from sms_handover.graph.events import RunEvent
+from sms_handover.model.deputy import DeputyDescription
 from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.model.reduced import generalized_jacobian
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.pose_path import PosePath
 from sms_handover.trajectory.schedule import (
-    DeputyDescription,
     GraspFrameTarget,
     Hold,
     JointTarget,

@@ -5,12 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
+from sms_handover.configuration.sections import Section, read_section
 from sms_handover.errors import ScheduleError, UnknownNameError
+from sms_handover.model.deputy import DeputyDescription
 from sms_handover.model.poses import pose_from_xyz_rpy
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.trajectory.schedule import (
     ArmTarget,
-    DeputyDescription,
     GraspFrameTarget,
     Hold,
     JointTarget,
@@ -21,7 +22,6 @@ from sms_handover.trajectory.schedule import (
     ToolTarget,
 )
 from sms_handover.trajectory.validate import check_phases
-from sms_handover.trajectory.yaml_lines import Section, read_section
 from sms_handover.types import Array, GraspAction, GraspCommand, Pose
 from sms_handover.units import seconds_to_ns
 

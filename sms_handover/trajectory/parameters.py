@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from sms_handover.parameters import parameter
+from sms_handover.configuration.parameters import parameter
 from sms_handover.trajectory.time_law import TIME_LAWS
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from types import MappingProxyType
 
+from sms_handover.model.deputy import DeputyDescription
 from sms_handover.types import Array, GraspCommand, Pose, read_only
 
 
@@ -79,24 +80,6 @@ class Phase:
         """Make the mappings immutable."""
         object.__setattr__(self, "targets", MappingProxyType(dict(self.targets)))
         object.__setattr__(self, "gains", MappingProxyType(dict(self.gains)))
-
-
-@dataclass(frozen=True, eq=False)
-class DeputyDescription:
-    """The deputy: mass kg, edges (3,) m, where it starts, and its grasp frames as poses in it.
-
-    A tool that holds the deputy perfectly coincides with a grasp frame.
-    """
-
-    mass: float
-    size: Array
-    deputy_in_world: Pose
-    grasp_frames: Mapping[str, Pose]
-
-    def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only."""
-        object.__setattr__(self, "size", read_only(self.size))
-        object.__setattr__(self, "grasp_frames", MappingProxyType(dict(self.grasp_frames)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,8 +4,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import nan
 
-from sms_handover.events import GRASP_FAILED, GRASP_MISSED, IK_FAILED, PHASE_RETRIED, RunEvent, Severity
-from sms_handover.topics import TRAJECTORY
+from sms_handover.graph.events import GRASP_FAILED, GRASP_MISSED, IK_FAILED, PHASE_RETRIED, RunEvent, Severity
+from sms_handover.graph.topics import TRAJECTORY
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.schedule import ArmTarget, Hold, MissAction, Phase, Schedule
 from sms_handover.types import GraspCommand, GraspEvent, GraspStatus, PhaseState, TaskPhase

@@ -16,10 +16,10 @@ from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from sms_handover.bag.info import read_info
-from sms_handover.bag.reader import read_run
-from sms_handover.cli.folders import bag_of
+from sms_handover.bag.run.reader import read_run
+from sms_handover.launcher.run_folder import bag_of
 from sms_handover.scene.live import LiveScene
-from sms_handover.scene.read import deputy_size_in, read_scene
+from sms_handover.scene.recorded_scene import deputy_size_in, read_scene
 from sms_handover.scene.server import SceneServer
 
 if TYPE_CHECKING:

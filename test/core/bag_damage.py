@@ -10,7 +10,7 @@ from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import CompressionType, Writer
 
-from sms_handover.bag.scan import FileScan, ScannedMessage
+from sms_handover.bag.mcap.scan import FileScan, ScannedMessage
 
 from .bag_messages import TYPES, joint_state, text
 

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from sms_handover import topics
-from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.qos import Durability, Qos
 from sms_handover.bag.recording import Recording
-from sms_handover.events import RunEvent, Severity
+from sms_handover.graph import topics
+from sms_handover.graph.events import RunEvent, Severity
+from sms_handover.messages.message_types import MessageTypes
 from sms_handover.run_data import Array, RunData
 from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, TaskPhase
 

@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from sms_handover.bag.files import bag_files
-from sms_handover.share import config_file
+from sms_handover.configuration.package_files import config_file
 
 FOXGLOVE = config_file("layouts/foxglove.json")
 PLOTJUGGLER = config_file("layouts/plotjuggler.xml")

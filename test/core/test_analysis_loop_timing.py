@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sms_handover import topics
 from sms_handover.analysis.comparison import compare
 from sms_handover.analysis.loop_timing import loop_timing
 from sms_handover.analysis.summary import summary
 from sms_handover.analysis.table import render
-from sms_handover.bag.loop import LoopRecord, read_loop
-from sms_handover.bag.reader import read_run
 from sms_handover.bag.recording import Recording
+from sms_handover.bag.run.loop_record import LoopRecord, read_loop
+from sms_handover.bag.run.reader import read_run
 from sms_handover.errors import BagError
+from sms_handover.graph import topics
 from sms_handover.run_data import RunData
 
 from .bag_messages import (

@@ -3,8 +3,8 @@ from math import isnan, nan
 import numpy as np
 import pytest
 
+from sms_handover.analysis.conservation import ik_outcomes, physics_residuals
 from sms_handover.analysis.grasps import Hold, holds
-from sms_handover.analysis.receipts import ik_outcomes, physics_residuals
 from sms_handover.types import GraspAction, GraspStatus, IkStatus
 
 from .test_analysis_runs import NS, changed, grasp, make_run

@@ -3,8 +3,8 @@ from math import pi
 import numpy as np
 import pytest
 
+from sms_handover.analysis.conservation import ik_outcomes, physics_residuals
 from sms_handover.analysis.phases import phase_spans
-from sms_handover.analysis.receipts import ik_outcomes, physics_residuals
 from sms_handover.analysis.work import joint_work
 from sms_handover.run_data import RunData
 from sms_handover.simulation.simulate import simulate

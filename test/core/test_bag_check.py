@@ -10,8 +10,6 @@ import pytest
 import yaml
 from mcap.writer import CompressionType, IndexType, Writer
 
-from sms_handover.bag.check import check
-from sms_handover.bag.findings import CheckResult, Severity
 from sms_handover.bag.metadata import (
     LARGEST_METADATA,
     ROSBAG2_KEY,
@@ -21,10 +19,12 @@ from sms_handover.bag.metadata import (
     to_yaml,
 )
 from sms_handover.bag.recording import Recording
-from sms_handover.bag.recover import recover
+from sms_handover.bag.repair.check import check
+from sms_handover.bag.repair.findings import CheckResult, Severity
+from sms_handover.bag.repair.recover import recover
+from sms_handover.configuration.yaml_reader import LARGEST_FILE
 from sms_handover.errors import BagError
-from sms_handover.topics import LOOP_NODES
-from sms_handover.yaml_files import LARGEST_FILE
+from sms_handover.graph.topics import LOOP_NODES
 
 from .bag_damage import STRING, chunks_of, write_file
 from .bag_messages import (

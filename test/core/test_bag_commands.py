@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from sms_handover.cli.main import main
-from sms_handover.topics import LOOP_NODES
+from sms_handover.graph.topics import LOOP_NODES
 
 from .bag_damage import chunks_of, write_file
 from .test_bag_check import write_finished

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from sms_handover.bag.counting import LedgerKeeper
 from sms_handover.bag.info import read_info
 from sms_handover.bag.ledger import Ledger, TopicLedger, ledger_table
+from sms_handover.bag.ledger_keeper import LedgerKeeper
 from sms_handover.bag.recording import PUBLISHED_COUNTS, Recording
-from sms_handover.bag.transforms import TF_TYPE
 from sms_handover.errors import BagError
+from sms_handover.messages.transforms import TF_TYPE
 
 from .bag_messages import TICK_NS, TYPES, WALL_NS, joint_state, published_counts, text
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sms_handover.bag.message_types import MessageTypes, definition_roots
-from sms_handover.bag.stamp import stamp_ns
-from sms_handover.bag.transforms import TF_TYPE, transforms_cdr
 from sms_handover.errors import BagError
+from sms_handover.messages.message_types import MessageTypes, definition_roots
+from sms_handover.messages.stamps import stamp_ns
+from sms_handover.messages.transforms import TF_TYPE, transforms_cdr
 from sms_handover.types import Pose
 
 from .bag_messages import OURS, TYPES, joint_state, odometry, text

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sms_handover import topics
 from sms_handover.bag.info import read_info
-from sms_handover.bag.reader import read_run
 from sms_handover.bag.recording import Recording
+from sms_handover.bag.run.reader import read_run
 from sms_handover.bag.writer import BagWriter
 from sms_handover.errors import BagError
+from sms_handover.graph import topics
 from sms_handover.run_data import RunData
 
 from .bag_damage import chunks_of

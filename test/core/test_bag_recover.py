@@ -12,13 +12,13 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StorageP
 from rosbags.rosbag2 import Writer as RosbagsWriter
 from rosbags.typesys import Stores, get_typestore
 
-from sms_handover.bag.check import check
 from sms_handover.bag.info import read_info
 from sms_handover.bag.ledger import Ledger
-from sms_handover.bag.reader import read_run
 from sms_handover.bag.recording import Recording
-from sms_handover.bag.recover import recover
-from sms_handover.bag.recovery import Recovery
+from sms_handover.bag.repair.check import check
+from sms_handover.bag.repair.recover import recover
+from sms_handover.bag.repair.recovery import Recovery
+from sms_handover.bag.run.reader import read_run
 from sms_handover.errors import BagError
 from sms_handover.run_data import RunData
 
@@ -224,7 +224,7 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
 FULL_DISK = """
 import resource, sys
 from pathlib import Path
-from sms_handover.bag.recover import recover
+from sms_handover.bag.repair.recover import recover
 from sms_handover.errors import BagError
 resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))
 try:

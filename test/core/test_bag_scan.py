@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType, Writer
 
-from sms_handover.bag.damage import Damage
-from sms_handover.bag.scan import FileScan, Located, ScannedMessage
+from sms_handover.bag.mcap.damage import Damage
+from sms_handover.bag.mcap.scan import FileScan, Located, ScannedMessage
 
 from .bag_damage import Message, chunks_of, is_subsequence, scanned, write_file
 from .bag_messages import TYPES, text

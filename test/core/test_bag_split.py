@@ -6,12 +6,12 @@ import pytest
 import yaml
 from rosbags.rosbag2 import Reader
 
-from sms_handover.bag.check import check
 from sms_handover.bag.files import read_messages
-from sms_handover.bag.findings import Severity
 from sms_handover.bag.info import read_info
 from sms_handover.bag.recording import Recording
-from sms_handover.bag.recover import recover
+from sms_handover.bag.repair.check import check
+from sms_handover.bag.repair.findings import Severity
+from sms_handover.bag.repair.recover import recover
 from sms_handover.bag.split import Split
 from sms_handover.bag.writer import FLUSH_PERIOD_NS, BagWriter
 from sms_handover.errors import BagError

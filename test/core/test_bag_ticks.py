@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from sms_handover.bag.qos import Qos
-from sms_handover.bag.ticks import RecordedTick, recorded_ticks
+from sms_handover.bag.run.ticks import RecordedTick, recorded_ticks
 from sms_handover.bag.writer import BagWriter
 from sms_handover.errors import BagError
 

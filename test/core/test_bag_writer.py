@@ -20,12 +20,12 @@ from rosbags.rosbag2 import Reader
 
 from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import read_info
-from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.qos import Durability, History, Qos, Reliability
-from sms_handover.bag.reader import read_run
 from sms_handover.bag.recording import Recording
+from sms_handover.bag.run.reader import read_run
 from sms_handover.bag.writer import BagWriter
 from sms_handover.errors import BagError
+from sms_handover.messages.message_types import MessageTypes
 
 from .bag_messages import (
     JOINT_STATE,

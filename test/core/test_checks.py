@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sms_handover.checks import check_finite, check_unit
 from sms_handover.errors import MessageError, Reason
+from sms_handover.ros.codecs.validation import check_finite, check_unit
 
 
 @pytest.mark.parametrize("bad", [np.nan, -np.nan, np.inf, -np.inf])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sms_handover.events import COMMAND_BACK, COMMAND_LOST, TORQUE_ZERO, Severity
-from sms_handover.plant.command_watch import CommandWatch
+from sms_handover.graph.events import COMMAND_BACK, COMMAND_LOST, TORQUE_ZERO, Severity
+from sms_handover.nodes.parts.command_watch import CommandWatch
 from sms_handover.simulation.scenario import load_parameters
 from sms_handover.types import JointCommand
 

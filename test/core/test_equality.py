@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sms_handover.analysis.equality import Difference, compare_runs
-from sms_handover.events import RunEvent, Severity
+from sms_handover.graph.events import RunEvent, Severity
 from sms_handover.run_data import RunData
 from sms_handover.types import GraspStatus
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from sms_handover import events
-from sms_handover.events import RunEvent, Severity, graver_in_words
+from sms_handover.graph import events
+from sms_handover.graph.events import RunEvent, Severity, graver_in_words
 
 EVENT = RunEvent(2_500_000_000, "plant", "command_lost", Severity.WARNING, "no command comes")
 

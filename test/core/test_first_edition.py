@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sms_handover.bag.info import read_info
-from sms_handover.bag.reader import read_run
+from sms_handover.bag.run.reader import read_run
 from sms_handover.cli.main import main
 from sms_handover.cli.reproduce import scenario_in
 from sms_handover.simulation.simulate import simulate

@@ -8,9 +8,9 @@ import pytest
 
 from sms_handover.bag.recording import Recording
 from sms_handover.frames import DEPUTY, WORLD
+from sms_handover.graph.topics import ROBOT_DESCRIPTION, graph_topics
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.scene.links import DescribedRobot
-from sms_handover.topics import ROBOT_DESCRIPTION, graph_topics
 
 from .bag_messages import TYPES, WALL_NS, joint_state, made_up_run, odometry, open_topics, record_run
 from .layout_paths import (

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from sms_handover.cli.node_log import NodeLog
 from sms_handover.errors import GraphError
+from sms_handover.launcher.node_log import NodeLog
 
 
 @pytest.mark.parametrize("fate", ["stays", "moved", "deleted"])

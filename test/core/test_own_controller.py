@@ -9,11 +9,11 @@ from in_process_controller import JointPd
 from my_controller.task_space_pd import TaskSpaceGains, TaskSpacePd
 
 from sms_handover.analysis.equality import compare_runs
+from sms_handover.configuration.parameters import build
 from sms_handover.control.protocol import Guidance
 from sms_handover.errors import ConfigurationError, ControllerError
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.parameters import build
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.simulation.wiring import make_controller

@@ -6,11 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sms_handover.control.nmpc import NmpcGains
-from sms_handover.control.parameters import ControllerParameters, gains_of
-from sms_handover.control.pid import PidGains
-from sms_handover.errors import ConfigurationError, SmsHandoverError, UnknownNameError
-from sms_handover.parameters import (
+from sms_handover.configuration.parameters import (
     EVERY_NODE,
     ParameterSpec,
     build,
@@ -19,6 +15,10 @@ from sms_handover.parameters import (
     read_yaml,
     spec_of,
 )
+from sms_handover.control.nmpc import NmpcGains
+from sms_handover.control.parameters import ControllerParameters, gains_of
+from sms_handover.control.pid import PidGains
+from sms_handover.errors import ConfigurationError, SmsHandoverError, UnknownNameError
 from sms_handover.simulation.scenario import load_parameters
 
 

@@ -5,13 +5,13 @@ import signal
 
 import pytest
 
-from sms_handover.playback.keyboard import Keyboard
+from sms_handover.terminal.keyboard import Keyboard
 
 from .terminal import Terminal
 
 PROGRAM = """
 import sys, time
-from sms_handover.playback.keyboard import Keyboard
+from sms_handover.terminal.keyboard import Keyboard
 def stop(number, frame):
     sys.exit(7)
 import signal

@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from sms_handover.bag.info import read_info
-from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.time_order import TimeSpan
 from sms_handover.bag.writer import BagWriter
 from sms_handover.errors import ConfigurationError
+from sms_handover.messages.message_types import MessageTypes
 from sms_handover.playback.definitions import same_definition
 from sms_handover.playback.source import PlaybackSource, span_of
 

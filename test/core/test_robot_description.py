@@ -12,12 +12,12 @@ import pinocchio as pin
 import pytest
 import yaml
 
+from sms_handover.configuration.package_files import config_file
+from sms_handover.configuration.parameters import read_yaml
 from sms_handover.errors import ConfigurationError, RobotDescriptionError, UnknownNameError
 from sms_handover.model.description import Inertia, RobotDescription, load_robot
 from sms_handover.model.parts import Gripper, box_moments, cylinder_moments
 from sms_handover.model.urdf import to_urdf
-from sms_handover.parameters import read_yaml
-from sms_handover.share import config_file
 from sms_handover.types import Array
 
 Document = dict[str, Any]

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from sms_handover.bag.check import check
 from sms_handover.bag.recording import Recording
+from sms_handover.bag.repair.check import check
 from sms_handover.bag.run_recordings import RunRecordings
-from sms_handover.cli.folders import bag_of, bags_of
 from sms_handover.errors import BagError, ConfigurationError
+from sms_handover.launcher.run_folder import bag_of, bags_of
 
 
 def nothing(recording: Recording) -> None:

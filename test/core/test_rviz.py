@@ -5,10 +5,10 @@ from typing import Any
 import pytest
 import yaml
 
+from sms_handover.configuration.package_files import config_file
 from sms_handover.frames import WORLD
+from sms_handover.graph.topics import Topic, graph_topics
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.share import config_file
-from sms_handover.topics import Topic, graph_topics
 
 TAKES = {  # what each display of rviz_default_plugins subscribes to
     "RobotModel": "std_msgs/msg/String",

@@ -14,7 +14,7 @@ from sms_handover.model.poses import pose_distance, pose_of, se3_of
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.run_data import RunData
 from sms_handover.scene.links import DescribedRobot
-from sms_handover.scene.read import read_scene
+from sms_handover.scene.recorded_scene import read_scene
 from sms_handover.scene.scene import Scene, frame_stamps, make_scene
 from sms_handover.scene.shapes import read_shapes
 from sms_handover.simulation.scenario import Scenario

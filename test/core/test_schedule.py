@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sms_handover.configuration.package_files import config_file
 from sms_handover.errors import ConfigurationError, ScheduleError
 from sms_handover.model.poses import pose_distance, pose_from_xyz_rpy
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.share import config_file
 from sms_handover.simulation.scenario import Scenario
 from sms_handover.simulation.wiring import gains_by_phase
 from sms_handover.trajectory.load import load_schedule

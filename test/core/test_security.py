@@ -9,13 +9,13 @@ import pytest
 import yaml
 
 from sms_handover.bag.recording import Recording
+from sms_handover.configuration.parameters import read_parameter_files
+from sms_handover.configuration.yaml_reader import YamlLoader
 from sms_handover.errors import SmsHandoverError
 from sms_handover.export.csv_files import CsvFormat
 from sms_handover.export.output import Tables
 from sms_handover.model.description import load_robot
-from sms_handover.parameters import read_parameter_files
 from sms_handover.simulation.scenario import load_scenario
-from sms_handover.yaml_files import YamlLoader
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = [

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from sms_handover.errors import ConfigurationError, UnstableLoopError
-from sms_handover.events import GRASP_FAILED, GRASP_MISSED, IK_FAILED, PHASE_RETRIED
+from sms_handover.graph.events import GRASP_FAILED, GRASP_MISSED, IK_FAILED, PHASE_RETRIED
 from sms_handover.model.poses import pose_of, pose_row, se3_of
 from sms_handover.model.reduced import base_twist_per_joint_rate, reduced_dynamics
 from sms_handover.run_data import RunData

@@ -1,12 +1,12 @@
 import pytest
 
-from sms_handover.status_line import StatusLine
+from sms_handover.terminal.status_line import StatusLine
 
 
 @pytest.fixture(params=[True, False])
 def line(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> StatusLine:
     monkeypatch.setattr("sys.stderr.isatty", lambda: request.param)
-    monkeypatch.setattr("sms_handover.status_line.monotonic", lambda: time[0])
+    monkeypatch.setattr("sms_handover.terminal.status_line.monotonic", lambda: time[0])
     time[0] = 100.0
     return StatusLine()
 

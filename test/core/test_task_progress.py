@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from sms_handover.events import GRASP_FAILED, GRASP_MISSED, IK_FAILED, PHASE_RETRIED, RunEvent, Severity
+from sms_handover.graph.events import GRASP_FAILED, GRASP_MISSED, IK_FAILED, PHASE_RETRIED, RunEvent, Severity
 from sms_handover.trajectory.schedule import Hold
 from sms_handover.trajectory.task_progress import Stage, TaskProgress
 from sms_handover.types import GraspCommand, GraspEvent, GraspStatus, PhaseState

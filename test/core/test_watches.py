@@ -1,8 +1,8 @@
 """References and answers that stop coming are told once, with for how long."""
 
-from sms_handover.control.reference_watch import ReferenceWatch
-from sms_handover.events import NO_ANSWER, REFERENCE_BACK, REFERENCE_LOST, RunEvent
-from sms_handover.plant.answer_watch import AnswerWatch
+from sms_handover.graph.events import NO_ANSWER, REFERENCE_BACK, REFERENCE_LOST, RunEvent
+from sms_handover.nodes.parts.answer_watch import AnswerWatch
+from sms_handover.nodes.parts.reference_watch import ReferenceWatch
 from sms_handover.simulation.scenario import load_parameters
 
 _MS = 1_000_000  # ns

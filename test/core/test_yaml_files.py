@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 import yaml
 
+from sms_handover.configuration.parameters import read_yaml
+from sms_handover.configuration.yaml_reader import LARGEST_FILE, load
 from sms_handover.errors import ConfigurationError, UnknownNameError
-from sms_handover.parameters import read_yaml
 from sms_handover.simulation.scenario import load_parameters, load_scenario
-from sms_handover.yaml_files import LARGEST_FILE, load
 
 BOMB = "a: &a [lol, lol, lol, lol, lol, lol, lol, lol, lol]\n" + "".join(
     f"{chr(97 + n)}: &{chr(97 + n)} [{', '.join([f'*{chr(96 + n)}'] * 9)}]\n" for n in range(1, 9)

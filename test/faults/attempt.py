@@ -11,7 +11,7 @@ from subprocess import TimeoutExpired
 from time import monotonic
 from typing import Any
 
-from sms_handover.cli.domain import reserved_domain
+from sms_handover.launcher.domain import reserved_domain
 
 from .fault import Fault
 from .leftovers import MARK, SHARED_MEMORY, shared_memory, wait_for_none

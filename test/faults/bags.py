@@ -5,9 +5,9 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from sms_handover.bag.check import check
 from sms_handover.bag.files import read_messages
-from sms_handover.bag.findings import Severity
+from sms_handover.bag.repair.check import check
+from sms_handover.bag.repair.findings import Severity
 
 from ..ros.short_handover import short_handover
 from ..system.runs import Ended

@@ -16,9 +16,9 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
 
+from sms_handover.graph.topics import graph_topics
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.qos import profile_of
-from sms_handover.topics import graph_topics
 
 _ARMS = ("arm_a", "arm_b")
 _JOINTS = [f"{arm}_joint_{number}" for arm in _ARMS for number in range(1, 8)]

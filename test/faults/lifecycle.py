@@ -12,7 +12,7 @@ from rclpy.signals import SignalHandlerOptions
 from sms_handover_interfaces.srv import StepTicks
 from std_srvs.srv import SetBool, Trigger
 
-from sms_handover.topics import CONTROLLER, NODES, PLANT, TRAJECTORY
+from sms_handover.graph.topics import CONTROLLER, NODES, PLANT, TRAJECTORY
 
 from ..system.runs import Ended, Running
 from .fault import Fault

@@ -8,9 +8,9 @@ from functools import partial
 from pathlib import Path
 
 from sms_handover.bag.info import read_info
+from sms_handover.configuration.package_files import config_file
 from sms_handover.errors import Reason
-from sms_handover.share import config_file
-from sms_handover.topics import (
+from sms_handover.graph.topics import (
     BASE_ODOMETRY,
     DEPUTY_POSE,
     GRASP_EVENT,

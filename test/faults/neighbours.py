@@ -3,7 +3,7 @@
 import signal
 import sys
 
-from sms_handover.topics import CONTROLLER
+from sms_handover.graph.topics import CONTROLLER
 
 from ..system.runs import Ended, command_of
 from .fault import Fault
@@ -17,7 +17,7 @@ TITLE = "Runs side by side"
 _TAKE_ALL = """
 import subprocess, sys
 from contextlib import ExitStack
-from sms_handover.cli.domain import reservation
+from sms_handover.launcher.domain import reservation
 from sms_handover.errors import ConfigurationError
 with ExitStack() as stack:
     try:

@@ -7,7 +7,7 @@ from functools import partial
 from time import sleep
 
 from benchmarks.recorder_kill import Witness
-from sms_handover.topics import NODES, RECORDER
+from sms_handover.graph.topics import NODES, RECORDER
 
 from ..system.runs import Ended, is_node
 from .fault import Fault

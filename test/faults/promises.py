@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from sms_handover.bag.check import check
-from sms_handover.bag.findings import Severity
 from sms_handover.bag.info import read_info
 from sms_handover.bag.ledger import Ledger
-from sms_handover.bag.reader import read_run
-from sms_handover.bag.recover import recover
+from sms_handover.bag.repair.check import check
+from sms_handover.bag.repair.findings import Severity
+from sms_handover.bag.repair.recover import recover
+from sms_handover.bag.run.reader import read_run
 from sms_handover.errors import BagError
 from sms_handover.units import NS_PER_S
 

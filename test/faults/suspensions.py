@@ -5,7 +5,7 @@ import signal
 from functools import partial
 from time import sleep
 
-from sms_handover.topics import NODES, RECORDER
+from sms_handover.graph.topics import NODES, RECORDER
 
 from ..system.runs import Ended
 from .fault import Fault

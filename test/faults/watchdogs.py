@@ -11,11 +11,11 @@ import numpy as np
 import yaml
 
 from sms_handover.analysis.equality import compare_runs
-from sms_handover.bag.reader import read_run
+from sms_handover.bag.run.reader import read_run
+from sms_handover.graph.topics import CONTROLLER, IK, PLANT, TRAJECTORY
 from sms_handover.run_data import RunData
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
-from sms_handover.topics import CONTROLLER, IK, PLANT, TRAJECTORY
 from sms_handover.types import GraspStatus
 from sms_handover.units import NS_PER_S
 

@@ -14,20 +14,20 @@ from shutil import copy, rmtree
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
-from sms_handover.bag.check import check
 from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import read_info
-from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.metadata import METADATA_FILE, counts_of, metadata_of
-from sms_handover.bag.reader import read_run
-from sms_handover.bag.recover import recover
+from sms_handover.bag.repair.check import check
+from sms_handover.bag.repair.recover import recover
+from sms_handover.bag.run.reader import read_run
+from sms_handover.configuration.package_files import config_file
 from sms_handover.errors import SmsHandoverError
 from sms_handover.frames import BASE, WORLD
+from sms_handover.messages.message_types import MessageTypes
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.ros.phase_wire import PhaseWire
-from sms_handover.ros.wire import JointStateWire, OdometryWire, PoseWire, arrival_ns
+from sms_handover.ros.codecs.loop_messages import JointStateWire, OdometryWire, PoseWire, arrival_ns
+from sms_handover.ros.codecs.task_phase import PhaseWire
 from sms_handover.scene.live import LiveScene
-from sms_handover.share import config_file
 from sms_handover.simulation.scenario import load_parameters
 from sms_handover.trajectory.load import load_schedule
 

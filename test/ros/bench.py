@@ -10,9 +10,9 @@ from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-from sms_handover.ros.graph_node import GraphNode
-from sms_handover.ros.inputs import Inputs
+from sms_handover.ros.node.graph_node import GraphNode
 from sms_handover.ros.parameters import as_arguments
+from sms_handover.ros.transport.inputs import Inputs
 
 N = TypeVar("N", bound=Node)
 

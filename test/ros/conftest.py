@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sms_handover.cli.domain import _is_used, reserved_domain
+from sms_handover.launcher.domain import _is_used, reserved_domain
 
 from .bench import Bench
 

@@ -8,17 +8,7 @@ from rclpy.node import Node
 from sms_handover_interfaces.msg import RunState
 from std_msgs.msg import Header, String
 
-from sms_handover.bag.message_types import MessageTypes
-from sms_handover.bag.stamp import stamp_ns
-from sms_handover.nodes.controller import ControllerNode
-from sms_handover.nodes.ik import IkNode
-from sms_handover.nodes.plant import PlantNode
-from sms_handover.nodes.trajectory import TrajectoryNode
-from sms_handover.ros.convert import time_message
-from sms_handover.ros.endpoints import Endpoints
-from sms_handover.ros.graph_node import GraphNode
-from sms_handover.simulation.parameters import EXECUTOR
-from sms_handover.topics import (
+from sms_handover.graph.topics import (
     CONTROLLER,
     IK,
     JOINT_STATES,
@@ -32,6 +22,16 @@ from sms_handover.topics import (
     Topic,
     graph_topics,
 )
+from sms_handover.messages.message_types import MessageTypes
+from sms_handover.messages.stamps import stamp_ns
+from sms_handover.nodes.controller import ControllerNode
+from sms_handover.nodes.ik import IkNode
+from sms_handover.nodes.plant import PlantNode
+from sms_handover.nodes.trajectory import TrajectoryNode
+from sms_handover.ros.codecs.convert import time_message
+from sms_handover.ros.node.endpoints import Endpoints
+from sms_handover.ros.node.graph_node import GraphNode
+from sms_handover.simulation.parameters import EXECUTOR
 
 from .bench import Bench, Parameters
 from .short_handover import short_handover

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import yaml
 
+from sms_handover.configuration.package_files import config_file
 from sms_handover.ik.levenberg_marquardt import solve_ik
 from sms_handover.model.poses import pose_from_xyz_rpy, pose_of, se3_of
-from sms_handover.share import config_file
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.wiring import initial_joints
 from sms_handover.types import IkRequest, IkStatus, Pose

@@ -7,15 +7,9 @@ import pytest
 from rclpy.serialization import serialize_message
 from sms_handover_interfaces.msg import RunState, TaskPhase
 
-from sms_handover.bag.stamp import stamp_ns
-from sms_handover.bag.ticks import RecordedTick
+from sms_handover.bag.run.ticks import RecordedTick
 from sms_handover.frames import BASE, WORLD
-from sms_handover.model.robot_model import RobotModel
-from sms_handover.ros.command_replay import PEERS, CommandReplay
-from sms_handover.ros.convert import header
-from sms_handover.ros.endpoints import Endpoints
-from sms_handover.ros.wire import JointStateWire, StateWire
-from sms_handover.topics import (
+from sms_handover.graph.topics import (
     BASE_ODOMETRY,
     CONTROLLER,
     JOINT_COMMAND,
@@ -26,6 +20,12 @@ from sms_handover.topics import (
     TASK_PHASE,
     graph_topics,
 )
+from sms_handover.launcher.command_replay import PEERS, CommandReplay
+from sms_handover.messages.stamps import stamp_ns
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.ros.codecs.convert import header
+from sms_handover.ros.codecs.loop_messages import JointStateWire, StateWire
+from sms_handover.ros.node.endpoints import Endpoints
 from sms_handover.types import Pose, RobotState, Twist
 
 from .bench import Bench

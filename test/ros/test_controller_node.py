@@ -8,17 +8,10 @@ import numpy as np
 import pytest
 from sms_handover_interfaces.msg import RunState
 
-from sms_handover.bag.stamp import stamp_ns
 from sms_handover.control.controller import JointController
 from sms_handover.errors import UnstableLoopError
 from sms_handover.frames import BASE, WORLD
-from sms_handover.nodes.controller import ControllerNode
-from sms_handover.ros.convert import phase_message
-from sms_handover.ros.endpoints import CountedPublisher, Endpoints
-from sms_handover.ros.wire import JointStateWire, StateWire
-from sms_handover.simulation.scenario import Scenario, load_scenario
-from sms_handover.simulation.wiring import initial_joints, make_controller
-from sms_handover.topics import (
+from sms_handover.graph.topics import (
     BASE_ODOMETRY,
     CONTROLLER,
     JOINT_COMMAND,
@@ -30,6 +23,13 @@ from sms_handover.topics import (
     TASK_PHASE,
     TRAJECTORY,
 )
+from sms_handover.messages.stamps import stamp_ns
+from sms_handover.nodes.controller import ControllerNode
+from sms_handover.ros.codecs.convert import phase_message
+from sms_handover.ros.codecs.loop_messages import JointStateWire, StateWire
+from sms_handover.ros.node.endpoints import CountedPublisher, Endpoints
+from sms_handover.simulation.scenario import Scenario, load_scenario
+from sms_handover.simulation.wiring import initial_joints, make_controller
 from sms_handover.types import Array, JointReference, Pose, RobotState, TaskPhase, Twist
 
 from .bench import Bench

@@ -10,7 +10,9 @@ from sms_handover_interfaces.msg import IkStatus as IkStatusMessage
 from sms_handover_interfaces.msg import RunEvent as RunEventMessage
 from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
 
-from sms_handover.bag.decode import (
+from sms_handover.errors import GraphError
+from sms_handover.graph.events import RunEvent, Severity
+from sms_handover.messages.values import (
     energy_values,
     grasp_event,
     header_ns,
@@ -20,9 +22,7 @@ from sms_handover.bag.decode import (
     task_phase,
     vector_values,
 )
-from sms_handover.errors import GraphError
-from sms_handover.events import RunEvent, Severity
-from sms_handover.ros.convert import (
+from sms_handover.ros.codecs.convert import (
     energy_message,
     event_message,
     header,

@@ -13,12 +13,7 @@ from sms_handover_interfaces.msg import GraspCommand, RunState
 from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
 
 from sms_handover.errors import MessageError, Reason
-from sms_handover.ros.convert import time_message
-from sms_handover.ros.door import Refusals
-from sms_handover.ros.qos import LOSSLESS
-from sms_handover.ros.sender import Sender
-from sms_handover.simulation.parameters import DIRECT, EXECUTOR
-from sms_handover.topics import (
+from sms_handover.graph.topics import (
     BASE_ODOMETRY,
     CONTROLLER,
     DEPUTY_POSE,
@@ -35,6 +30,11 @@ from sms_handover.topics import (
     TASK_PHASE,
     TRAJECTORY,
 )
+from sms_handover.ros.codecs.convert import time_message
+from sms_handover.ros.node.message_filter import Refusals
+from sms_handover.ros.qos import LOSSLESS
+from sms_handover.ros.transport.publisher_identity import Sender
+from sms_handover.simulation.parameters import DIRECT, EXECUTOR
 
 from .bench import Bench
 from .graph import Graph, Messages
@@ -52,7 +52,7 @@ class Log:
         self.now = 100.0
         self.lines: list[str] = []
         self.firsts: list[str] = []
-        monkeypatch.setattr("sms_handover.ros.door.monotonic", lambda: self.now)
+        monkeypatch.setattr("sms_handover.ros.node.message_filter.monotonic", lambda: self.now)
         self.refusals = Refusals(self.lines.append, lambda topic, error: self.firsts.append(topic))
 
 

@@ -9,9 +9,9 @@ from rclpy.node import Node
 from std_msgs.msg import String
 
 from sms_handover.errors import GraphError
-from sms_handover.ros.endpoints import CountedPublisher, Endpoints
+from sms_handover.graph.topics import CONTROLLER, IK, NODES, PLANT, RECORDER, TRAJECTORY, Rate, Topic
+from sms_handover.ros.node.endpoints import CountedPublisher, Endpoints
 from sms_handover.ros.qos import LATCHED
-from sms_handover.topics import CONTROLLER, IK, NODES, PLANT, RECORDER, TRAJECTORY, Rate, Topic
 
 from .bench import Bench
 
@@ -68,8 +68,8 @@ class Time:
 @pytest.fixture
 def time(monkeypatch: pytest.MonkeyPatch) -> Time:
     time = Time()
-    monkeypatch.setattr("sms_handover.ros.endpoints.monotonic", time.monotonic)
-    monkeypatch.setattr("sms_handover.ros.endpoints.sleep", time.sleep)
+    monkeypatch.setattr("sms_handover.ros.node.endpoints.monotonic", time.monotonic)
+    monkeypatch.setattr("sms_handover.ros.node.endpoints.sleep", time.sleep)
     return time
 
 

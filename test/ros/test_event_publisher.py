@@ -2,11 +2,11 @@
 
 import pytest
 
-from sms_handover.bag.decode import run_event
-from sms_handover.events import RunEvent, Severity
-from sms_handover.ros.endpoints import Endpoints
-from sms_handover.ros.event_publisher import EventPublisher
-from sms_handover.topics import RUN_EVENTS
+from sms_handover.graph.events import RunEvent, Severity
+from sms_handover.graph.topics import RUN_EVENTS
+from sms_handover.messages.values import run_event
+from sms_handover.ros.node.endpoints import Endpoints
+from sms_handover.ros.node.event_publisher import EventPublisher
 
 from .bench import Bench
 from .graph import TOPICS

@@ -10,8 +10,8 @@ from my_controller.task_space_pd import TaskSpaceGains, TaskSpacePd
 from sms_handover.control.protocol import Guidance
 from sms_handover.errors import UnknownNameError
 from sms_handover.external.controller import GuidedController, OwnControllerNode
+from sms_handover.graph.topics import CONTROLLER, JOINT_COMMAND, PLANT
 from sms_handover.simulation.scenario import Scenario, load_scenario
-from sms_handover.topics import CONTROLLER, JOINT_COMMAND, PLANT
 from sms_handover.types import Array, JointReference, Pose, RobotState, TaskPhase
 
 from .bench import Bench

@@ -12,26 +12,9 @@ import pytest
 import rclpy
 from rclpy.parameter import Parameter
 
-from sms_handover.nodes.controller import ControllerNode
-from sms_handover.nodes.ik import IkNode
-from sms_handover.nodes.plant import PlantNode
-from sms_handover.nodes.recorder import RecorderNode
-from sms_handover.nodes.trajectory import TrajectoryNode
-from sms_handover.parameters import build, read_parameter_files
-from sms_handover.ros.graph_node import GraphNode
-from sms_handover.ros.help import EXAMPLES, node_help
-from sms_handover.ros.playback_services import offer_services
-from sms_handover.ros.reference import (
-    ANY_ARM,
-    OWN_GROUPS,
-    groups_of,
-    parameter_rows,
-    qos_text,
-    services_of,
-    topics_of,
-)
-from sms_handover.share import config_file
-from sms_handover.topics import (
+from sms_handover.configuration.package_files import config_file
+from sms_handover.configuration.parameters import build, read_parameter_files
+from sms_handover.graph.topics import (
     CLOCK,
     CONTAINER,
     LOOP_NODES,
@@ -41,6 +24,23 @@ from sms_handover.topics import (
     TF,
     Rate,
     graph_topics,
+)
+from sms_handover.nodes.controller import ControllerNode
+from sms_handover.nodes.ik import IkNode
+from sms_handover.nodes.parts.playback_services import offer_services
+from sms_handover.nodes.plant import PlantNode
+from sms_handover.nodes.recorder import RecorderNode
+from sms_handover.nodes.trajectory import TrajectoryNode
+from sms_handover.ros.node.graph_node import GraphNode
+from sms_handover.ros.reference.help import EXAMPLES, node_help
+from sms_handover.ros.reference.interfaces import (
+    ANY_ARM,
+    OWN_GROUPS,
+    groups_of,
+    parameter_rows,
+    qos_text,
+    services_of,
+    topics_of,
 )
 
 from ..workspace import ROOT, executables

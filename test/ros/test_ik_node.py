@@ -9,13 +9,13 @@ from geometry_msgs.msg import Pose as PoseMessage
 from sms_handover_interfaces.msg import IkStatus as IkStatusMessage
 from sms_handover_interfaces.srv import SolveIK
 
-from sms_handover.bag.decode import header_ns
+from sms_handover.graph.topics import SOLVE_IK
 from sms_handover.ik.levenberg_marquardt import solve_ik
+from sms_handover.messages.values import header_ns
 from sms_handover.nodes.ik import IkNode
-from sms_handover.ros.convert import joint_positions_message, joints_in_order, pose_message
+from sms_handover.ros.codecs.convert import joint_positions_message, joints_in_order, pose_message
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.wiring import initial_joints
-from sms_handover.topics import SOLVE_IK
 from sms_handover.types import Array, IkRequest, IkStatus, Pose
 
 from .bench import Bench

@@ -11,9 +11,9 @@ from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
-from sms_handover.ros.direct_inputs import DirectInputs
-from sms_handover.ros.inputs import ExecutorInputs, Inputs
 from sms_handover.ros.qos import LATCHED, LOSSLESS
+from sms_handover.ros.transport.direct import DirectInputs
+from sms_handover.ros.transport.inputs import ExecutorInputs, Inputs
 
 from .bench import DEADLINE_S, Bench
 

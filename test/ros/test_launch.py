@@ -13,13 +13,13 @@ from typing import Any
 
 import pytest
 
+from sms_handover.configuration.package_files import config_file
+from sms_handover.configuration.parameters import build, read_parameter_files
 from sms_handover.errors import ConfigurationError, GraphError
-from sms_handover.parameters import build, read_parameter_files
-from sms_handover.ros.composition import ProcessArguments
-from sms_handover.ros.launch_arguments import ARGUMENTS, launch_processes
-from sms_handover.ros.parent import LAUNCHER_PID
-from sms_handover.share import config_file
-from sms_handover.topics import CONTAINER, CONTROLLER, IK, LOOP_NODES, PLANT, RECORDER, TRAJECTORY
+from sms_handover.graph.topics import CONTAINER, CONTROLLER, IK, LOOP_NODES, PLANT, RECORDER, TRAJECTORY
+from sms_handover.ros.launching.composition import ProcessArguments
+from sms_handover.ros.launching.launch_arguments import ARGUMENTS, launch_processes
+from sms_handover.ros.process.launcher_process import LAUNCHER_PID
 
 from ..workspace import ROOT, executables
 

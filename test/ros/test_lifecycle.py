@@ -13,18 +13,8 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
-from sms_handover.bag.stamp import stamp_ns
 from sms_handover.errors import ConfigurationError
-from sms_handover.nodes.controller import ControllerNode
-from sms_handover.nodes.ik import IkNode
-from sms_handover.nodes.plant import PlantNode
-from sms_handover.nodes.recorder import RecorderNode
-from sms_handover.nodes.trajectory import TrajectoryNode
-from sms_handover.ros import lifecycle_driver
-from sms_handover.ros.graph_node import GraphNode
-from sms_handover.ros.lifecycle_driver import LifecycleDriver
-from sms_handover.simulation.parameters import DIRECT, EXECUTOR
-from sms_handover.topics import (
+from sms_handover.graph.topics import (
     BASE_ODOMETRY,
     CONTROLLER,
     IK,
@@ -38,6 +28,16 @@ from sms_handover.topics import (
     TASK_PHASE,
     TRAJECTORY,
 )
+from sms_handover.launcher import lifecycle_driver
+from sms_handover.launcher.lifecycle_driver import LifecycleDriver
+from sms_handover.messages.stamps import stamp_ns
+from sms_handover.nodes.controller import ControllerNode
+from sms_handover.nodes.ik import IkNode
+from sms_handover.nodes.plant import PlantNode
+from sms_handover.nodes.recorder import RecorderNode
+from sms_handover.nodes.trajectory import TrajectoryNode
+from sms_handover.ros.node.graph_node import GraphNode
+from sms_handover.simulation.parameters import DIRECT, EXECUTOR
 
 from .bench import Bench
 from .graph import REAL, Graph, Messages

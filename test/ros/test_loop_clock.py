@@ -5,7 +5,7 @@ from math import sqrt
 import pytest
 from sms_handover_interfaces.msg import LoopTiming
 
-from sms_handover.ros.loop_clock import LATENCY_BIN_S, LATENCY_BINS, LoopClock
+from sms_handover.ros.transport.loop_clock import LATENCY_BIN_S, LATENCY_BINS, LoopClock
 
 TICK_S = 0.25  # s; with all times multiples of 1/16 s every sum here is exact
 TICK_NS = 250_000_000
@@ -26,7 +26,7 @@ class WallClock:
 @pytest.fixture
 def wall(monkeypatch: pytest.MonkeyPatch) -> WallClock:
     clock = WallClock()
-    monkeypatch.setattr("sms_handover.ros.loop_clock.monotonic", clock)
+    monkeypatch.setattr("sms_handover.ros.transport.loop_clock.monotonic", clock)
     return clock
 
 

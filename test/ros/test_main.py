@@ -13,8 +13,8 @@ from rclpy.executors import Executor
 
 from sms_handover.errors import BagError, ConfigurationError, GraphError
 from sms_handover.nodes import controller, ik, plant, recorder, trajectory
-from sms_handover.ros.main import EXIT_FAILED, EXIT_OK, EXIT_USAGE, RunnableNode, Stop, run_node
-from sms_handover.ros.parent import LAUNCHER_PID
+from sms_handover.ros.process.launcher_process import LAUNCHER_PID
+from sms_handover.ros.process.main import EXIT_FAILED, EXIT_OK, EXIT_USAGE, RunnableNode, Stop, run_node
 
 from ..system.runs import DEADLINE_S
 from .bench import Bench
@@ -165,7 +165,7 @@ def test_an_argument_that_ros_does_not_know_is_refused(capfd: pytest.CaptureFixt
 
 
 IMPATIENT = """
-from sms_handover.ros.main import RunnableNode, run_node
+from sms_handover.ros.process.main import RunnableNode, run_node
 
 class Worker(RunnableNode):
     def __init__(self):
@@ -192,8 +192,8 @@ def test_a_signal_on_the_way_out_keeps_the_exit_code() -> None:
 
 
 HANGING = """
-from sms_handover.ros import main
-from sms_handover.ros.main import RunnableNode, run_node
+from sms_handover.ros.process.realtime import main
+from sms_handover.ros.process.main import RunnableNode, run_node
 
 class Worker(RunnableNode):
     def run(self, executor, stop):
@@ -222,7 +222,7 @@ if "exit" in sys.argv:
     atexit.register(hang)  # before ours, so it is called after it
 
 from sms_handover.ros import launcher_watch, main
-from sms_handover.ros.main import RunnableNode, run_node
+from sms_handover.ros.process.main import RunnableNode, run_node
 
 class Worker(RunnableNode):
     def run(self, executor, stop):

@@ -14,14 +14,8 @@ from sms_handover_interfaces.msg import PublishedCounts, RunState
 from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
 from std_srvs.srv import Trigger
 
-from sms_handover.events import RunEvent, Severity
-from sms_handover.ros.convert import event_message, header, phase_message, pose_stamped, run_event_message
-from sms_handover.ros.graph_node import INPUTS
-from sms_handover.ros.inputs import ExecutorInputs, Inputs
-from sms_handover.ros.monitor import RunMonitor
-from sms_handover.ros.qos import LATCHED, LOSSLESS
-from sms_handover.simulation.parameters import DIRECT
-from sms_handover.topics import (
+from sms_handover.graph.events import RunEvent, Severity
+from sms_handover.graph.topics import (
     DIAGNOSTICS,
     GRASP_EVENT,
     RUN_EVENTS,
@@ -31,6 +25,18 @@ from sms_handover.topics import (
     target_pose,
     tool_pose,
 )
+from sms_handover.launcher.monitor import RunMonitor
+from sms_handover.ros.codecs.convert import (
+    event_message,
+    header,
+    phase_message,
+    pose_stamped,
+    run_event_message,
+)
+from sms_handover.ros.node.graph_node import INPUTS
+from sms_handover.ros.qos import LATCHED, LOSSLESS
+from sms_handover.ros.transport.inputs import ExecutorInputs, Inputs
+from sms_handover.simulation.parameters import DIRECT
 from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, Pose, TaskPhase
 
 from .bench import Bench

@@ -10,16 +10,16 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from sms_handover.bag.parameters import RecorderParameters
+from sms_handover.configuration.package_files import config_file
+from sms_handover.configuration.parameters import EVERY_NODE, build, parameter, read_parameter_files
 from sms_handover.control.parameters import ControllerParameters
 from sms_handover.errors import ConfigurationError, UnknownNameError
+from sms_handover.graph.topics import CONTROLLER, IK, PLANT, RECORDER, TRAJECTORY
 from sms_handover.ik.parameters import IkParameters
-from sms_handover.parameters import EVERY_NODE, build, parameter, read_parameter_files
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.ros.parameters import as_arguments, declare, refuse_unknown
-from sms_handover.share import config_file
 from sms_handover.simulation.parameters import CommonParameters
 from sms_handover.simulation.scenario import load_parameters
-from sms_handover.topics import CONTROLLER, IK, PLANT, RECORDER, TRAJECTORY
 from sms_handover.trajectory.parameters import TrajectoryParameters
 
 from .bench import Bench

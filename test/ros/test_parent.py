@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from sms_handover.ros.parent import LAUNCHER_PID
+from sms_handover.ros.process.launcher_process import LAUNCHER_PID
 
 from ..system.runs import DEADLINE_S, has_ended
 
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.ros
 # A node without the middleware: it tells its process id, and ends when Stop says so.
 NODE = """
 import os, signal, sys
-from sms_handover.ros.main import Stop
+from sms_handover.ros.process.main import Stop
 stop = Stop()
 print(os.getpid(), flush=True)
 if "suspend" in sys.argv:
@@ -97,7 +97,7 @@ def test_a_program_of_others_is_ended_with_its_launcher(
     file = tmp_path / "theirs.py"
     file.write_text("import os, sys\nprint(os.getpid(), flush=True)\nos.read(0, 1)\n", encoding="utf-8")
     command = "import os; os.environ['" + LAUNCHER_PID + "'] = str(os.getpid()); " + STARTER.format(skip=1)
-    ward = ("-m", "sms_handover.ros.parent", sys.executable, str(file))
+    ward = ("-m", "sms_handover.ros.process.launcher_process", sys.executable, str(file))
     process, pid = start([sys.executable, "-c", command, *ward])
     assert not has_ended(pid, 0.1)
     kill(process)

@@ -6,8 +6,8 @@ import pytest
 from rclpy.node import Node
 from rclpy.parameter_client import AsyncParameterClient
 
-from sms_handover.bag.contents import parameters_from_json, parameters_json
-from sms_handover.ros.peer_parameters import PeerParameters
+from sms_handover.bag.attachments import parameters_from_json, parameters_json
+from sms_handover.nodes.parts.peer_parameters import PeerParameters
 
 from .bench import Bench
 

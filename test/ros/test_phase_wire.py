@@ -4,10 +4,10 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
 
-from sms_handover.bag.decode import task_phase
-from sms_handover.bag.message_types import MessageTypes
-from sms_handover.ros.convert import phase_message
-from sms_handover.ros.phase_wire import PhaseWire
+from sms_handover.messages.message_types import MessageTypes
+from sms_handover.messages.values import task_phase
+from sms_handover.ros.codecs.convert import phase_message
+from sms_handover.ros.codecs.task_phase import PhaseWire
 from sms_handover.types import GraspAction, GraspCommand, TaskPhase
 
 TYPE = "sms_handover_interfaces/msg/TaskPhase"

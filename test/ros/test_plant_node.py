@@ -8,11 +8,8 @@ from sms_handover_interfaces.srv import StepTicks
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import Marker
 
-from sms_handover.bag.decode import header_ns
 from sms_handover.frames import DEPUTY
-from sms_handover.ros.convert import stamp_ns_of
-from sms_handover.simulation.parameters import TRANSPORTS
-from sms_handover.topics import (
+from sms_handover.graph.topics import (
     BASE_ODOMETRY,
     CLOCK,
     DEPUTY_MARKER,
@@ -28,6 +25,9 @@ from sms_handover.topics import (
     TASK_PHASE,
     Rate,
 )
+from sms_handover.messages.values import header_ns
+from sms_handover.ros.codecs.convert import stamp_ns_of
+from sms_handover.simulation.parameters import TRANSPORTS
 
 from .bench import Bench
 from .graph import TOPICS, Graph, Messages

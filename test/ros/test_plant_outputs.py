@@ -5,16 +5,16 @@ from typing import Any
 
 import pytest
 
-from sms_handover.ros.plant_outputs import PlantOutputs
-from sms_handover.simulation.scenario import load_scenario
-from sms_handover.simulation.wiring import make_plant
-from sms_handover.topics import (
+from sms_handover.graph.topics import (
     BASE_ODOMETRY,
     DEPUTY_POSE,
     JOINT_STATES,
     SAMPLED_BASE_ODOMETRY,
     SAMPLED_JOINT_STATES,
 )
+from sms_handover.nodes.parts.plant_outputs import PlantOutputs
+from sms_handover.simulation.scenario import load_scenario
+from sms_handover.simulation.wiring import make_plant
 
 pytestmark = pytest.mark.ros
 

@@ -12,11 +12,7 @@ from sms_handover_interfaces.msg import GraspEvent, LoopTiming, RunState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
-from sms_handover.bag.stamp import stamp_ns
-from sms_handover.ros.convert import header, phase_message
-from sms_handover.ros.endpoints import Endpoints
-from sms_handover.simulation.parameters import DIRECT
-from sms_handover.topics import (
+from sms_handover.graph.topics import (
     BASE_ODOMETRY,
     CLOCK,
     CONTROLLER,
@@ -36,6 +32,10 @@ from sms_handover.topics import (
     SAMPLED_JOINT_STATES,
     TASK_PHASE,
 )
+from sms_handover.messages.stamps import stamp_ns
+from sms_handover.ros.codecs.convert import header, phase_message
+from sms_handover.ros.node.endpoints import Endpoints
+from sms_handover.simulation.parameters import DIRECT
 from sms_handover.types import Array, GraspAction, GraspCommand, TaskPhase
 
 from .bench import DEADLINE_S, Bench
@@ -260,7 +260,7 @@ class StopWhen:
 
 @pytest.fixture
 def fast_clock(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sms_handover.ros.loop_clock.monotonic", FastClock())
+    monkeypatch.setattr("sms_handover.ros.transport.loop_clock.monotonic", FastClock())
 
 
 def run_until(graph: Graph, condition: Callable[[], bool]) -> None:

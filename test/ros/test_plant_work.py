@@ -7,10 +7,10 @@ from types import FrameType
 import numpy as np
 import pytest
 
+from sms_handover.graph.topics import PLANT
 from sms_handover.nodes.plant import PlantNode
-from sms_handover.ros.phase_wire import PhaseWire
-from sms_handover.ros.wire import JointStateWire
-from sms_handover.topics import PLANT
+from sms_handover.ros.codecs.loop_messages import JointStateWire
+from sms_handover.ros.codecs.task_phase import PhaseWire
 from sms_handover.types import TaskPhase
 
 from .bench import Bench

@@ -15,16 +15,16 @@ from sms_handover_interfaces.srv import Seek, SetRate
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.qos import Durability, History, Qos, Reliability
 from sms_handover.bag.writer import BagWriter
 from sms_handover.errors import BagError, ConfigurationError, GraphError
+from sms_handover.graph.topics import PLAYER
+from sms_handover.messages.message_types import MessageTypes
+from sms_handover.nodes.parts.bag_publishers import BagPublisher, profile_for
 from sms_handover.nodes.player import PlayerNode
 from sms_handover.playback.qos import Offer
-from sms_handover.ros.bag_publishers import BagPublisher, profile_for
-from sms_handover.ros.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED
+from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED
 from sms_handover.ros.qos import LATCHED, LOSSLESS
-from sms_handover.topics import PLAYER
 
 from .bench import Bench
 from .script import Script, Stop

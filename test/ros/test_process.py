@@ -8,13 +8,13 @@ import sys
 import pytest
 
 from sms_handover.errors import ConfigurationError
-from sms_handover.ros.process import settle
+from sms_handover.ros.process.realtime import settle
 from sms_handover.simulation.parameters import CommonParameters
 from sms_handover.simulation.scenario import load_scenario
 
 _SHOW = """
 import os, threading
-from sms_handover.ros.process import settle
+from sms_handover.ros.process.realtime import settle
 from sms_handover.simulation.scenario import load_scenario
 event = threading.Event()
 threading.Thread(target=event.wait).start()

@@ -9,9 +9,9 @@ from std_msgs.msg import String
 
 from sms_handover.bag.qos import Durability, History, Reliability
 from sms_handover.errors import GraphError
+from sms_handover.graph.topics import Rate, graph_topics
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.qos import LATCHED, LOSSLESS, profile_of, stored
-from sms_handover.topics import Rate, graph_topics
 
 from .bench import Bench
 

@@ -6,9 +6,9 @@ from xml.etree import ElementTree
 
 import pytest
 
+from sms_handover.configuration.package_files import config_file
 from sms_handover.errors import ConfigurationError
-from sms_handover.ros.reach import THIS_MACHINE, Reach, reach_of, reach_to, settle_reach
-from sms_handover.share import config_file
+from sms_handover.ros.process.network_scope import THIS_MACHINE, Reach, reach_of, reach_to, settle_reach
 
 RANGE, PEERS = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"
 LOCALHOST_ONLY, PROFILE = "ROS_LOCALHOST_ONLY", "FASTRTPS_DEFAULT_PROFILES_FILE"

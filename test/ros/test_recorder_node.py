@@ -15,28 +15,14 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from sms_handover.analysis.equality import compare_runs
-from sms_handover.bag.check import check
 from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import BagInfo, read_info
-from sms_handover.bag.message_types import MessageTypes
-from sms_handover.bag.reader import read_run
-from sms_handover.bag.scan import FileScan, ScannedMessage
+from sms_handover.bag.mcap.scan import FileScan, ScannedMessage
+from sms_handover.bag.repair.check import check
+from sms_handover.bag.run.reader import read_run
 from sms_handover.errors import ConfigurationError
 from sms_handover.frames import BASE, WORLD
-from sms_handover.nodes.controller import ControllerNode
-from sms_handover.nodes.ik import IkNode
-from sms_handover.nodes.plant import PlantNode
-from sms_handover.nodes.recorder import RecorderNode
-from sms_handover.nodes.trajectory import TrajectoryNode
-from sms_handover.ros.convert import stamp_ns_of
-from sms_handover.ros.endpoints import Endpoints
-from sms_handover.ros.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED
-from sms_handover.ros.qos import LATCHED, LOSSLESS
-from sms_handover.ros.wire import JointStateWire
-from sms_handover.simulation.parameters import DIRECT, EXECUTOR, TRANSPORTS
-from sms_handover.simulation.scenario import Overrides, load_scenario
-from sms_handover.simulation.simulate import simulate
-from sms_handover.topics import (
+from sms_handover.graph.topics import (
     DIAGNOSTICS,
     JOINT_STATES,
     NODES,
@@ -49,6 +35,20 @@ from sms_handover.topics import (
     TF,
     Rate,
 )
+from sms_handover.messages.message_types import MessageTypes
+from sms_handover.nodes.controller import ControllerNode
+from sms_handover.nodes.ik import IkNode
+from sms_handover.nodes.plant import PlantNode
+from sms_handover.nodes.recorder import RecorderNode
+from sms_handover.nodes.trajectory import TrajectoryNode
+from sms_handover.ros.codecs.convert import stamp_ns_of
+from sms_handover.ros.codecs.loop_messages import JointStateWire
+from sms_handover.ros.node.endpoints import Endpoints
+from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED
+from sms_handover.ros.qos import LATCHED, LOSSLESS
+from sms_handover.simulation.parameters import DIRECT, EXECUTOR, TRANSPORTS
+from sms_handover.simulation.scenario import Overrides, load_scenario
+from sms_handover.simulation.simulate import simulate
 
 from .bench import Bench
 from .graph import TOPICS

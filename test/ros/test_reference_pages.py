@@ -1,8 +1,8 @@
 """The written pages hold what a reader looks for; test/test_package.py holds them to be up to date."""
 
 from docs.reference import DOCS, pages
-from sms_handover.ros.reference import COMMON_GROUP, OWN_GROUPS, parameter_rows
-from sms_handover.topics import graph_topics
+from sms_handover.graph.topics import graph_topics
+from sms_handover.ros.reference.interfaces import COMMON_GROUP, OWN_GROUPS, parameter_rows
 
 PAGES = pages()
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sms_handover.errors import MessageError, Reason
-from sms_handover.ros.stamp_sync import StampOrder, StampSync
+from sms_handover.ros.transport.stamp_sync import StampOrder, StampSync
 
 NAMES = ("a", "b", "c")
 
@@ -145,7 +145,7 @@ def test_a_stamp_from_the_future_is_refused_and_leaves_nothing() -> None:
 
 def test_a_run_in_real_time_may_go_on_as_the_wall_clock_does(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [5_000]
-    monkeypatch.setattr("sms_handover.ros.stamp_sync.monotonic_ns", lambda: now[0])
+    monkeypatch.setattr("sms_handover.ros.transport.stamp_sync.monotonic_ns", lambda: now[0])
     sync: StampSync[int] = StampSync(ahead_ns=10, paced=True)
     sync.add(3, "a", 0)
     sync.take(3, ("a",))

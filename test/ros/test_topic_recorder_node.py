@@ -12,10 +12,10 @@ from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import read_info
 from sms_handover.bag.time_order import messages_by_time
 from sms_handover.errors import ConfigurationError
+from sms_handover.graph.topics import TOPIC_RECORDER
 from sms_handover.nodes.topic_recorder import TopicRecorderNode
-from sms_handover.ros.main import EXIT_FAILED, EXIT_OK
+from sms_handover.ros.process.main import EXIT_FAILED, EXIT_OK
 from sms_handover.ros.qos import LATCHED, LOSSLESS
-from sms_handover.topics import TOPIC_RECORDER
 
 from .bench import Bench
 from .script import Script, Stop

@@ -12,12 +12,7 @@ from sms_handover_interfaces.srv import SolveIK
 from std_msgs.msg import String
 
 from sms_handover.errors import GraphError, ScheduleError
-from sms_handover.nodes.trajectory import TrajectoryNode
-from sms_handover.ros.endpoints import Endpoints
-from sms_handover.simulation.parameters import TRANSPORTS
-from sms_handover.simulation.scenario import load_scenario
-from sms_handover.simulation.simulate import simulate
-from sms_handover.topics import (
+from sms_handover.graph.topics import (
     DIAGNOSTICS,
     IK,
     IK_STATUS,
@@ -30,6 +25,11 @@ from sms_handover.topics import (
     TASK_PHASE,
     target_pose,
 )
+from sms_handover.nodes.trajectory import TrajectoryNode
+from sms_handover.ros.node.endpoints import Endpoints
+from sms_handover.simulation.parameters import TRANSPORTS
+from sms_handover.simulation.scenario import load_scenario
+from sms_handover.simulation.simulate import simulate
 
 from .bench import Bench
 from .graph import TOPICS, Graph, Messages

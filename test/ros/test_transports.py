@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from sms_handover.errors import GraphError
-from sms_handover.ros.transports import avoid_full_shared_memory, require_shared_memory
+from sms_handover.ros.process.shared_memory_check import avoid_full_shared_memory, require_shared_memory
 
 VARIABLE = "FASTDDS_BUILTIN_TRANSPORTS"
 

@@ -10,14 +10,7 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from sms_handover_interfaces.msg import GraspEvent, TaskPhase
 
-from sms_handover.bag.decode import pose_values
-from sms_handover.bag.message_types import MessageTypes
-from sms_handover.bag.stamp import stamp_ns
-from sms_handover.nodes.viewer import ViewerNode
-from sms_handover.ros.message_types import message_class
-from sms_handover.ros.qos import profile_of
-from sms_handover.scene.live import LiveScene, Seen
-from sms_handover.topics import (
+from sms_handover.graph.topics import (
     DEPUTY_POSE,
     GRASP_EVENT,
     SAMPLED_BASE_ODOMETRY,
@@ -29,6 +22,13 @@ from sms_handover.topics import (
     target_pose,
     tool_pose,
 )
+from sms_handover.messages.message_types import MessageTypes
+from sms_handover.messages.stamps import stamp_ns
+from sms_handover.messages.values import pose_values
+from sms_handover.nodes.viewer import ViewerNode
+from sms_handover.ros.message_types import message_class
+from sms_handover.ros.qos import profile_of
+from sms_handover.scene.live import LiveScene, Seen
 
 from ..core.scene_documents import poses, times
 from .bench import Bench

@@ -10,9 +10,8 @@ from sensor_msgs.msg import JointState
 from sms_handover_interfaces.msg import RunState
 from std_srvs.srv import Trigger
 
-from sms_handover.bag.decode import run_event, task_phase
 from sms_handover.control.controller import JointController
-from sms_handover.events import (
+from sms_handover.graph.events import (
     COMMAND_LOST,
     GRASP_FAILED,
     IK_FAILED,
@@ -23,11 +22,7 @@ from sms_handover.events import (
     TORQUE_ZERO,
     RunEvent,
 )
-from sms_handover.ros.endpoints import Endpoints
-from sms_handover.run_data import RunData
-from sms_handover.simulation.scenario import load_scenario
-from sms_handover.simulation.simulate import simulate
-from sms_handover.topics import (
+from sms_handover.graph.topics import (
     CONTROLLER,
     IK,
     JOINT_COMMAND,
@@ -38,6 +33,11 @@ from sms_handover.topics import (
     TASK_PHASE,
     TRAJECTORY,
 )
+from sms_handover.messages.values import run_event, task_phase
+from sms_handover.ros.node.endpoints import Endpoints
+from sms_handover.run_data import RunData
+from sms_handover.simulation.scenario import load_scenario
+from sms_handover.simulation.simulate import simulate
 from sms_handover.types import JointReference
 
 from .bench import Bench
@@ -125,7 +125,7 @@ def stamp_of(message: Any) -> int:
 
 @pytest.fixture
 def fast_clock(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sms_handover.ros.loop_clock.monotonic", FastClock())
+    monkeypatch.setattr("sms_handover.ros.transport.loop_clock.monotonic", FastClock())
 
 
 def test_in_real_time_the_torque_is_held_and_then_ramped_to_zero(bench: Bench, fast_clock: None) -> None:

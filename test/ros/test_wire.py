@@ -13,16 +13,16 @@ from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
 from sms_handover_interfaces.msg import EnergyStamped
 
-from sms_handover.bag.stamp import stamp_ns
 from sms_handover.errors import GraphError
-from sms_handover.ros.convert import (
+from sms_handover.messages.stamps import stamp_ns
+from sms_handover.ros.codecs.convert import (
     energy_message,
     pose_message,
     pose_stamped,
     time_message,
     vector_stamped,
 )
-from sms_handover.ros.wire import (
+from sms_handover.ros.codecs.loop_messages import (
     JointStateWire,
     OdometryWire,
     PoseWire,
@@ -130,7 +130,7 @@ def no_general_path(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object) -> None:
         raise AssertionError("not read by the template")
 
-    monkeypatch.setattr("sms_handover.ros.wire.deserialize_message", fail)
+    monkeypatch.setattr("sms_handover.ros.codecs.loop_messages.deserialize_message", fail)
 
 
 # Joint states

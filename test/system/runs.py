@@ -11,7 +11,7 @@ from pathlib import Path
 from select import select
 from time import monotonic
 
-from sms_handover.ros.parent import LAUNCHER_PID
+from sms_handover.ros.process.launcher_process import LAUNCHER_PID
 
 from .hosts import Host
 

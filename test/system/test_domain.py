@@ -11,13 +11,13 @@ from threading import Barrier
 
 import pytest
 
-from sms_handover.cli import domain as domains
-from sms_handover.cli.domain import FIRST_DOMAIN, LAST_DOMAIN, reservation, reserved_domain
 from sms_handover.errors import ConfigurationError
+from sms_handover.launcher import domain as domains
+from sms_handover.launcher.domain import FIRST_DOMAIN, LAST_DOMAIN, reservation, reserved_domain
 
 HOLDER = """
 import subprocess, sys
-from sms_handover.cli.domain import reservation
+from sms_handover.launcher.domain import reservation
 with reservation(None) as held:
     subprocess.Popen([sys.executable, "-c", "import sys; sys.stdin.read()"], pass_fds=held.descriptors)
     print(held.domain, flush=True)

@@ -10,9 +10,9 @@ import pytest
 
 from sms_handover.analysis.equality import compare_runs
 from sms_handover.bag.info import read_info
-from sms_handover.bag.reader import read_run
+from sms_handover.bag.run.reader import read_run
+from sms_handover.graph.topics import NODES
 from sms_handover.run_data import RunData
-from sms_handover.topics import NODES
 
 from ..ros.short_handover import short_handover
 from .runs import DEADLINE_S, command_of, has_ended, nodes_of, running, sms_handover

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from sms_handover.analysis.equality import compare_runs
-from sms_handover.bag.reader import read_run
+from sms_handover.bag.run.reader import read_run
+from sms_handover.graph.topics import CONTAINER, RECORDER
 from sms_handover.run_data import RunData
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
-from sms_handover.topics import CONTAINER, RECORDER
 from sms_handover.types import GraspStatus
 
 from .conftest import LAWS, TICKS

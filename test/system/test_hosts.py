@@ -13,7 +13,7 @@ import pytest
 
 from sms_handover.analysis.equality import compare_runs
 from sms_handover.bag.info import read_info
-from sms_handover.bag.reader import read_run
+from sms_handover.bag.run.reader import read_run
 from sms_handover.run_data import RunData
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sms_handover.bag.reader import read_run
+from sms_handover.bag.run.reader import read_run
 from sms_handover.errors import BagError
 
 from .runs import DEADLINE_S, command_of, sms_handover

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from sms_handover.cli.patience import Delay, Suspended, WatchedTime
-from sms_handover.cli.processes import Death, NodeProcesses
 from sms_handover.errors import GraphError
+from sms_handover.launcher.processes import Death, NodeProcesses
+from sms_handover.launcher.timeouts import Delay, Suspended, WatchedTime
 
 
 def test_time_in_which_nobody_looked_does_not_count() -> None:

@@ -11,12 +11,12 @@ from mcap.reader import make_reader
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from sms_handover.bag.message_types import MessageTypes
 from sms_handover.bag.qos import Durability, History, Qos, Reliability
-from sms_handover.bag.stamp import stamp_ns
 from sms_handover.bag.time_order import messages_by_time
 from sms_handover.bag.writer import BagWriter
-from sms_handover.cli.domain import reserved_domain
+from sms_handover.launcher.domain import reserved_domain
+from sms_handover.messages.message_types import MessageTypes
+from sms_handover.messages.stamps import stamp_ns
 
 from ..core.terminal import Terminal
 from .conftest import TICKS

@@ -17,15 +17,15 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 from sms_handover.bag.info import BagInfo, read_info
-from sms_handover.bag.reader import read_run
+from sms_handover.bag.run.reader import read_run
 from sms_handover.bag.writer import BagWriter
 from sms_handover.frames import DEPUTY, WORLD
+from sms_handover.graph.topics import LOOP_NODES, NODES, Rate, graph_topics
 from sms_handover.model.poses import pose_distance, pose_of
 from sms_handover.run_data import RunData
 from sms_handover.scene.links import DescribedRobot
-from sms_handover.scene.read import read_scene
+from sms_handover.scene.recorded_scene import read_scene
 from sms_handover.simulation.scenario import load_robot_model, load_scenario
-from sms_handover.topics import LOOP_NODES, NODES, Rate, graph_topics
 from sms_handover.types import Pose
 
 from ..core.layout_paths import (

@@ -13,9 +13,9 @@ from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
 from sms_handover.analysis.equality import before, compare_runs
-from sms_handover.bag.reader import read_run
+from sms_handover.bag.run.reader import read_run
+from sms_handover.graph.topics import CONTROLLER, NODES, PLANT
 from sms_handover.run_data import RunData
-from sms_handover.topics import CONTROLLER, NODES, PLANT
 
 from .conftest import LAWS, TICKS
 from .runs import DEADLINE_S, Running, running, sms_handover

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from sms_handover.cli.shared_memory import SharedMemory
+from sms_handover.launcher.shared_memory import SharedMemory
 
 # A participant as Fast DDS makes one: a segment and a port, with locks that are held; it waits to be ended.
 PARTICIPANT = """
@@ -31,7 +31,7 @@ SEGMENT, PORT, OTHER = "fastrtps_0123456789abcdef", "fastrtps_port7411", "fastrt
 RUN = """
 import os, signal, sys
 from pathlib import Path
-from sms_handover.cli.shared_memory import SharedMemory
+from sms_handover.launcher.shared_memory import SharedMemory
 with SharedMemory(Path(sys.argv[1])) as memory:
     memory.note([int(sys.argv[2])])
     os.kill(os.getpid(), signal.SIGKILL)

@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from sms_handover.analysis.equality import compare_runs
-from sms_handover.bag.reader import read_run
+from sms_handover.bag.run.reader import read_run
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
 

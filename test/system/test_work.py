@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from sms_handover.bag.decode import header_ns
 from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import read_info
-from sms_handover.bag.message_types import MessageTypes
-from sms_handover.topics import CONTROLLER, DIAGNOSTICS, IK, PLANT, TRAJECTORY, Rate, graph_topics
+from sms_handover.graph.topics import CONTROLLER, DIAGNOSTICS, IK, PLANT, TRAJECTORY, Rate, graph_topics
+from sms_handover.messages.message_types import MessageTypes
+from sms_handover.messages.values import header_ns
 
 from .conftest import LAWS, TICKS
 from .runs import Ended

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from sms_handover.share import config_file
+from sms_handover.configuration.package_files import config_file
 
 from .runs import sms_handover
 

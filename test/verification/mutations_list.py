@@ -548,14 +548,14 @@ BREAKS: tuple[Break, ...] = (
     # recorder and bag
     _core(
         "ledger that never counts gaps",
-        "bag/counting",
+        "bag/ledger_keeper",
         "if self.period_ns and start <= end:",
         "if self.period_ns and start <= end and False:",
         "bag_ledger",
     ),
     _core(
         "ledger off by one in every gap",
-        "bag/counting",
+        "bag/ledger_keeper",
         "(end - start) // self.period_ns + 1 for",
         "(end - start) // self.period_ns for",
         "bag_ledger",
@@ -569,7 +569,7 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "stamp without its nanoseconds",
-        "bag/stamp",
+        "messages/stamps",
         "return int(seconds) * NS_PER_S + int(nanoseconds)",
         "return int(seconds) * NS_PER_S + 0 * int(nanoseconds)",
         "bag_ledger",

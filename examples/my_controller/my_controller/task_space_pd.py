@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from sms_handover.configuration.parameters import parameter
 from sms_handover.control.protocol import Guidance
 from sms_handover.model.poses import se3_of
 from sms_handover.model.reduced import generalized_jacobian
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.parameters import parameter
 from sms_handover.types import BASE_NV, Array
 
 

@@ -4,12 +4,12 @@ import json
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from pathlib import Path
 
-from sms_handover.bag.check import check
 from sms_handover.bag.files import recover_hint
-from sms_handover.bag.findings import CheckResult, Severity
-from sms_handover.cli.bag.progress import ProgressLine
+from sms_handover.bag.repair.check import check
+from sms_handover.bag.repair.findings import CheckResult, Severity
 from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
-from sms_handover.cli.folders import bags_of
+from sms_handover.launcher.run_folder import bags_of
+from sms_handover.terminal.progress import ProgressLine
 
 _MARKS = {Severity.DAMAGED: "DAMAGED", Severity.MISSING: "MISSING", Severity.NOTE: "note"}
 

@@ -5,11 +5,11 @@ from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from pathlib import Path
 
 from sms_handover.bag.topic_choice import TopicChoice
-from sms_handover.cli.bag.progress import ProgressLine
 from sms_handover.cli.exit_codes import EXIT_OK
-from sms_handover.cli.folders import bag_of
 from sms_handover.export.export import CSV, FORMATS, export
 from sms_handover.export.selection import Selection
+from sms_handover.launcher.run_folder import bag_of
+from sms_handover.terminal.progress import ProgressLine
 
 
 def add_parser(parser: ArgumentParser) -> None:

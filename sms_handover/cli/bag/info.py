@@ -9,7 +9,7 @@ from sms_handover.bag.info import BagInfo, TopicInfo, read_info
 from sms_handover.bag.ledger import ledger_table
 from sms_handover.bag.overview import overview
 from sms_handover.cli.exit_codes import EXIT_OK
-from sms_handover.cli.folders import bag_of
+from sms_handover.launcher.run_folder import bag_of
 from sms_handover.units import NS_PER_S
 
 _BYTES_PER_MIB = 2**20

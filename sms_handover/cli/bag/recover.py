@@ -5,11 +5,11 @@ from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from pathlib import Path
 
 from sms_handover.bag.ledger import ledger_table
-from sms_handover.bag.recover import recover
-from sms_handover.bag.recovery import Recovery
-from sms_handover.cli.bag.progress import ProgressLine
+from sms_handover.bag.repair.recover import recover
+from sms_handover.bag.repair.recovery import Recovery
 from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
-from sms_handover.cli.folders import bag_of
+from sms_handover.launcher.run_folder import bag_of
+from sms_handover.terminal.progress import ProgressLine
 from sms_handover.units import NS_PER_S
 
 _MOST = 20  # places of damage that are listed

@@ -1,0 +1,1 @@
+"""MCAP files: their records, chunks and summary, read also where they are damaged."""

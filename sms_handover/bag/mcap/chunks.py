@@ -1,0 +1,81 @@
+"""Take the messages out of a chunk, whole or cut off, if what it says of itself holds."""
+
+import zlib
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import lz4.frame
+import zstandard
+from mcap.opcode import Opcode
+
+from sms_handover.bag.mcap.records import MESSAGE_HEAD, RECORD_HEAD, ChunkHead, fits, plausible_head
+
+_ERRORS = (zstandard.ZstdError, RuntimeError, EOFError, ValueError, MemoryError, OverflowError)
+
+
+class Inner(NamedTuple):
+    """A record within a chunk."""
+
+    opcode: int
+    begin: int
+    end: int
+
+
+class DamagedChunkError(Exception):
+    """The records of a chunk cannot be had; the text says why."""
+
+
+def records_of(head: ChunkHead, body: bytes) -> bytes:
+    """Return the records of a whole chunk; raises DamagedChunkError unless they are as they were written."""
+    stored = memoryview(body)[head.begin :]
+    try:
+        records = _inflated(head.compression, stored, head.uncompressed_size)
+    except _ERRORS as error:
+        raise DamagedChunkError(f"the chunk does not decompress: {' '.join(str(error).split())}") from error
+    if len(records) != head.uncompressed_size:
+        raise DamagedChunkError(f"the chunk holds {len(records)} bytes instead of {head.uncompressed_size}")
+    if head.checksum and zlib.crc32(records) != head.checksum:
+        raise DamagedChunkError("the checksum of the chunk does not match")
+    return records
+
+
+def records_of_cut(head: ChunkHead, body: bytes) -> bytes:
+    """Return what can be had of the records of a chunk of which only the beginning is there."""
+    stored = body[head.begin :]
+    try:
+        if head.compression == "zstd":
+            return zstandard.ZstdDecompressor().decompressobj().decompress(stored)
+        if head.compression == "lz4":
+            return bytes(lz4.frame.LZ4FrameDecompressor().decompress(stored))
+    except _ERRORS:
+        return b""
+    return stored if head.compression == "" else b""
+
+
+def inner_records(records: bytes) -> Iterator[Inner]:
+    """Yield the records of a chunk that are whole, up to the first that is not."""
+    place, size = 0, len(records)
+    while place + RECORD_HEAD.size <= size:
+        opcode, length = RECORD_HEAD.unpack_from(records, place)
+        begin = place + RECORD_HEAD.size
+        end = begin + length
+        if end > size or not plausible_head(opcode, length):
+            return
+        if opcode == Opcode.MESSAGE:
+            if length < MESSAGE_HEAD.size:
+                return
+        elif not fits(opcode, records[begin:end]):
+            return
+        yield Inner(opcode, begin, end)
+        place = end
+
+
+def _inflated(compression: str, stored: memoryview, size: int) -> bytes:
+    """Return the records in the stored bytes of a whole chunk; raises one of ``_ERRORS``."""
+    if compression == "zstd":
+        return zstandard.ZstdDecompressor().decompress(stored, max_output_size=size)
+    if compression == "lz4":
+        return bytes(lz4.frame.decompress(stored))
+    if compression:
+        raise ValueError(f"unknown compression {compression!r}")
+    return bytes(stored)

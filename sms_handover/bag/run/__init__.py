@@ -1,0 +1,1 @@
+"""A recorded run out of a bag: ticks, series and events as arrays."""

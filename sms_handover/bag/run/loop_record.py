@@ -1,0 +1,84 @@
+"""Read when the ticks of a recorded run took place, by the clock on the wall."""
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sms_handover.bag.files import read_messages
+from sms_handover.bag.info import read_info
+from sms_handover.bag.run.reader import find_namespace
+from sms_handover.bag.run.series import RowCollector, Series
+from sms_handover.errors import BagError
+from sms_handover.graph import topics
+from sms_handover.messages.message_types import MessageTypes
+from sms_handover.messages.stamps import stamp_ns
+from sms_handover.run_data import Array, Stamps
+from sms_handover.units import NS_PER_S
+
+
+@dataclass(frozen=True, eq=False)
+class LoopRecord:
+    """The course of a run in wall time.
+
+    Rows per tick (N,): ``tick_ns``, and ``wall`` s, when the recorder got the state of that tick, since it
+    got the first one. Rows per LoopTiming message of the plant (M,): ``report_ns``; ``ticks``,
+    ``late_ticks`` and ``held_commands`` since the start; ``period_mean``, ``period_std`` and
+    ``period_max`` s between the ticks since the report before.
+    """
+
+    tick_ns: Stamps
+    wall: Array
+    report_ns: Stamps
+    ticks: Array
+    late_ticks: Array
+    held_commands: Array
+    period_mean: Array
+    period_std: Array
+    period_max: Array
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for item in fields(self):
+            getattr(self, item.name).setflags(write=False)
+
+
+_REPORTED = ("ticks", "late_ticks", "held_commands", "period_mean", "period_std", "period_max")
+
+
+def read_loop(path: Path, namespace: str | None = None) -> LoopRecord:
+    """Return when the ticks of the run in the bag at ``path`` took place; of the last run after a reset.
+
+    ``namespace`` is the one the graph ran in; without it the bag must hold one run only. Raises
+    BagError if there is no bag, it is damaged, was not closed, or holds no run of ours.
+    """
+    info = read_info(path)
+    prefix = find_namespace(info) if namespace is None else namespace.rstrip("/")
+    states, reports = (f"{prefix}/{name}" for name in (topics.JOINT_STATES, topics.LOOP_TIMING))
+    types = MessageTypes(roots=())
+    if reports in info.topics:
+        types.learn(info.topics[reports].type, info.topics[reports].schema_text)
+    collected = RowCollector(len(_REPORTED), _reported)
+    stamps: list[int] = []
+    walls: list[int] = []
+    for message in read_messages(path, {states, reports}):
+        if message.topic == states:
+            stamps.append(stamp_ns(message.data))
+            walls.append(message.publish_time_ns)
+        else:
+            try:
+                collected.add(types.deserialize(message.data, message.type))
+            except AttributeError as error:
+                raise BagError(f"{path}: {reports} is not as this version knows it: {error}") from error
+    wall_ns = np.array(walls, dtype=np.int64)
+    since = (wall_ns - wall_ns[:1]) / NS_PER_S
+    arrived = Series(np.array(stamps, dtype=np.int64), since.reshape(-1, 1)).settled()
+    told = collected.series().settled()
+    wall = arrived.values[:, 0] - arrived.values[:1, 0]
+    return LoopRecord(arrived.stamp_ns, wall, told.stamp_ns, *(np.array(column) for column in told.values.T))
+
+
+def _reported(message: Any) -> tuple[float, ...]:
+    """Return the numbers of a LoopTiming."""
+    return tuple(float(getattr(message, name)) for name in _REPORTED)

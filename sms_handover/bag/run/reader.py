@@ -1,0 +1,133 @@
+"""Read a recorded run into arrays."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from sms_handover.bag.info import BagInfo, read_info
+from sms_handover.bag.ledger import is_of_ours
+from sms_handover.bag.run.collector import BASE_POSE, BASE_TWIST, EFFORT, POSITION, VELOCITY, RunCollector
+from sms_handover.bag.run.series import Series
+from sms_handover.errors import BagError
+from sms_handover.graph import topics
+from sms_handover.run_data import Array, RunData, Stamps
+from sms_handover.types import TaskPhase
+
+_NO_IK = -1  # in RunData.ik_status where no solve was asked
+_MOST_NAMES = 8  # topics listed in an error message
+_REQUIRED = (topics.JOINT_STATES, topics.BASE_ODOMETRY)
+
+
+def read_run(path: Path, namespace: str | None = None) -> RunData:
+    """Return the run in the bag at ``path``, its folder or its file.
+
+    There is a row per tick for each stamp with joint states and base odometry, and a row per
+    reference period for each stamp with a joint reference; what was not recorded at such a stamp
+    is NaN. ``phases`` has an entry per reference period. Joints are matched by name, in the order
+    of the first joint state. If the simulation was reset while it was recorded, only what came
+    after the last reset is read.
+
+    ``namespace`` is the one the graph ran in; without it the bag must hold one run only. Raises
+    BagError if there is no bag, it is damaged, was not closed, or holds no run of ours.
+    """
+    info = read_info(path)
+    collector = RunCollector(info, find_namespace(info) if namespace is None else namespace.rstrip("/"))
+    for name in _REQUIRED:
+        if collector.full_name(name) not in info.topics:
+            raise BagError(
+                f"{path} holds no run of sms_handover: it has no topic {collector.full_name(name)}"
+            )
+    collector.collect()
+    return _assemble(collector)
+
+
+def _assemble(collector: RunCollector) -> RunData:
+    """Put what was collected into rows."""
+    joint_names = collector.joints[topics.JOINT_STATES].first_texts()
+
+    def joint(topic: str, block: int) -> Series:
+        return collector.joints[topic].series(block, joint_names).settled()
+
+    def rows(topic: str) -> Array:
+        return collector.rows[topic].series().settled().at(periods)
+
+    position = joint(topics.JOINT_STATES, POSITION)
+    pose = collector.odometry.series(BASE_POSE, 7).settled()
+    twist = collector.odometry.series(BASE_TWIST, 6).settled()
+    ticks: Stamps = np.intersect1d(position.stamp_ns, pose.stamp_ns)
+    reference = joint(topics.JOINT_REFERENCE, POSITION)
+    periods = reference.stamp_ns
+    arms = sorted(collector.arms, key=lambda arm: (_first_joint(arm, joint_names), arm))
+    energy = rows(topics.ENERGY)
+    return RunData(
+        joint_names=joint_names,
+        arms=tuple(arms),
+        tick_ns=ticks,
+        joint_position=position.at(ticks),
+        joint_velocity=joint(topics.JOINT_STATES, VELOCITY).at(ticks),
+        joint_effort=joint(topics.JOINT_STATES, EFFORT).at(ticks),
+        joint_command=joint(topics.JOINT_COMMAND, EFFORT).at(ticks),
+        base_pose=pose.at(ticks),
+        base_twist=twist.at(ticks),
+        reference_ns=periods,
+        reference_position=reference.at(periods),
+        reference_velocity=joint(topics.JOINT_REFERENCE, VELOCITY).at(periods),
+        target_pose={arm: rows(topics.target_pose(arm)) for arm in arms},
+        tool_pose={arm: rows(topics.tool_pose(arm)) for arm in arms},
+        deputy_pose=rows(topics.DEPUTY_POSE),
+        linear_momentum=rows(topics.LINEAR_MOMENTUM),
+        angular_momentum=rows(topics.ANGULAR_MOMENTUM),
+        kinetic_energy=energy[:, 0].copy(),
+        work=energy[:, 1].copy(),
+        ik_status=np.nan_to_num(rows(topics.IK_STATUS)[:, 0], nan=_NO_IK).astype(np.int64),
+        phases=_last_run(collector.phases),
+        grasp_events=tuple(collector.events),
+        run_events=tuple(collector.run_events),
+    )
+
+
+def holds_run(info: BagInfo) -> bool:
+    """Tell whether a bag is one of ours and holds one run."""
+    try:
+        find_namespace(info)
+    except BagError:
+        return False
+    return is_of_ours(info.records)
+
+
+def find_namespace(info: BagInfo) -> str:
+    """Return the namespace of the only run in a bag, '' for the root."""
+    tail = f"/{topics.JOINT_STATES}"
+    found = [name.removesuffix(tail) for name in info.topics if name.endswith(tail)]
+    runs = [prefix for prefix in found if all(f"{prefix}/{name}" in info.topics for name in _REQUIRED)]
+    if not runs:
+        raise BagError(
+            f"{info.path} holds no run of sms_handover: it needs the topics {' and '.join(_REQUIRED)},"
+            f" and has {_listed(list(info.topics))}"
+        )
+    if len(runs) > 1:
+        raise BagError(f"{info.path} holds several runs, name the namespace of one: {', '.join(runs)}")
+    return runs[0]
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return names as a list that is short enough for a message."""
+    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+    return (", ".join(names[:_MOST_NAMES]) or "none") + more
+
+
+def _first_joint(arm: str, joint_names: Sequence[str]) -> int:
+    """Return the place of an arm's first joint, behind all others if it has none."""
+    places = [place for place, name in enumerate(joint_names) if name.startswith(f"{arm}_")]
+    return min(places, default=len(joint_names))
+
+
+def _last_run(phases: Sequence[TaskPhase]) -> tuple[TaskPhase, ...]:
+    """Return the phases since the last reset, one per stamp, in the order of time."""
+    begin = 0
+    for place in range(1, len(phases)):
+        if phases[place - 1].stamp_ns > phases[place].stamp_ns <= phases[0].stamp_ns:
+            begin = place
+    by_stamp = {phase.stamp_ns: phase for phase in phases[begin:]}
+    return tuple(by_stamp[stamp_ns] for stamp_ns in sorted(by_stamp))

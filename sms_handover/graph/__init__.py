@@ -1,0 +1,1 @@
+"""The graph as data: what topics, services and events the nodes have."""

@@ -1,0 +1,1 @@
+"""The launcher: starts the processes of a graph, watches the run, and ends them whatever happens."""

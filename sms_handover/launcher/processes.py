@@ -1,0 +1,142 @@
+"""The processes of a graph: started together, watched, and ended whatever happens."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic
+from types import TracebackType
+
+from sms_handover.launcher.node_log import NodeLog
+from sms_handover.ros.process.launcher_process import LAUNCHER_PID
+
+_GRACE_S = 20.0  # [s] of wall time a process gets to end when asked to, before it is killed
+
+
+@dataclass(frozen=True)
+class Death:
+    """A process that ended: its name, exit code, and the last lines of its log."""
+
+    name: str
+    code: int
+    last_lines: str
+
+    @property
+    def how(self) -> str:
+        """How it ended, in words."""
+        if self.code >= 0:
+            return f"ended with exit code {self.code}"
+        try:
+            name = signal.Signals(-self.code).name
+        except ValueError:
+            name = "a real-time signal"
+        return f"was killed by signal {-self.code} ({name})"
+
+
+class NodeProcesses:
+    """One process per node, each in a session of its own, its output in ``<folder>/<node>.log``.
+
+    Use it as a context manager: leaving it ends every process that is still there.
+    """
+
+    def __init__(
+        self, log_folder: Path, environment: Mapping[str, str], inherited: Sequence[int] = ()
+    ) -> None:
+        """Prepare; nothing is started yet. Every process keeps the ``inherited`` file descriptors open."""
+        self._folder, self._inherited = log_folder, inherited
+        self._environment = {**os.environ, **environment, LAUNCHER_PID: str(os.getpid())}
+        self._processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._logs: dict[str, NodeLog] = {}
+
+    def __enter__(self) -> "NodeProcesses":
+        """Return the processes."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End every process that is still there."""
+        self.end()
+        for log in self._logs.values():
+            log.close()
+
+    def start(self, node: str, arguments: Sequence[str], program: Sequence[str] = ()) -> None:
+        """Start a node or the container, of this package unless it is another ``program``.
+
+        Another program need not know of us; it is sent SIGTERM if this process is killed. Raises
+        GraphError if the log cannot be written.
+        """
+        foreign = ("sms_handover.ros.process.launcher_process", *program)
+        command = [
+            sys.executable,
+            "-m",
+            *(foreign if program else (f"sms_handover.nodes.{node}",)),
+            *arguments,
+        ]
+        log = self._logs[node] = NodeLog(self._folder / f"{node}.log")
+        self._processes[node] = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=log.stream,
+            stderr=subprocess.STDOUT,
+            env=self._environment,
+            start_new_session=True,
+            pass_fds=self._inherited,
+        )
+
+    def text_of(self, node: str) -> str:
+        """Return what a node has printed so far."""
+        return self._logs[node].text
+
+    @property
+    def ids(self) -> dict[str, int]:
+        """Return the process id of every node that was started."""
+        return {name: process.pid for name, process in self._processes.items()}
+
+    def suspended(self) -> dict[str, int]:
+        """Return the process ids of the nodes that are stopped and were not continued, by name."""
+        if not hasattr(os, "waitid"):  # macOS has it from Python 3.13 on
+            return {}
+        return {name: pid for name, pid in self.ids.items() if _is_stopped(pid)}
+
+    def exit_code(self, node: str) -> int | None:
+        """Return the exit code of a node that has ended, else None."""
+        return self._processes[node].poll()
+
+    def dead(self) -> list[Death]:
+        """Return the processes that have ended by themselves."""
+        codes = {name: process.poll() for name, process in self._processes.items()}
+        return [
+            Death(name, code, self._logs[name].last_lines) for name, code in codes.items() if code is not None
+        ]
+
+    def end(self) -> None:
+        """End every process: ask it to, wake it if it is suspended, wait, and kill who does not end."""
+        alive = self._alive()
+        for number in (signal.SIGTERM, signal.SIGCONT):
+            for process in alive.values():
+                process.send_signal(number)
+        deadline = monotonic() + _GRACE_S
+        for process in alive.values():
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(max(deadline - monotonic(), 0.01))
+        for name, process in self._alive().items():
+            print(f"node {name!r} did not end within {_GRACE_S:g} s and was killed", file=sys.stderr)
+            process.kill()
+            process.wait()
+
+    def _alive(self) -> dict[str, "subprocess.Popen[bytes]"]:
+        """Return the processes that have not ended."""
+        return {name: process for name, process in self._processes.items() if process.poll() is None}
+
+
+def _is_stopped(pid: int) -> bool:
+    """Tell whether a child is stopped now; what is told of it is left for others to ask."""
+    try:
+        return os.waitid(os.P_PID, pid, os.WSTOPPED | os.WNOHANG | os.WNOWAIT) is not None
+    except ChildProcessError:  # it has ended and was reaped
+        return False

@@ -1,0 +1,1 @@
+"""Messages without ROS: their definitions, their bytes, and the values in them."""

@@ -1,0 +1,87 @@
+"""Decoded messages as the values of the core; used for the topics that are not worth a fast path."""
+
+from dataclasses import replace
+from typing import Any
+
+from sms_handover.graph.events import RunEvent, Severity
+from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, PhaseState, TaskPhase
+from sms_handover.units import NS_PER_S
+
+_ACTIONS = (GraspAction.GRASP, GraspAction.RELEASE, GraspAction.TRANSFER)  # by number in the message
+_STATUSES = (GraspStatus.SUCCEEDED, GraspStatus.MISSED, GraspStatus.REJECTED)
+_PHASE_STATES = (PhaseState.ACTIVE, PhaseState.FAILED)
+_SEVERITIES = (Severity.INFO, Severity.WARNING, Severity.ERROR)
+
+
+def pose_values(message: Any) -> tuple[float, ...]:
+    """Return position and quaternion of a PoseStamped."""
+    position, turn = message.pose.position, message.pose.orientation
+    return position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w
+
+
+def vector_values(message: Any) -> tuple[float, ...]:
+    """Return the components of a Vector3Stamped."""
+    return message.vector.x, message.vector.y, message.vector.z
+
+
+def energy_values(message: Any) -> tuple[float, ...]:
+    """Return kinetic energy and work of an EnergyStamped."""
+    return message.kinetic, message.work
+
+
+def status_values(message: Any) -> tuple[float, ...]:
+    """Return the number of an IkStatus."""
+    return (message.status,)
+
+
+def header_ns(message: Any) -> int:
+    """Return the stamp in the header of a message."""
+    return time_ns(message.header.stamp)
+
+
+def time_ns(message: Any) -> int:
+    """Return a Time message in ns."""
+    return int(message.sec) * NS_PER_S + int(message.nanosec)
+
+
+def task_phase(message: Any) -> TaskPhase:
+    """Return a TaskPhase message as its value."""
+    commands = tuple(grasp_command(command) for command in message.commands)
+    phase = TaskPhase(header_ns(message), int(message.index), message.name, commands)
+    if not hasattr(message, "state"):
+        return phase  # recorded before phases could fail
+    state, attempt = _PHASE_STATES[message.state], int(message.attempt)
+    return replace(phase, state=state, attempt=attempt, end_ns=time_ns(message.end))
+
+
+def grasp_command(message: Any) -> GraspCommand:
+    """Return a GraspCommand message as its value."""
+    return GraspCommand(_ACTIONS[message.action], message.arm, message.grasp_frame, message.from_arm)
+
+
+def grasp_event(message: Any) -> GraspEvent:
+    """Return a GraspEvent message as its value."""
+    return GraspEvent(
+        stamp_ns=header_ns(message),
+        command=grasp_command(message.command),
+        status=_STATUSES[message.status],
+        position_error=message.position_error,
+        angle_error=message.angle_error,
+        relative_speed=message.relative_speed,
+        detail=message.detail,
+    )
+
+
+def run_event(message: Any) -> RunEvent:
+    """Return a RunEvent message as its value."""
+    return RunEvent(
+        stamp_ns=header_ns(message),
+        node=message.node,
+        kind=message.kind,
+        severity=_SEVERITIES[message.severity],
+        detail=message.detail,
+        phase=message.phase,
+        value=message.value,
+        limit=message.limit,
+        unit=message.unit,
+    )

@@ -1,0 +1,81 @@
+"""What the plant publishes of its state: each tick what the loop waits for, each period what goes with it."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from sms_handover.frames import BASE, WORLD
+from sms_handover.graph.topics import (
+    ANGULAR_MOMENTUM,
+    BASE_ODOMETRY,
+    CLOCK,
+    CLOCK_PERIOD_NS,
+    DEPUTY_POSE,
+    ENERGY,
+    JOINT_STATES,
+    LINEAR_MOMENTUM,
+    SAMPLED_BASE_ODOMETRY,
+    SAMPLED_JOINT_STATES,
+    tool_pose,
+)
+from sms_handover.messages.template import head
+from sms_handover.model.poses import pose_row
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.plant.free_floating import FreeFloatingPlant
+from sms_handover.ros.codecs.loop_messages import PoseWire, StateWire, energy_wire, vector_wire
+from sms_handover.ros.node.endpoints import CountedPublisher
+
+_LOOP = (JOINT_STATES, BASE_ODOMETRY, SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
+_PERIOD = (LINEAR_MOMENTUM, ANGULAR_MOMENTUM, ENERGY)
+
+
+class PlantOutputs:
+    """The publishers of the plant's state, and the layout of their messages."""
+
+    def __init__(
+        self, robot: RobotModel, publisher: Callable[[str], CountedPublisher], *, lockstep: bool
+    ) -> None:
+        """Make the publishers; ``publisher`` returns the one of a topic."""
+        self._lockstep = lockstep
+        names = (*_LOOP, *_PERIOD, CLOCK, *(tool_pose(arm) for arm in robot.arms))
+        self._publish: dict[str, Callable[[Any], None]] = {name: publisher(name).publish for name in names}
+        self._state_wire = StateWire(robot.joint_names, WORLD, BASE)
+        self._pose_wire, self._vector_wire = PoseWire(WORLD), vector_wire(WORLD)
+        self._energy_wire = energy_wire(WORLD)
+
+    def publish_loop(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
+        """Publish what the other nodes of the loop wait for.
+
+        At a reference period in lock step what the trajectory waits for goes first, because more has to be
+        done with it. In real time the controller is the one who must not wait.
+        """
+        publish = self._publish
+        joints, odometry = self._state_wire.pack_arrays(plant.stamp_ns, plant.q, plant.v, plant.joint_effort)
+        if with_reference and self._lockstep:
+            self._publish_sample(plant, joints, odometry)
+        publish[JOINT_STATES](joints)
+        publish[BASE_ODOMETRY](odometry)
+        if with_reference and not self._lockstep:
+            self._publish_sample(plant, joints, odometry)
+
+    def _publish_sample(self, plant: FreeFloatingPlant, joints: bytes, odometry: bytes) -> None:
+        """Publish what the trajectory waits for: the state of a reference period, and the deputy."""
+        publish = self._publish
+        publish[SAMPLED_JOINT_STATES](joints)
+        publish[SAMPLED_BASE_ODOMETRY](odometry)
+        publish[DEPUTY_POSE](self._pose_wire.pack(plant.stamp_ns, pose_row(plant.deputy.deputy_in_world)))
+
+    def publish_rest(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
+        """Publish what nobody in the loop waits for: tools, momenta, energy, the clock."""
+        now_ns, publish = plant.stamp_ns, self._publish
+        if with_reference:
+            receipt = plant.receipt
+            for arm, pose in plant.tools_in_world.items():
+                publish[tool_pose(arm)](self._pose_wire.pack(now_ns, pose_row(pose)))
+            energy = np.array([receipt.kinetic_energy, plant.work])
+            publish[LINEAR_MOMENTUM](self._vector_wire.pack(now_ns, receipt.linear_momentum))
+            publish[ANGULAR_MOMENTUM](self._vector_wire.pack(now_ns, receipt.angular_momentum))
+            publish[ENERGY](self._energy_wire.pack(now_ns, energy))
+        if now_ns % CLOCK_PERIOD_NS == 0:
+            publish[CLOCK](head(now_ns))

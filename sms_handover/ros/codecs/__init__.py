@@ -1,0 +1,1 @@
+"""Codecs between values of the core and ROS messages, as objects and as CDR bytes."""

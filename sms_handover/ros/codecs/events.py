@@ -1,0 +1,34 @@
+"""Reads the messages that tell of events, of whatever sender."""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
+from sms_handover_interfaces.msg import RunEvent as RunEventMessage
+
+from sms_handover.errors import MessageError, Reason
+from sms_handover.graph.events import RunEvent
+from sms_handover.messages.values import grasp_event, run_event
+from sms_handover.ros.codecs.loop_messages import decoded
+from sms_handover.types import GraspEvent
+
+V = TypeVar("V")
+
+
+def read_grasp_event(data: bytes) -> GraspEvent:
+    """Return what came of a grasp command; raises MessageError."""
+    return _read(data, GraspEventMessage, grasp_event)
+
+
+def read_run_event(data: bytes) -> RunEvent:
+    """Return what a node has decided; raises MessageError."""
+    return _read(data, RunEventMessage, run_event)
+
+
+def _read(data: bytes, kind: Any, value: Callable[[Any], V]) -> V:
+    """Return the value of a message; raises MessageError if a number in it stands for nothing known."""
+    try:
+        return value(decoded(data, kind))
+    except IndexError as error:
+        text = f"a {kind.__name__} has an action, status or severity that is not known"
+        raise MessageError(Reason.NAMES, text) from error

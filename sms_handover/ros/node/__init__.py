@@ -1,0 +1,1 @@
+"""What every node of the graph is made of: lifecycle, endpoints, filtered messages, events."""

@@ -1,0 +1,50 @@
+"""How a node tells what it has decided: on ``run/events``, hence in the bag, and in its log."""
+
+from math import nan
+
+from rclpy.node import Node
+
+from sms_handover.graph.events import RunEvent, Severity
+from sms_handover.ros.codecs.convert import run_event_message
+from sms_handover.ros.node.endpoints import CountedPublisher
+
+
+class EventPublisher:
+    """Publishes events of one node and logs each at its severity.
+
+    The topic is latched and reliable with a bounded history: whoever may decide often counts, and tells
+    at most once per second.
+    """
+
+    def __init__(self, node: Node, publisher: CountedPublisher) -> None:
+        """Speak for a node on a publisher of ``run/events``."""
+        self._name, self._log = node.get_name(), node.get_logger()
+        self._publisher = publisher
+
+    def publish(self, event: RunEvent) -> None:
+        """Publish and log an event."""
+        self._publisher.publish(run_event_message(event))
+        text = str(event).strip()
+        if event.severity is Severity.INFO:  # rclpy wants a line of code to log at one severity
+            self._log.info(text)
+        elif event.severity is Severity.WARNING:
+            self._log.warning(text)
+        else:
+            self._log.error(text)
+
+    def tell(
+        self,
+        kind: str,
+        severity: Severity,
+        detail: str,
+        stamp_ns: int,
+        *,
+        phase: str = "",
+        value: float = nan,
+        limit: float = nan,
+        unit: str = "",
+    ) -> None:
+        """Publish and log an event of this node."""
+        self.publish(
+            RunEvent(stamp_ns, self._name, kind, severity, detail, phase, value=value, limit=limit, unit=unit)
+        )

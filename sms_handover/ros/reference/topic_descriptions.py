@@ -1,0 +1,38 @@
+"""What the topics of the graph carry, for readers: the help of the nodes and docs/topics.md."""
+
+from sms_handover.graph import topics
+from sms_handover.graph.topics import Topic
+
+_CONTENTS = {
+    topics.JOINT_STATES: "joint positions [rad], velocities [rad/s], efforts of the last tick [N m]",
+    topics.BASE_ODOMETRY: "pose of base_link in world [m], its twist in base_link [m/s, rad/s]",
+    topics.SAMPLED_JOINT_STATES: "those of joint_states that fall on a reference period",
+    topics.SAMPLED_BASE_ODOMETRY: "those of base_odometry that fall on a reference period",
+    topics.JOINT_COMMAND: "joint efforts asked for [N m], with the stamp of the state that they answer",
+    topics.JOINT_REFERENCE: "desired joint positions [rad] and velocities [rad/s]",
+    topics.TASK_PHASE: "the phase of the schedule in force, and the grasp commands due at this instant",
+    topics.DEPUTY_POSE: "pose of the CubeSat in world [m]",
+    topics.DEPUTY_MARKER: "the shape of the CubeSat, for viewers",
+    topics.GRASP_EVENT: "what came of a grasp command, with the errors at that instant [m, rad, m/s]",
+    topics.LINEAR_MOMENTUM: "linear momentum of the whole robot in world axes [kg m/s]",
+    topics.ANGULAR_MOMENTUM: "angular momentum about the centre of mass in world axes [kg m^2/s]",
+    topics.ENERGY: "kinetic energy and the work that the joint efforts have done [J]",
+    topics.IK_STATUS: "how the last inverse-kinematics solve ended: status, iterations, errors [m, rad]",
+    topics.ROBOT_DESCRIPTION: "URDF of the robot",
+    topics.RUN_STATE: "whether the run waits, runs, pauses or is over",
+    topics.RUN_READY: "name of a node that is ready to begin",
+    topics.RUN_PUBLISHED: "how many messages a node has published on each topic, told once at the end",
+    topics.RUN_EVENTS: "what a node has decided by itself: a watchdog, a refused input, a phase done again",
+    topics.RUN_RECORDED: "up to which stamp all is in the bag; the plant goes at most 45 ms ahead",
+    topics.LOOP_TIMING: "late ticks, held commands, the real period [s] and the real-time factor",
+    topics.CLOCK: "simulation time",
+    topics.DIAGNOSTICS: "what a node is doing or waiting for",
+    topics.target_pose(""): "where the tool shall be, in world [m]",
+    topics.tool_pose(""): "where the tool is, in world [m]",
+}
+
+
+def contents_of(topic: Topic) -> str:
+    """Return what a topic of the graph carries; raises KeyError if that is not told here."""
+    of_an_arm = topic.name[topic.name.find("/") :]
+    return _CONTENTS[of_an_arm if of_an_arm in _CONTENTS else topic.name]

@@ -1,0 +1,93 @@
+"""Tells the messages of a topic's own publisher from those of any other, such as a second controller."""
+
+from collections.abc import Collection
+
+from rclpy.node import Node
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from sms_handover.errors import MessageError, Reason
+from sms_handover.ros.transport.rcl_take import IDENTITY
+
+# The name that a publisher has as long as discovery has not told its node; its messages may be here by then.
+_NAMELESS = "_NODE_NAME_UNKNOWN_"
+
+
+class Sender:
+    """The publishers whose messages on a topic count: of each node of the run one, or one in all.
+
+    It is the first that discovery gives to such a node, for as long as it is there. Against one that
+    forges identifiers only DDS-Security helps.
+    """
+
+    def __init__(self, node: Node, topic: str, peers: Collection[str], *, several: bool = False) -> None:
+        """Expect the messages of a topic, by its full name, from nodes among ``peers``."""
+        self.own: frozenset[bytes] = frozenset()  # global identifiers of the publishers that are known
+        self._node = node
+        self._topic = topic
+        self._peers = frozenset(peers)
+        self._several = several
+        self._strangers: dict[bytes, str] = {}  # names by global identifier
+
+    @property
+    def others(self) -> list[str]:
+        """Return the names of the nodes that publish on the topic but are not to."""
+        return [_name(endpoint) for endpoint in self._split()[1]]
+
+    def require(self, publisher: bytes) -> None:
+        """Take a message of a publisher that is not known as one of the own, b"" where that is not told.
+
+        Raises MessageError if it is another's.
+        """
+        if not publisher:
+            return
+        name = self._strangers.get(publisher)
+        if name is None:
+            own, others = self._split()
+            named = {_identity(endpoint) for endpoint in own if endpoint.node_name != _NAMELESS}
+            if publisher in named:
+                self.own = frozenset(named)
+            if publisher in map(_identity, own) or self._may_be_early(publisher, own, others):
+                return
+            name = self._name_of(publisher, others)
+        raise MessageError(Reason.SENDER, f"node {name} publishes too, whose messages do not count")
+
+    def _may_be_early(
+        self, publisher: bytes, own: list[TopicEndpointInfo], others: list[TopicEndpointInfo]
+    ) -> bool:
+        """Tell whether a message may be here before discovery has told of its publisher."""
+        if self._several:
+            return publisher not in map(_identity, others)
+        return not (self.own or own or others)
+
+    def _name_of(self, publisher: bytes, others: list[TopicEndpointInfo]) -> str:
+        """Return who publishes in words, and keep in mind who is a stranger for good."""
+        for endpoint in others:
+            if _identity(endpoint) == publisher:
+                name = repr(_name(endpoint))
+                if endpoint.node_name not in self._peers and endpoint.node_name != _NAMELESS:
+                    self._strangers[publisher] = name
+                return name
+        return "that is gone again"
+
+    def _split(self) -> tuple[list[TopicEndpointInfo], list[TopicEndpointInfo]]:
+        """Return the publishers that count, as far as they are there, and all others."""
+        there = self._node.get_publishers_info_by_topic(self._topic)
+        there.sort(key=lambda endpoint: _identity(endpoint) not in self.own)
+        by_node: dict[str, TopicEndpointInfo] = {}
+        for endpoint in there:
+            if endpoint.node_name in self._peers:
+                by_node.setdefault(endpoint.node_name, endpoint)
+        own = list(by_node.values())
+        nameless = [endpoint for endpoint in there if endpoint.node_name == _NAMELESS]
+        own = own + nameless if self._several else (own or nameless)[:1]
+        return own, [endpoint for endpoint in there if endpoint not in own]
+
+
+def _identity(endpoint: TopicEndpointInfo) -> bytes:
+    """Return the global identifier of an endpoint."""
+    return bytes(endpoint.endpoint_gid[:IDENTITY])
+
+
+def _name(endpoint: TopicEndpointInfo) -> str:
+    """Return the full name of the node that an endpoint belongs to."""
+    return f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"

@@ -1,0 +1,36 @@
+"""The scene of a recorded run, from what its bag carries and nothing else."""
+
+from pathlib import Path
+
+import yaml
+
+from sms_handover.bag.info import BagInfo, read_info
+from sms_handover.bag.run.reader import read_run
+from sms_handover.configuration.yaml_reader import load
+from sms_handover.errors import BagError
+from sms_handover.model.validation import positive_vector
+from sms_handover.scene.scene import FRAME_RATE, Scene, make_scene
+from sms_handover.types import Array, read_only
+
+
+def read_scene(path: Path, frame_rate: float = FRAME_RATE) -> Scene:
+    """Return the scene of the bag at ``path``, its folder or its file.
+
+    Raises BagError if the bag cannot be read, holds no run, or lacks the robot description or the
+    schedule that says how large the deputy is.
+    """
+    info = read_info(path)
+    if info.urdf_text is None:
+        raise BagError(f"{path} carries no robot description, so there is nothing to draw")
+    return make_scene(read_run(path), info.urdf_text, deputy_size_in(info), frame_rate)
+
+
+def deputy_size_in(info: BagInfo) -> Array:
+    """Return the edges (3,) m of the deputy that the schedule in a bag describes; raises BagError."""
+    try:
+        size = load(info.schedule_text or "")["deputy"]["size"]
+        return read_only(positive_vector(size, 3, "deputy: size", "m"))
+    except (yaml.YAMLError, KeyError, TypeError, ValueError) as error:
+        raise BagError(
+            f"{info.path} carries no schedule that says how large the deputy is: {error}"
+        ) from error

@@ -1,0 +1,1 @@
+"""The terminal: progress of long work, and keys."""
