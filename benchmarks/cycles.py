@@ -128,7 +128,7 @@ def unheld() -> set[str]:
 
 
 def is_held(lock: Path) -> bool:
-    """Tell whether a process holds a lock; to try it would disturb whoever is about to take it."""
+    """Whether a process holds a lock; to try it would disturb whoever is about to take it."""
     try:
         inode = lock.stat().st_ino
     except OSError:

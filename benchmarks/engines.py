@@ -17,7 +17,7 @@ from benchmarks.handover_task import Contestant, HandoverTask, State
 from benchmarks.machine import versions
 from benchmarks.mujoco_model import apart
 from benchmarks.results import DIAGRAMS, Result, Table, publish, row
-from sms_handover.model.conserved import physics_receipt
+from sms_handover.model.conserved import conserved_quantities
 from sms_handover.plant.integrators import TABLEAUS, Tableau
 from sms_handover.run_data import RunData
 from sms_handover.simulation.check import check_scenario
@@ -105,7 +105,9 @@ def undisturbed(course: Course) -> float:
 def precision(task: HandoverTask, course: Course, exact: Course) -> tuple[float, float, float]:
     """Return the largest error of the joints in rad and of the base in m or rad, and the momentum gained."""
     errors = np.array([apart(a, b) for a, b in zip(course.states, exact.states, strict=True)])
-    momenta = [physics_receipt(task.scenario.robot, *state).angular_momentum for state in course.states[::10]]
+    momenta = [
+        conserved_quantities(task.scenario.robot, *state).angular_momentum for state in course.states[::10]
+    ]
     return float(errors[:, 0].max()), float(errors[:, 1:].max()), float(np.linalg.norm(momenta, axis=1).max())
 
 

@@ -111,7 +111,7 @@ def with_pink(robot: RobotModel) -> Solver:
 
 
 def _met(error: Array) -> bool:
-    """Tell whether a tool is within the tolerance of its target."""
+    """Whether a tool is within the tolerance of its target."""
     return bool(max(np.linalg.norm(error[:3]), np.linalg.norm(error[3:])) <= TOLERANCE)
 
 

@@ -26,9 +26,9 @@ from sms_handover.graph.topics import (
 )
 from sms_handover.launcher.domain import reserved_domain
 from sms_handover.messages.stamps import stamp_ns
-from sms_handover.ros.codecs.loop_messages import JointStateWire, OdometryWire
+from sms_handover.ros.codecs.loop_messages import JointStateCodec, OdometryCodec
 from sms_handover.ros.node.endpoints import Endpoints
-from sms_handover.ros.process.network_scope import settle_reach
+from sms_handover.ros.process.network_scope import apply_network_scope
 from sms_handover.ros.transport.direct import DirectInputs
 from sms_handover.ros.transport.inputs import Deliver
 
@@ -56,9 +56,9 @@ class Side:
         self._executor.add_node(node)
         zeros = np.zeros(len(NAMES))
         pose, twist = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]), np.zeros(6)
-        states = JointStateWire(NAMES, ("position", "velocity", "effort"))
-        odometry = OdometryWire(WORLD, BASE)
-        commands = JointStateWire(NAMES, ("effort",))
+        states = JointStateCodec(NAMES, ("position", "velocity", "effort"))
+        odometry = OdometryCodec(WORLD, BASE)
+        commands = JointStateCodec(NAMES, ("effort",))
         pack: dict[str, Callable[[int], bytes]] = {
             JOINT_STATES: lambda stamp: states.pack(stamp, position=zeros, velocity=zeros, effort=zeros),
             BASE_ODOMETRY: lambda stamp: odometry.pack(stamp, pose, twist),
@@ -138,7 +138,7 @@ def solo(trips: int) -> float:
 def main() -> None:
     """Play one of the two sides, or both."""
     os.environ.update(ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST", ROS_STATIC_PEERS="")
-    settle_reach()
+    apply_network_scope()
     role, trips = sys.argv[1], int(sys.argv[2])
     if role == "pong":
         pong(trips)

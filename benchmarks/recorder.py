@@ -16,7 +16,7 @@ from sms_handover.bag.recording import Recording
 from sms_handover.bag.writer import CHUNK_SIZE
 from sms_handover.graph.topics import TF, graph_topics
 from sms_handover.messages.message_types import MessageTypes
-from sms_handover.ros.codecs.loop_messages import JointStateWire
+from sms_handover.ros.codecs.loop_messages import JointStateCodec
 
 COUNT = 60_000  # messages, as of one topic of a whole run
 ROUNDS = 5
@@ -28,7 +28,7 @@ _TYPE = "sensor_msgs/msg/JointState"
 
 def messages() -> list[bytes]:
     """Return the joint states of a run in which every joint moves."""
-    wire, random = JointStateWire(NAMES, ("position", "velocity", "effort")), np.random.default_rng(1)
+    wire, random = JointStateCodec(NAMES, ("position", "velocity", "effort")), np.random.default_rng(1)
     blocks = random.normal(size=(3, COUNT, len(NAMES)))
     return [
         wire.pack(k * _TICK_NS, position=blocks[0, k], velocity=blocks[1, k], effort=blocks[2, k])

@@ -131,7 +131,7 @@ def _ledger(result: Recovery) -> tuple[TopicLedger, ...]:
 
 
 def _opens(bag: Path) -> bool:
-    """Tell whether a bag can be read as a run."""
+    """Whether a bag can be read as a run."""
     try:
         read_run(bag)
     except BagError:

@@ -66,14 +66,14 @@ class Soak:
 
     @property
     def flat(self) -> bool:
-        """Tell whether nothing has grown: memory by its slope, descriptors and threads by their number."""
+        """Whether nothing has grown: memory by its slope, descriptors and threads by their number."""
         return all(self.growth_of(name) <= self.allowed_of(name) for name in self.samples) and not any(
             self.more_of(name) for name in self.samples
         )
 
     @property
     def whole(self) -> bool:
-        """Tell whether the run ended in order and the bag has everything up to its end."""
+        """Whether the run ended in order and the bag has everything up to its end."""
         return self.code in (0, _INTERRUPTED) and self.lost == 0 and not self.findings
 
     def growth_of(self, process: str) -> float:

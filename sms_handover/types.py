@@ -271,7 +271,7 @@ class TaskPhase:
 
     @property
     def failed(self) -> bool:
-        """Tell whether the phase has been given up."""
+        """Whether the phase has been given up."""
         return self.state is PhaseState.FAILED
 
     @property

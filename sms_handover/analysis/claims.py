@@ -252,6 +252,6 @@ def _never_as_infinite(finding: Finding) -> Finding:
 
 
 def _all_larger(findings: Iterable[Finding]) -> bool:
-    """Tell whether there are findings, and in each of them PID's value is the larger one."""
+    """Whether there are findings, and in each of them PID's value is the larger one."""
     compared = [finding.pid > finding.nmpc for finding in findings]
     return bool(compared) and all(compared)

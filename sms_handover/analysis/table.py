@@ -57,7 +57,7 @@ def figure_sections(comparison: Comparison, tolerance: Tolerance | None = None) 
         *_run_event_section(runs),
         *(_phase_section(comparison, name) for name in comparison.phase_names),
         Section("Torque over the whole run, peak / RMS [N m]", _torque_rows(runs)),
-        Section("Physics and inverse kinematics", _receipt_rows(runs)),
+        Section("Physics and inverse kinematics", _conservation_rows(runs)),
         *([Section("Wall clock", _loop_rows(runs))] if any(item.loop for item in runs) else []),
     )
 
@@ -204,7 +204,7 @@ def _peak_and_rms(metrics: RunMetrics, joint: str) -> str:
     return f"{torque.peak[place]:.3g} / {torque.rms[place]:.3g}"
 
 
-def _receipt_rows(runs: Sequence[RunMetrics]) -> tuple[Row, ...]:
+def _conservation_rows(runs: Sequence[RunMetrics]) -> tuple[Row, ...]:
     """Return the conservation laws and the outcomes of inverse kinematics."""
     return (
         row("largest linear momentum [kg m/s]", runs, lambda item: item.physics.linear_momentum),

@@ -109,7 +109,7 @@ def _motion(run: RunData, phase: PhaseSpan, arm: str, tool: Array, target: Array
 
 
 def _reference_moves(run: RunData, phase: PhaseSpan, arm: str) -> bool:
-    """Tell whether the joint reference of an arm changes within a phase; while held it does not."""
+    """Whether the joint reference of an arm changes within a phase; while held it does not."""
     reference = run.reference_position[phase.rows][:, joints_of(run.joint_names, arm)]
     reference = reference[complete(reference)]
     return bool(reference.size) and bool(np.max(np.ptp(reference, axis=0)) > _MOVED)

@@ -65,7 +65,7 @@ class TopicLedger:
 
     @property
     def complete(self) -> bool:
-        """Tell whether nothing is known to be missing."""
+        """Whether nothing is known to be missing."""
         return self.missing == 0 and (self.lost is None or self.lost <= 0)
 
 
@@ -77,7 +77,7 @@ class Ledger:
 
     @property
     def complete(self) -> bool:
-        """Tell whether no topic is known to miss anything."""
+        """Whether no topic is known to miss anything."""
         return all(topic.complete for topic in self.topics)
 
     def to_record(self) -> dict[str, str]:

@@ -45,7 +45,7 @@ class RunRecordings:
 
     @property
     def complete(self) -> bool:
-        """Tell whether nothing is known to be missing in any recording that is closed."""
+        """Whether nothing is known to be missing in any recording that is closed."""
         return self._complete
 
     def add_topic(self, name: str, type_name: str, qos: Sequence[Qos] = (), period_ns: int = 0) -> None:

@@ -40,7 +40,7 @@ class SchemaTypes:
 
     @property
     def stamped(self) -> bool:
-        """Tell whether a message begins with a time."""
+        """Whether a message begins with a time."""
         fields = self.fields(self.name)
         return bool(fields) and fields[0][1][1] in _TIMES
 

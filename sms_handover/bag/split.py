@@ -11,5 +11,5 @@ class Split:
     size: int = 0
 
     def due(self, duration_ns: int, size: int) -> bool:
-        """Tell whether a file with so much log time and so many bytes is at its end."""
+        """Whether a file with so much log time and so many bytes is at its end."""
         return 0 < self.duration_ns <= duration_ns or 0 < self.size <= size

@@ -91,7 +91,7 @@ def _indexed(
 
 
 def _may_hold(chunk: ChunkIndex, wanted: Collection[int], span: TimeSpan) -> bool:
-    """Tell whether a chunk can hold a message of the wanted channels and times."""
+    """Whether a chunk can hold a message of the wanted channels and times."""
     indexed = chunk.message_index_offsets
     return (
         chunk.message_end_time >= span.start_ns

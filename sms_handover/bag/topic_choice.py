@@ -29,7 +29,7 @@ class TopicChoice:
                 raise ConfigurationError(f"regular expression {text!r} is not readable: {error}") from error
 
     def wants(self, name: str) -> bool:
-        """Tell whether a topic is chosen."""
+        """Whether a topic is chosen."""
         if name in _full(self.exclude_topics) or (self.exclude_regex and re.search(self.exclude_regex, name)):
             return False
         if not self.topics and not self.regex:

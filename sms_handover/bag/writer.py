@@ -109,7 +109,7 @@ class BagWriter:
 
     @property
     def closed(self) -> bool:
-        """Tell whether the bag has been closed."""
+        """Whether the bag has been closed."""
         return self._closed
 
     @property

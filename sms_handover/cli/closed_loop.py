@@ -25,7 +25,7 @@ from sms_handover.launcher.launcher import LaunchPlan, graph_environment
 from sms_handover.launcher.processes import NodeProcesses
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.ros.parameters import as_arguments
-from sms_handover.ros.process.network_scope import reach_to
+from sms_handover.ros.process.network_scope import network_scope_to
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import COMMON, Scenario
 from sms_handover.units import ns_to_seconds
@@ -47,7 +47,7 @@ def closed_loop(bag: Path, domain_id: int | None) -> int:
         except BagError as error:
             raise ConfigurationError(str(error)) from error  # exit code 2: what was given cannot be used
         with reserved_domain(domain_id) as domain:
-            plan = LaunchPlan(scenario, (), domain, folder, bag=None, reach=reach_to(()))
+            plan = LaunchPlan(scenario, (), domain, folder, bag=None, reach=network_scope_to(()))
             os.environ.update(plan.reach.environment)
             begin = monotonic()
             rclpy.init(domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)

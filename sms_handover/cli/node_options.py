@@ -52,5 +52,5 @@ def run_in_process(
 
 
 def _unset(value: object) -> bool:
-    """Tell whether an option was not given."""
+    """Whether an option was not given."""
     return value is None or value is False or value == []

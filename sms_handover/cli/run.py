@@ -19,7 +19,7 @@ from sms_handover.launcher.launcher import LaunchPlan, launch
 from sms_handover.launcher.run_folder import BAG, LOGS, locked_logs
 from sms_handover.ros.launching.composition import listed, placed
 from sms_handover.ros.process.main import EXIT_LOSS
-from sms_handover.ros.process.network_scope import reach_to
+from sms_handover.ros.process.network_scope import network_scope_to
 from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.parameters import LOCKSTEP, REALTIME
 from sms_handover.simulation.scenario import Scenario
@@ -98,7 +98,7 @@ def command(options: Namespace) -> int:
     """Carry out the command; return the exit code."""
     mode = REALTIME if options.real_time else LOCKSTEP
     here, elsewhere = placed(options.nodes, record=not options.no_record)
-    reach = reach_to(listed(options.peers))
+    reach = network_scope_to(listed(options.peers))
     if (elsewhere or reach.hosts) and options.domain_id is None:
         raise ConfigurationError(
             "nodes of several hosts meet on a ROS domain: give each host the same --domain-id"

@@ -185,7 +185,7 @@ def _solved(matrix: list[list[Expression]], right: Expression) -> Expression:
 
 
 def _is_zero(value: Expression) -> bool:
-    """Tell whether an entry is zero for every configuration."""
+    """Whether an entry is zero for every configuration."""
     return bool(ca.SX(value).is_zero())
 
 

@@ -45,14 +45,14 @@ class Section:
         """Return file and line of a key, as errors name them."""
         return f"{self._path}:{self.line_of(key)}"
 
-    def refuse_unknown(self, known: Sequence[str]) -> None:
+    def reject_unknown(self, known: Sequence[str]) -> None:
         """Raise ScheduleError on a key that is not among the known ones."""
         for key in self._nodes:
             if key not in known:
                 raise ScheduleError(str(UnknownNameError("key", key, known, self.where(key))))
 
     def has(self, key: str) -> bool:
-        """Tell whether a key is given."""
+        """Whether a key is given."""
         return key in self._nodes
 
     def section(self, key: str) -> "Section":
@@ -73,7 +73,7 @@ class Section:
         return [Section(self._path, item) for item in node.value]
 
     def is_text(self, key: str) -> bool:
-        """Tell whether the value of a key is a single word or number."""
+        """Whether the value of a key is a single word or number."""
         return isinstance(self._get(key), yaml.ScalarNode)
 
     def value(self, key: str) -> Any:

@@ -21,7 +21,7 @@ class ReferenceTrack:
 
     @property
     def ready(self) -> bool:
-        """Tell whether a reference has come."""
+        """Whether a reference has come."""
         return self._last is not None
 
     @property

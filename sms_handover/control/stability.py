@@ -20,7 +20,7 @@ class LoopStability:
 
     @property
     def stable(self) -> bool:
-        """Tell whether every mode decays."""
+        """Whether every mode decays."""
         return self.spectral_radius < 1.0 - ROUNDING
 
 

@@ -32,7 +32,7 @@ class Selection:
 
     @property
     def everything(self) -> bool:
-        """Tell whether no topic is left out."""
+        """Whether no topic is left out."""
         return self.topics == TopicChoice()
 
     def wanted(self, origin_ns: int) -> Wanted:

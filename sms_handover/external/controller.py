@@ -13,7 +13,7 @@ from sms_handover.frames import WORLD
 from sms_handover.graph.topics import CONTROLLER, target_pose
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.nodes.controller import Answering, AnsweringNode
-from sms_handover.ros.codecs.loop_messages import PoseWire, Stamped
+from sms_handover.ros.codecs.loop_messages import PoseCodec, Stamped
 from sms_handover.ros.node.graph_node import P
 from sms_handover.ros.node.message_filter import Read
 from sms_handover.ros.process.main import EXIT_OK, run_node
@@ -62,7 +62,7 @@ class OwnControllerNode(AnsweringNode[P]):
     def make_controller(self, schedule: Schedule) -> Answering:
         """Return the controller, guided as in one process."""
         robot = self.robot
-        self._pose_wire = PoseWire(WORLD)
+        self._pose_wire = PoseCodec(WORLD)
         self._arms = {target_pose(arm): arm for arm in robot.arms}
         controller = CheckedController(self._make(robot, self.parameters), robot.joint_names)
         self._guided = GuidedController(controller, robot)

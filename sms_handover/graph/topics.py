@@ -48,7 +48,7 @@ class Topic:
 
     @property
     def latched(self) -> bool:
-        """Tell whether a late subscriber still gets the last message."""
+        """Whether a late subscriber still gets the last message."""
         return self.rate is Rate.CHANGE
 
 
@@ -91,7 +91,7 @@ REFUSED_TOPIC = "/refused"  # ends the topic of a bag with what others published
 
 
 def is_refused(topic: str) -> bool:
-    """Tell whether a topic of a bag holds what others published; nothing of that counts for the run."""
+    """Whether a topic of a bag holds what others published; nothing of that counts for the run."""
     return topic.endswith(REFUSED_TOPIC)
 
 

@@ -65,7 +65,7 @@ def find_joints(robot: RobotModel, request: IkRequest, parameters: IkParameters)
 
 
 def _converged(residual: Residual, parameters: IkParameters) -> bool:
-    """Tell whether both errors are below their tolerances, and are numbers."""
+    """Whether both errors are below their tolerances, and are numbers."""
     return (
         residual.energy < inf
         and residual.position_error <= parameters.position_tolerance

@@ -26,9 +26,9 @@ from sms_handover.graph.topics import (
 )
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.ros.codecs.convert import header
-from sms_handover.ros.codecs.loop_messages import JointStateWire, Stamped, StateWire, decoded
+from sms_handover.ros.codecs.loop_messages import JointStateCodec, Stamped, StateCodec, decoded
 from sms_handover.ros.node.endpoints import CountedPublisher, Endpoints
-from sms_handover.ros.node.message_filter import Read, Refusals
+from sms_handover.ros.node.message_filter import MessageFilter, Read
 from sms_handover.ros.transport.inputs import Deliver
 from sms_handover.ros.transport.stamp_sync import StampSync
 from sms_handover.units import NS_PER_S
@@ -61,15 +61,15 @@ class CommandReplay:
         self._next = next(ticks, None)
         self._reference_ns = reference_ns
         zero = np.zeros(robot.n_joints)  # N m
-        self._last_command = JointStateWire(robot.joint_names, ("effort",)).pack(0, effort=zero)
-        self._wire = StateWire(robot.joint_names, WORLD, BASE)
+        self._last_command = JointStateCodec(robot.joint_names, ("effort",)).pack(0, effort=zero)
+        self._wire = StateCodec(robot.joint_names, WORLD, BASE)
         self._inputs: StampSync[bytes] = StampSync()
         self._endpoints = Endpoints(node, graph_topics(robot.arms), PEERS)
         self._command = self._endpoints.publisher(JOINT_COMMAND)
         self._phase = self._endpoints.publisher(TASK_PHASE)
         self._ready = self._endpoints.publisher(RUN_READY)
         self._answers: list[tuple[CountedPublisher, Any]] = []  # to the last state
-        self.refusals = Refusals(node.get_logger().warning, lambda topic, error: None)
+        self.refusals = MessageFilter(node.get_logger().warning, lambda topic, error: None)
         reads = dict(zip(_STATE, (self._wire.joints.checked, self._wire.odometry.checked), strict=True))
         for name, read in reads.items():
             self._listen(name, self.refusals.guarding(name, partial(self._take, name), _as_it_came(read)))

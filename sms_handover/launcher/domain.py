@@ -68,7 +68,7 @@ def reserved_domain(asked: int | None) -> Iterator[int]:
 
 
 def _is_used(domain: int) -> bool:
-    """Tell whether somebody takes part in a domain, who has not reserved it: any other ROS program."""
+    """Whether somebody takes part in a domain, who has not reserved it: any other ROS program."""
     for number in range(_PARTICIPANTS_LOOKED_FOR):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             if not _is_free(probe, _EVERYWHERE, domain, _PARTICIPANT + _PER_PARTICIPANT * number):

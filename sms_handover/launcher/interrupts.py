@@ -35,12 +35,12 @@ class Interrupts:
 
     @property
     def asked(self) -> bool:
-        """Tell whether the run is to end."""
+        """Whether the run is to end."""
         return self._count > 0
 
     @property
     def at_once(self) -> bool:
-        """Tell whether nothing is to be waited for."""
+        """Whether nothing is to be waited for."""
         return self._count > 1
 
     def tell(self) -> None:

@@ -22,11 +22,11 @@ from sms_handover.launcher.lifecycle_driver import LifecycleDriver
 from sms_handover.launcher.monitor import RunMonitor
 from sms_handover.launcher.processes import Death, NodeProcesses
 from sms_handover.launcher.shared_memory import SharedMemory
-from sms_handover.launcher.timeouts import Delay, Suspended, WatchedTime
+from sms_handover.launcher.timeouts import ActiveTime, SuspensionMonitor, WaitNotice
 from sms_handover.ros.launching.composition import ProcessArguments, nodes_together, process_arguments
 from sms_handover.ros.node.graph_node import INPUTS
 from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK
-from sms_handover.ros.process.network_scope import THIS_MACHINE, Reach
+from sms_handover.ros.process.network_scope import THIS_MACHINE, NetworkScope
 from sms_handover.simulation.scenario import COMMON, Scenario
 from sms_handover.types import GraspEvent
 from sms_handover.units import ns_to_seconds
@@ -65,7 +65,7 @@ class LaunchPlan:
     inherited: tuple[int, ...] = ()
     nodes: tuple[str, ...] = NODES
     elsewhere: tuple[str, ...] = ()
-    reach: Reach = THIS_MACHINE
+    reach: NetworkScope = THIS_MACHINE
 
     @property
     def external(self) -> frozenset[str]:
@@ -177,7 +177,7 @@ class _Watch:
         self._display = Display(end_ns)
         self._events_shown = self._run_events_shown = 0
         self._interrupts, self._memory = interrupts, memory
-        self._time, self._suspended = WatchedTime(), Suspended()
+        self._time, self._suspended = ActiveTime(), SuspensionMonitor()
         self._recorder_seen_gone = inf
 
     def to_the_end(self) -> Outcome:
@@ -213,7 +213,7 @@ class _Watch:
         deadline = inf if by_hand else self._time.seconds + patience_s
         interrupted = inf
         asked = False
-        delay = Delay()
+        delay = WaitNotice()
         while self._monitor.progress.state == RunState.WAITING:
             self._driver.look()
             self._look()
@@ -318,10 +318,10 @@ class _Watch:
         self._interrupts.tell()
         self._suspended.look(self._processes.suspended(), self._time.seconds)
         if dead := [death for death in self._processes.dead() if not self._recorder_is_done(death)]:
-            raise GraphError(self._obituary(dead))
+            raise GraphError(self._death_report(dead))
 
     def _recorder_is_done(self, death: Death) -> bool:
-        """Tell whether a process that ended is the recorder at the end of the run.
+        """Whether a process that ended is the recorder at the end of the run.
 
         The recorder may close the bag and end before the news of the end has come to the launcher.
         """
@@ -347,7 +347,7 @@ class _Watch:
             self._display.finish(progress.wall_time)
         self._display.show(progress.stamp_ns, progress.phase, progress.tool_error, last=last)
 
-    def _obituary(self, dead: Sequence[Death]) -> str:
+    def _death_report(self, dead: Sequence[Death]) -> str:
         """Return who died, how, what to do, and the last they said."""
         who = "; ".join(f"node {death.name!r} {death.how}" for death in dead)
         cut = any(death.name == RECORDER and death.code < 0 for death in dead)

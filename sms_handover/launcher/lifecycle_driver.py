@@ -37,7 +37,7 @@ class LifecycleDriver:
 
     @property
     def active(self) -> bool:
-        """Tell whether every node has been activated."""
+        """Whether every node has been activated."""
         return self._have_all(_ACTIVATE)
 
     @property
@@ -62,7 +62,7 @@ class LifecycleDriver:
         self._ask(_SHUTDOWN)
 
     def _have_all(self, transition: int) -> bool:
-        """Tell whether every node has done a transition."""
+        """Whether every node has done a transition."""
         return self._done[transition] >= self._clients.keys()
 
     def _ask(self, transition: int) -> None:

@@ -35,7 +35,7 @@ from sms_handover.ros.message_types import message_class
 from sms_handover.ros.node.message_filter import Read
 from sms_handover.ros.qos import LATCHED
 from sms_handover.ros.transport.inputs import Inputs
-from sms_handover.ros.transport.publisher_identity import Sender
+from sms_handover.ros.transport.publisher_identity import PublisherIdentity
 from sms_handover.types import GraspEvent
 
 _EVERY_NODE = 16  # [messages] of which the newest may not push out those of other nodes
@@ -101,7 +101,7 @@ class RunMonitor:
         """Hand every good message of the own publishers of a topic to ``take``."""
         topic, full_name = self._topics[name], self._node.resolve_topic_name(name)
         several = len(topic.publishers) > 1
-        sender = Sender(self._node, full_name, topic.publishers, several=several)
+        sender = PublisherIdentity(self._node, full_name, topic.publishers, several=several)
 
         def receive(data: bytes, sent_ns: int, publisher: bytes) -> None:
             with suppress(MessageError):
@@ -125,12 +125,12 @@ class RunMonitor:
 
     @property
     def finished(self) -> bool:
-        """Tell whether the plant has said that the run is over."""
+        """Whether the plant has said that the run is over."""
         return self.progress.state in (RunState.FINISHED, RunState.FAILED)
 
     @property
     def heard_every_event(self) -> bool:
-        """Tell whether every event has come that the nodes say, at their end, they have published.
+        """Whether every event has come that the nodes say, at their end, they have published.
 
         The plant must have said so; a node that hangs is not waited for.
         """

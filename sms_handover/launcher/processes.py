@@ -135,7 +135,7 @@ class NodeProcesses:
 
 
 def _is_stopped(pid: int) -> bool:
-    """Tell whether a child is stopped now; what is told of it is left for others to ask."""
+    """Whether a child is stopped now; what is told of it is left for others to ask."""
     try:
         return os.waitid(os.P_PID, pid, os.WSTOPPED | os.WNOHANG | os.WNOWAIT) is not None
     except ChildProcessError:  # it has ended and was reaped

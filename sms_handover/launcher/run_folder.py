@@ -25,7 +25,7 @@ def bags_of(path: Path) -> tuple[Path, ...]:
 
 
 def is_bag_of_run(name: str) -> bool:
-    """Tell whether a bag of this name is one in the output folder of a run."""
+    """Whether a bag of this name is one in the output folder of a run."""
     return name == BAG or _LATER_RUN.fullmatch(name) is not None
 
 

@@ -47,7 +47,7 @@ class _Inodes(NamedTuple):
         return cls(_inode(folder / f"{name}{_LOCK}"), _inode(folder / name))
 
     def stayed(self, now: "_Inodes") -> bool:
-        """Tell whether what is there now is still the same: the lock or, without one, the memory."""
+        """Whether what is there now is still the same: the lock or, without one, the memory."""
         return self.lock == now.lock if now.lock else self.memory == now.memory
 
 

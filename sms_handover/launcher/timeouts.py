@@ -13,7 +13,7 @@ _LONGEST_LOOK_S = 1.0  # [s] of wall time between two looks; what is longer, the
 _DELAY_S = 10.0  # [s] of wall time between two lines on what is waited for
 
 
-class WatchedTime:
+class ActiveTime:
     """Wall time that counts only while this process looks.
 
     A launcher that was suspended, by Ctrl-Z or with the whole machine, has not waited in vain.
@@ -32,7 +32,7 @@ class WatchedTime:
         self._seen = now
 
 
-class Suspended:
+class SuspensionMonitor:
     """Notices nodes that are suspended, by SIGSTOP or a debugger: the run waits for them, not for ever."""
 
     def __init__(self) -> None:
@@ -61,7 +61,7 @@ class Suspended:
                 )
 
 
-class Delay:
+class WaitNotice:
     """Tells what something that has not begun waits for: after a while, and again when the reason changes."""
 
     def __init__(self) -> None:

@@ -55,7 +55,7 @@ class MessageTypes:
         return Schema(type_name, text, self._store.hash_rihs01(type_name))
 
     def stamped(self, type_name: str) -> bool:
-        """Tell whether a message of this type begins with a time: a Header or a Time comes first."""
+        """Whether a message of this type begins with a time: a Header or a Time comes first."""
         self.require(type_name)
         fields = self._store.fielddefs[type_name][1]
         return bool(fields) and fields[0][1][1] in (_TIME, _HEADER)

@@ -35,7 +35,7 @@ def transforms_cdr(types: MessageTypes, transforms: Sequence[Transform], stamp_n
     return types.serialize(types.make(TF_TYPE, transforms=stamped))
 
 
-class TransformsWire:
+class TransformsCodec:
     """Packs TFMessages for one list of frames: the layout is fixed, only stamps and numbers change."""
 
     def __init__(self, types: MessageTypes, frames: Sequence[tuple[str, str]]) -> None:

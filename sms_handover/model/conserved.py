@@ -10,7 +10,7 @@ from sms_handover.types import Array, frozen
 
 
 @dataclass(frozen=True, eq=False)
-class PhysicsReceipt:
+class ConservedQuantities:
     """Momenta, kinetic energy and centre of mass of the whole robot at one instant.
 
     ``linear_momentum`` (3,) kg m/s and ``angular_momentum`` (3,) kg m^2/s about the centre of mass
@@ -23,7 +23,7 @@ class PhysicsReceipt:
     kinetic_energy: float
 
 
-def physics_receipt(robot: RobotModel, q: Array, v: Array) -> PhysicsReceipt:
+def conserved_quantities(robot: RobotModel, q: Array, v: Array) -> ConservedQuantities:
     """Return the conserved quantities by the centroidal momentum A_G(q) v [Orin2013].
 
     Kinetic energy is v^T H v / 2, with the rotors in H: Pinocchio 4.1's own sum leaves them out at
@@ -34,4 +34,4 @@ def physics_receipt(robot: RobotModel, q: Array, v: Array) -> PhysicsReceipt:
     centre = np.array(robot.data.com[0])
     inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.LOCAL)
     energy = 0.5 * float(v.dot(inertia).dot(v))
-    return PhysicsReceipt(frozen(linear), frozen(angular), frozen(centre), energy)
+    return ConservedQuantities(frozen(linear), frozen(angular), frozen(centre), energy)

@@ -15,8 +15,8 @@ from sms_handover.graph.topics import (
     TASK_PHASE,
 )
 from sms_handover.nodes.parts.reference_watch import ReferenceWatch
-from sms_handover.ros.codecs.loop_messages import JointStateWire, Stamped, StateWire, coordinates
-from sms_handover.ros.codecs.task_phase import PhaseWire
+from sms_handover.ros.codecs.loop_messages import JointStateCodec, Stamped, StateCodec, coordinates
+from sms_handover.ros.codecs.task_phase import PhaseCodec
 from sms_handover.ros.node.graph_node import GraphNode, P
 from sms_handover.ros.node.message_filter import Read, Receive
 from sms_handover.ros.process.main import run_node
@@ -64,10 +64,10 @@ class AnsweringNode(GraphNode[P]):
         self._controller = self.make_controller(schedule)
         self._lockstep = self.common.mode == LOCKSTEP
         self._tick_ns, self._reference_ns = self.common.tick_ns, self.common.reference_ns
-        self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
-        self._reference_wire = JointStateWire(self.robot.joint_names, ("position", "velocity"))
-        self._command_wire = JointStateWire(self.robot.joint_names, ("effort",))
-        self._phase_wire = PhaseWire(self.robot.arms, schedule.deputy.grasp_frames)
+        self._state_wire = StateCodec(self.robot.joint_names, WORLD, BASE)
+        self._reference_wire = JointStateCodec(self.robot.joint_names, ("position", "velocity"))
+        self._command_wire = JointStateCodec(self.robot.joint_names, ("effort",))
+        self._phase_wire = PhaseCodec(self.robot.arms, schedule.deputy.grasp_frames)
         guidance = self.guidance()
         state: dict[str, Read[Stamped[Any]]] = {
             JOINT_STATES: self._state_wire.joints.checked,
@@ -106,10 +106,10 @@ class AnsweringNode(GraphNode[P]):
     def on_answered(self, stamp: int) -> None:
         """Do what is due after an answer; a node may override this."""
 
-    def begin_anew(self) -> None:
+    def reset_run(self) -> None:
         """Forget the run: integrals, references and what waits of it."""
         self.begin()
-        self._inputs.begin_anew()
+        self._inputs.reset_run()
         self._early.clear()
         self._answered_ns = 0
         self._answer_bytes = b""

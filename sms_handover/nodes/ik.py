@@ -33,14 +33,14 @@ class IkNode(GraphNode[IkParameters]):
 
     def prepare(self) -> None:
         """Offer the service."""
-        self.begin_anew()
+        self.reset_run()
         self._names = list(self.robot.joint_names)
         self._response = SolveIK.Response(valid=True)  # filled anew each time: most of it never changes
         self._response.solution.name = self._names
         self._response.status.header.frame_id = WORLD
         self.inputs.serve(SolveIK, SOLVE_IK, self._on_request)
 
-    def begin_anew(self) -> None:
+    def reset_run(self) -> None:
         """Forget the run: only counts are kept of it, as a solution rests on its request alone."""
         self._solved = dict.fromkeys(IkStatus, 0)
         self._refused = 0

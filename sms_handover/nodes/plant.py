@@ -31,8 +31,8 @@ from sms_handover.nodes.parts.plant_outputs import PlantOutputs
 from sms_handover.nodes.parts.run_control import RunControl
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.ros.codecs.convert import event_message, header
-from sms_handover.ros.codecs.loop_messages import JointStateWire, Stamped, stamped
-from sms_handover.ros.codecs.task_phase import PhaseWire
+from sms_handover.ros.codecs.loop_messages import JointStateCodec, Stamped, stamped
+from sms_handover.ros.codecs.task_phase import PhaseCodec
 from sms_handover.ros.node.graph_node import GraphNode
 from sms_handover.ros.process.main import run_node
 from sms_handover.ros.transport.loop_clock import LoopClock
@@ -72,8 +72,8 @@ class PlantNode(GraphNode[PlantParameters]):
         self.lockstep = self.common.mode == LOCKSTEP
         self._tick_ns, self._per_reference = self.common.tick_ns, self.common.ticks_per_reference
         self._is_recorded = RECORDER in self.common.peers
-        self._command_wire = JointStateWire(self.robot.joint_names, ("effort",))
-        self._phase_wire = PhaseWire(self.robot.arms, tuple(schedule.deputy.grasp_frames))
+        self._command_wire = JointStateCodec(self.robot.joint_names, ("effort",))
+        self._phase_wire = PhaseCodec(self.robot.arms, tuple(schedule.deputy.grasp_frames))
         self._inputs: StampSync[Any] = StampSync(ahead_ns=self._tick_ns)
         self._orders = {topic: StampOrder(0) for topic in _PHASE_AND_COMMAND}
         self._loop_clock = LoopClock(self.common.tick_ns, paced=not self.lockstep)
@@ -157,7 +157,7 @@ class PlantNode(GraphNode[PlantParameters]):
 
     @property
     def _ahead_of_recorder(self) -> bool:
-        """Tell whether the next state would be more than may be lost if the recorder were killed."""
+        """Whether the next state would be more than may be lost if the recorder were killed."""
         next_ns = self._plant.stamp_ns + self._tick_ns
         return self._is_recorded and next_ns - self._recorded_ns > _MOST_UNRECORDED_NS
 
@@ -329,8 +329,8 @@ class PlantNode(GraphNode[PlantParameters]):
     # What the services of the run's control ask for
 
     @property
-    def recorder_is_gone(self) -> bool:
-        """Tell whether there should be a recorder, but is none any more."""
+    def recorder_has_ended(self) -> bool:
+        """Whether there should be a recorder, but is none any more."""
         return self._is_recorded and not self.count_publishers(RUN_RECORDED)
 
     def ticks_to(self, most: int) -> tuple[int, int]:
@@ -345,9 +345,9 @@ class PlantNode(GraphNode[PlantParameters]):
             self.publish_diagnostics()
             self.publish_counts()
         self.finished = False
-        self._control.begin_anew()
+        self._control.reset_run()
         self._plant.reset()
-        self._inputs.begin_anew()
+        self._inputs.reset_run()
         for order in self._orders.values():
             order.reset()
         self._loop_clock.reset()

@@ -20,7 +20,7 @@ from sms_handover.playback.report import closing_line, progress_line
 from sms_handover.playback.schedule import PlaybackOptions, PlaybackSchedule
 from sms_handover.playback.source import PlaybackSource, span_of
 from sms_handover.ros.codecs.convert import time_message
-from sms_handover.ros.parameters import declare, refuse_unknown
+from sms_handover.ros.parameters import declare, reject_unknown
 from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, RunnableNode, Stop, run_node
 from sms_handover.terminal.keyboard import Key, Keyboard
 from sms_handover.terminal.status_line import StatusLine
@@ -48,7 +48,7 @@ class PlayerNode(RunnableNode):
         """Open the bag and advertise its topics; raises ConfigurationError if nothing can be played."""
         super().__init__(PLAYER, automatically_declare_parameters_from_overrides=True)
         self.parameters: PlayerParameters = declare(self, PlayerParameters, "player.yaml", PLAYER)
-        refuse_unknown(self, PlayerParameters)
+        reject_unknown(self, PlayerParameters)
         options = self.parameters
         try:
             self._info = read_info(Path(options.bag))

@@ -34,18 +34,18 @@ from sms_handover.graph.topics import (
     Rate,
     Topic,
 )
-from sms_handover.messages.transforms import TF_TYPE, TransformsWire
+from sms_handover.messages.transforms import TF_TYPE, TransformsCodec
 from sms_handover.model.link_tree import LinkTree
 from sms_handover.nodes.parts.peer_parameters import PeerParameters
 from sms_handover.ros.codecs.convert import time_message
-from sms_handover.ros.codecs.loop_messages import PoseWire, Stamped, StateWire, decoded, stamped, state_of
+from sms_handover.ros.codecs.loop_messages import PoseCodec, Stamped, StateCodec, decoded, stamped, state_of
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.node.graph_node import GraphNode
 from sms_handover.ros.node.message_filter import Read, Receive
 from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, Stop, run_node
 from sms_handover.ros.qos import LOSSLESS, profile_of, stored, weakest
 from sms_handover.ros.transport.inputs import Deliver
-from sms_handover.ros.transport.publisher_identity import Sender
+from sms_handover.ros.transport.publisher_identity import PublisherIdentity
 from sms_handover.ros.transport.stamp_sync import StampSync
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import load_task
@@ -86,12 +86,12 @@ class RecorderNode(GraphNode[RecorderParameters]):
             self._poll_s = _LOCKSTEP_POLL_S
         self._others = [peer for peer in self.common.peers if peer != RECORDER]
         self._peer_parameters = PeerParameters(self, self.common.peers)
-        self._state_wire = StateWire(self.robot.joint_names, WORLD, BASE)
-        self._pose_wire = PoseWire(WORLD)
+        self._state_wire = StateCodec(self.robot.joint_names, WORLD, BASE)
+        self._pose_wire = PoseCodec(WORLD)
         self._tf: StampSync[Any] = StampSync(_BEHIND)
         self._links = LinkTree(self.robot)
         frames = [*self._links.frames, (WORLD, DEPUTY)]
-        self._tf_wire = TransformsWire(self._recordings.types, frames)
+        self._tf_wire = TransformsCodec(self._recordings.types, frames)
         self._topics: set[str] = set()
         self._recorded = self.endpoints.publisher(RUN_RECORDED)
         self._take_over(self._recordings.current)
@@ -117,13 +117,13 @@ class RecorderNode(GraphNode[RecorderParameters]):
         """Do nothing: processor and priority are for the nodes of the loop, before this one."""
 
     def prepared(self) -> bool:
-        """Tell whether a bag is open, and the parameters of every node have been written into it."""
+        """Whether a bag is open, and the parameters of every node have been written into it."""
         if not self._run_is_over and not self._described and self._peer_parameters.poll():
             self._recording.describe(parameters=self._peer_parameters.values)
             self._described = True
         return self._described
 
-    def begin_anew(self) -> None:
+    def reset_run(self) -> None:
         """Keep in mind that the bag is to be closed when all of the run has come."""
         self._run_is_over, self._described = True, False
 
@@ -207,7 +207,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
             self._recorded.publish(Header(stamp=time_message(self._flushed_ns)))
 
     def _drained(self) -> bool:
-        """Tell whether nothing is to be expected any more of a run that is over."""
+        """Whether nothing is to be expected any more of a run that is over."""
         silent = self.endpoints.silent(RUN_PUBLISHED)
         if (self._reported | silent).issuperset(self._others) and self._recording.ledger.complete:
             return True
@@ -264,8 +264,8 @@ class RecorderNode(GraphNode[RecorderParameters]):
 
         return deliver
 
-    def _is_own(self, topic: Topic, sender: Sender, publisher: bytes, data: bytes) -> bool:
-        """Tell whether a message is from the topic's own publishers.
+    def _is_own(self, topic: Topic, sender: PublisherIdentity, publisher: bytes, data: bytes) -> bool:
+        """Whether a message is from the topic's own publishers.
 
         One that comes before discovery tells whose it is passes for that only if it is of the topic's type.
         """

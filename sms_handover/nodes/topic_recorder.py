@@ -14,7 +14,7 @@ from sms_handover.bag.writer import BagWriter
 from sms_handover.errors import BagError, ConfigurationError, SmsHandoverError
 from sms_handover.graph.topics import TOPIC_RECORDER
 from sms_handover.ros.message_types import message_class
-from sms_handover.ros.parameters import declare, refuse_unknown
+from sms_handover.ros.parameters import declare, reject_unknown
 from sms_handover.ros.process.main import EXIT_FAILED, EXIT_OK, RunnableNode, Stop, run_node
 from sms_handover.ros.qos import stored, weakest
 from sms_handover.ros.transport.direct import DirectInputs
@@ -39,7 +39,7 @@ class TopicRecorderNode(RunnableNode):
         self.parameters: TopicRecorderParameters = declare(
             self, TopicRecorderParameters, "topic_recorder.yaml", TOPIC_RECORDER
         )
-        refuse_unknown(self, TopicRecorderParameters)
+        reject_unknown(self, TopicRecorderParameters)
         self._choice = self.parameters.choice
         folder = self.parameters.folder or datetime.now().strftime("rosbag2_%Y_%m_%d-%H_%M_%S")
         try:

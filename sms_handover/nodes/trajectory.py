@@ -31,14 +31,14 @@ from sms_handover.ros.codecs.convert import (
 )
 from sms_handover.ros.codecs.events import read_grasp_event
 from sms_handover.ros.codecs.loop_messages import (
-    JointStateWire,
-    PoseWire,
+    JointStateCodec,
+    PoseCodec,
     Stamped,
-    StateWire,
+    StateCodec,
     stamped,
     state_of,
 )
-from sms_handover.ros.codecs.task_phase import PhaseWire
+from sms_handover.ros.codecs.task_phase import PhaseCodec
 from sms_handover.ros.node.endpoints import CountedPublisher
 from sms_handover.ros.node.graph_node import GraphNode
 from sms_handover.ros.node.message_filter import Receive
@@ -70,8 +70,8 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         schedule = load_task(self.common, self.robot)
         check_feasibility(Scenario(_for_any_plant(load_parameters()), self.robot, schedule))
         self._generator = TrajectoryGenerator(self.robot, schedule, self.parameters)
-        self._reference_wire = JointStateWire(self.robot.joint_names, ("position", "velocity"))
-        self._pose_wire, self._phase_wire = PoseWire(WORLD), PhaseWire()
+        self._reference_wire = JointStateCodec(self.robot.joint_names, ("position", "velocity"))
+        self._pose_wire, self._phase_wire = PoseCodec(WORLD), PhaseCodec()
         self._lockstep = self.common.mode == LOCKSTEP
         ahead_ns = self.common.reference_ns if self._lockstep else NS_PER_S
         self._inputs: StampSync[Any] = StampSync(ahead_ns=ahead_ns, paced=not self._lockstep)
@@ -88,19 +88,19 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._reference = self.endpoints.publisher(JOINT_REFERENCE)
         self._targets = {arm: self.endpoints.publisher(target_pose(arm)) for arm in self.robot.arms}
         self.receive(GRASP_EVENT, self._on_grasp, stamped)
-        state = StateWire(self.robot.joint_names, WORLD, BASE)
+        state = StateCodec(self.robot.joint_names, WORLD, BASE)
         self.receive(SAMPLED_JOINT_STATES, self._taker(SAMPLED_JOINT_STATES), state.joints.checked)
         self.receive(SAMPLED_BASE_ODOMETRY, self._taker(SAMPLED_BASE_ODOMETRY), state.odometry.checked)
         self.receive(DEPUTY_POSE, self._taker(DEPUTY_POSE), self._pose_wire.checked)
 
     def prepared(self) -> bool:
-        """Tell whether the IK service is there."""
+        """Whether the IK service is there."""
         return self._solver.ready()
 
-    def begin_anew(self) -> None:
+    def reset_run(self) -> None:
         """Forget the run: phases, what waits of it, and the question that is under way."""
         self._generator.reset()
-        self._inputs.begin_anew()
+        self._inputs.reset_run()
         self._stamp_ns = self._newest_ns = self._failures = 0
         self._overdue += self._asked is not None
         self._answer = []
@@ -144,7 +144,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
 
     @property
     def _waits_for_grasps(self) -> bool:
-        """Tell whether it has to be known what came of a grasp before the task goes on (lock step)."""
+        """Whether it has to be known what came of a grasp before the task goes on (lock step)."""
         return self._lockstep and self._generator.awaits_grasps
 
     def _on_grasp(self, message: Stamped[bytes], sent_ns: int) -> None:
@@ -231,7 +231,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
 
 
 def _answers(answer: Any, stamp_ns: int) -> bool:
-    """Tell whether an answer of the IK service is that to a request of this stamp."""
+    """Whether an answer of the IK service is that to a request of this stamp."""
     return stamp_ns_of(answer.solution.header.stamp) == stamp_ns
 
 

@@ -25,11 +25,11 @@ from sms_handover.graph.topics import (
 )
 from sms_handover.model.poses import pose_row
 from sms_handover.ros.codecs.events import read_grasp_event
-from sms_handover.ros.codecs.loop_messages import PoseWire, Stamped, StateWire, stamped, state_of
-from sms_handover.ros.codecs.task_phase import PhaseWire
+from sms_handover.ros.codecs.loop_messages import PoseCodec, Stamped, StateCodec, stamped, state_of
+from sms_handover.ros.codecs.task_phase import PhaseCodec
 from sms_handover.ros.message_types import message_class
-from sms_handover.ros.node.message_filter import Read, Receive, Refusals
-from sms_handover.ros.parameters import declare, refuse_unknown
+from sms_handover.ros.node.message_filter import MessageFilter, Read, Receive
+from sms_handover.ros.parameters import declare, reject_unknown
 from sms_handover.ros.process.main import EXIT_OK, RunnableNode, Stop, run_node
 from sms_handover.ros.qos import LATCHED
 from sms_handover.ros.transport.stamp_sync import StampSync
@@ -60,20 +60,20 @@ class ViewerNode(RunnableNode):
         """Serve the page; raises ConfigurationError on a bad parameter or a port that is taken."""
         super().__init__(VIEWER, automatically_declare_parameters_from_overrides=True)
         self.parameters: ViewerParameters = declare(self, ViewerParameters, "viewer.yaml", VIEWER)
-        refuse_unknown(self, CommonParameters, ViewerParameters)  # a file may set those of every node
+        reject_unknown(self, CommonParameters, ViewerParameters)  # a file may set those of every node
         self._urdf = ""
         self._deputy_size: tuple[float, ...] = ()
         self._scene: LiveScene | None = None
         self._inputs: StampSync[Any] = StampSync()
-        self.refusals = Refusals(self.get_logger().warning, lambda topic, error: None)
-        self._pose_wire = PoseWire(WORLD)
-        self._state_wire: StateWire | None = None  # known with the robot
+        self.refusals = MessageFilter(self.get_logger().warning, lambda topic, error: None)
+        self._pose_wire = PoseCodec(WORLD)
+        self._state_wire: StateCodec | None = None  # known with the robot
         self._shown_ns = -1  # stamp of what is shown
         self._wanted: tuple[str, ...] = (SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
         self._listen(ROBOT_DESCRIPTION, self._on_robot, LATCHED)
         self._listen(DEPUTY_MARKER, self._on_deputy, LATCHED)
         self._take(GRASP_EVENT, self._on_event, read_grasp_event, LATCHED)
-        self._take(TASK_PHASE, self._on_phase, PhaseWire().read, _GLANCE)
+        self._take(TASK_PHASE, self._on_phase, PhaseCodec().read, _GLANCE)
         for name in self._wanted:
             self._take(name, partial(self._add, name), stamped, _GLANCE)
         self.server = SceneServer(self.find_scene, self.parameters.port, "Handover, live")
@@ -139,7 +139,7 @@ class ViewerNode(RunnableNode):
         except SmsHandoverError as error:
             self.get_logger().error(f"the robot cannot be shown: {error}")
             return
-        self._state_wire = StateWire(self._scene.joint_names, WORLD, BASE)
+        self._state_wire = StateCodec(self._scene.joint_names, WORLD, BASE)
         targets = tuple(target_pose(arm) for arm in self._arms)
         self._wanted += targets
         for name in targets:

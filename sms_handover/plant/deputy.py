@@ -28,7 +28,7 @@ class GraspErrors:
     speed: float
 
     def within(self, tolerance: GraspTolerance) -> bool:
-        """Tell whether every error is inside its tolerance."""
+        """Whether every error is inside its tolerance."""
         return (
             self.position <= tolerance.position
             and self.angle <= tolerance.angle

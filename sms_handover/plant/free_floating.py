@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sms_handover.errors import ConfigurationError
-from sms_handover.model.conserved import PhysicsReceipt, physics_receipt
+from sms_handover.model.conserved import ConservedQuantities, conserved_quantities
 from sms_handover.model.robot_model import BASE_NQ, RobotModel
 from sms_handover.plant.deputy import MasslessDeputy
 from sms_handover.plant.grasping import answer
@@ -116,9 +116,9 @@ class FreeFloatingPlant:
         return self._robot.tools_at(self.q)
 
     @property
-    def receipt(self) -> PhysicsReceipt:
+    def receipt(self) -> ConservedQuantities:
         """Return momenta, energy and centre of mass of the robot."""
-        return physics_receipt(self._robot, self.q, self.v)
+        return conserved_quantities(self._robot, self.q, self.v)
 
     def execute(self, commands: tuple[GraspCommand, ...]) -> tuple[GraspEvent, ...]:
         """Carry out grasp commands at this instant, in order, and return what came of each."""

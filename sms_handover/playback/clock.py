@@ -25,7 +25,7 @@ class PlaybackClock:
 
     @property
     def paused(self) -> bool:
-        """Tell whether bag time stands still."""
+        """Whether bag time stands still."""
         return self._paused
 
     def bag_ns(self, now_ns: int) -> int:

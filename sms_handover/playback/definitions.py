@@ -9,7 +9,7 @@ from sms_handover.messages.message_types import MessageTypes
 
 
 def same_definition(topic: TopicInfo, types: MessageTypes) -> bool:
-    """Tell whether the messages of a topic mean here what they meant when they were recorded.
+    """Whether the messages of a topic mean here what they meant when they were recorded.
 
     The type hash of the bag is compared, or where it has none that of its schema; what cannot be
     compared is taken to be the same.

@@ -36,7 +36,7 @@ class Offer:
 
     @property
     def latched(self) -> bool:
-        """Tell whether a late subscriber still gets the last messages."""
+        """Whether a late subscriber still gets the last messages."""
         return self.durability is Durability.TRANSIENT_LOCAL
 
 

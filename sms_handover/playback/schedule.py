@@ -50,7 +50,7 @@ class PlaybackSchedule:
 
     @property
     def finished(self) -> bool:
-        """Tell whether every message has been sent and nothing is to be repeated."""
+        """Whether every message has been sent and nothing is to be repeated."""
         return self._head() is None
 
     def start(self, now_ns: int) -> None:

@@ -58,7 +58,7 @@ def _decisions(run: RecordedRun) -> tuple[Verdict, ...]:
 
 
 def _recording(ledger: Ledger | None) -> Verdict:
-    """Tell whether messages are known to be missing."""
+    """Whether messages are known to be missing."""
     if ledger is None:
         return Verdict("recorded without a loss ledger", None)
     lost = sum(max(topic.missing, topic.lost or 0) for topic in ledger.topics)

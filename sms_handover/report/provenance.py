@@ -27,7 +27,7 @@ class ComparedValue:
 
     @property
     def differs(self) -> bool:
-        """Tell whether the runs do not all have the same value."""
+        """Whether the runs do not all have the same value."""
         return len(set(self.values)) > 1
 
 

@@ -48,7 +48,7 @@ def declare(node: Node, cls: type[T], file: str | None, section: str) -> T:
     return checked
 
 
-def refuse_unknown(node: Node, *groups: type[object]) -> None:
+def reject_unknown(node: Node, *groups: type[object]) -> None:
     """Raise UnknownNameError on a parameter that no group has; refuse changes from now on."""
     known = [item.name for cls in groups for item in fields(cls)]  # type: ignore[arg-type]
     for name in node.get_parameters_by_prefix(""):

@@ -54,7 +54,7 @@ def stored(profile: QoSProfile) -> Qos:
 
 
 def serves(offered: QoSProfile, asked: QoSProfile) -> bool:
-    """Tell whether a publisher's profile and a subscription's can match."""
+    """Whether a publisher's profile and a subscription's can match."""
     return bool(qos_check_compatible(offered, asked)[0] != QoSCompatibility.ERROR)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sms_handover.graph.events import RunEvent
-from sms_handover.model.conserved import PhysicsReceipt
+from sms_handover.model.conserved import ConservedQuantities
 from sms_handover.run_data import RunData
 from sms_handover.types import (
     BASE_NQ,
@@ -87,7 +87,11 @@ class RunRecorder:
         self._period += 1
 
     def plant(
-        self, tools_in_world: Mapping[str, Pose], deputy_in_world: Pose, receipt: PhysicsReceipt, work: float
+        self,
+        tools_in_world: Mapping[str, Pose],
+        deputy_in_world: Pose,
+        receipt: ConservedQuantities,
+        work: float,
     ) -> None:
         """Add what the plant gave in one reference period, before :meth:`reference`."""
         row = self._period

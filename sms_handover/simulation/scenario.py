@@ -63,7 +63,7 @@ def load_parameters(overrides: Overrides | None = None, files: Sequence[Path] = 
             raise UnknownNameError("node", node, known, "parameter overrides")
 
     for path in files:
-        _refuse_misspelt(path)
+        _reject_misspelt(path)
 
     def group(cls: type[T], node: str, section: str, external: Sequence[str] = ()) -> T:
         if node in external:  # what is given is for a node that we know nothing of
@@ -83,7 +83,7 @@ def load_parameters(overrides: Overrides | None = None, files: Sequence[Path] = 
     )
 
 
-def _refuse_misspelt(path: Path) -> None:
+def _reject_misspelt(path: Path) -> None:
     """Raise UnknownNameError on a section of a parameter file that nearly has the name of a node.
 
     A file may have sections for nodes of others, so only what looks like a slip is refused.

@@ -40,7 +40,7 @@ class Keyboard(AbstractContextManager["Keyboard"]):
 
     @property
     def usable(self) -> bool:
-        """Tell whether there are keys at all."""
+        """Whether there are keys at all."""
         return self._fd is not None
 
     def __enter__(self) -> "Keyboard":

@@ -20,7 +20,7 @@ class StatusLine:
 
     @property
     def due(self) -> bool:
-        """Tell whether it is time to show the line anew."""
+        """Whether it is time to show the line anew."""
         return monotonic() >= self._next
 
     def show(self, text: str) -> None:

@@ -90,7 +90,7 @@ class TrajectoryGenerator:
 
     @property
     def awaits_grasps(self) -> bool:
-        """Tell whether a command has been given of which it is not known yet what came of it."""
+        """Whether a command has been given of which it is not known yet what came of it."""
         return self._progress.awaits_grasps
 
     def grasped(self, events: Iterable[GraspEvent]) -> None:
@@ -184,5 +184,5 @@ def _joint_motion(start: Array, end: Array, progress: Progress) -> tuple[Array, 
 
 
 def _moves(twist: Twist) -> bool:
-    """Tell whether a twist is not zero."""
+    """Whether a twist is not zero."""
     return bool(np.count_nonzero(twist.linear) or np.count_nonzero(twist.angular))

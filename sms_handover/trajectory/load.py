@@ -32,9 +32,9 @@ _TARGET_KINDS = ("hold", "joints", "tool_in_world", "grasp_frame")
 def load_schedule(path: Path, robot: RobotModel, reference_period_ns: int) -> Schedule:
     """Return the schedule in a file; raises ScheduleError naming the line or phase that is wrong."""
     root, text = read_section(path)
-    root.refuse_unknown(("initial", "deputy", "phases"))
+    root.reject_unknown(("initial", "deputy", "phases"))
     initial = root.section("initial")
-    initial.refuse_unknown(("base_in_world", "joints"))
+    initial.reject_unknown(("base_in_world", "joints"))
     deputy = _deputy(root.section("deputy"))
     joints = _initial_joints(initial.section("joints"), robot)
     phases: list[Phase] = []
@@ -50,7 +50,7 @@ def load_schedule(path: Path, robot: RobotModel, reference_period_ns: int) -> Sc
 
 def _deputy(section: Section) -> DeputyDescription:
     """Return the deputy of the schedule."""
-    section.refuse_unknown(("mass", "size", "in_world", "grasp_frames"))
+    section.reject_unknown(("mass", "size", "in_world", "grasp_frames"))
     mass = section.number("mass", "kg", minimum=0.0)
     if mass != 0.0:
         raise section.error(f"'mass' is {mass:g} kg, but only a massless deputy (0 kg) can be simulated yet")
@@ -64,7 +64,7 @@ def _deputy(section: Section) -> DeputyDescription:
 
 def _initial_joints(section: Section, robot: RobotModel) -> dict[str, Array]:
     """Return the initial joint angles of every arm, which must be within their limits."""
-    section.refuse_unknown(robot.arms)
+    section.reject_unknown(robot.arms)
     return {arm: _joints(section, arm, arm, robot) for arm in robot.arms}
 
 
@@ -83,7 +83,7 @@ def _joints(section: Section, key: str, arm: str, robot: RobotModel) -> Array:
 
 def _phase(section: Section, robot: RobotModel, deputy: DeputyDescription, previous_end_ns: int) -> Phase:
     """Return one phase; it starts where the one before ends unless it says when."""
-    section.refuse_unknown(("name", "start", "duration", "motion", "arms", "events", "on_miss", "gains"))
+    section.reject_unknown(("name", "start", "duration", "motion", "arms", "events", "on_miss", "gains"))
     name = section.text("name")
     start_ns = previous_end_ns
     if section.has("start"):
@@ -103,7 +103,7 @@ def _phase(section: Section, robot: RobotModel, deputy: DeputyDescription, previ
                 f"phase {name!r}: 'motion' is longer than the phase", section.line_of("motion")
             )
     arms = section.section("arms")
-    arms.refuse_unknown(robot.arms)
+    arms.reject_unknown(robot.arms)
     targets = {arm: _target(arms, arm, robot, deputy) for arm in robot.arms}
     events = section.sections("events") if section.has("events") else []
     commands = tuple(_command(event, robot, deputy) for event in events)
@@ -126,7 +126,7 @@ def _on_miss(section: Section, commands: Sequence[GraspCommand], *, is_first: bo
             raise section.error(f"{key!r} needs to know how often: write {{retry: 2}}", line)
         return OnMiss(MissAction(word))
     inner = section.section(key)
-    inner.refuse_unknown((MissAction.RETRY.value,))
+    inner.reject_unknown((MissAction.RETRY.value,))
     retries = inner.count(MissAction.RETRY.value, minimum=1, maximum=MOST_RETRIES)
     if is_first:
         raise section.error("a retry does the phase before again, but this is the first one", line)
@@ -143,7 +143,7 @@ def _target(arms: Section, arm: str, robot: RobotModel, deputy: DeputyDescriptio
             raise arms.error(f"target of {arm!r} is {arms.value(arm)!r}, expected {known}", arms.line_of(arm))
         return Hold()
     section = arms.section(arm)
-    section.refuse_unknown(("joints", "tool_in_world", "grasp_frame", "tool_in_grasp_frame"))
+    section.reject_unknown(("joints", "tool_in_world", "grasp_frame", "tool_in_grasp_frame"))
     kinds = [kind for kind in _TARGET_KINDS if section.has(kind)]
     if len(kinds) != 1:
         raise section.error(f"target of {arm!r} needs exactly one of {', '.join(_TARGET_KINDS[1:])}")
@@ -160,18 +160,18 @@ def _target(arms: Section, arm: str, robot: RobotModel, deputy: DeputyDescriptio
 def _command(event: Section, robot: RobotModel, deputy: DeputyDescription) -> GraspCommand:
     """Return one event of a phase: ``grasp``, ``release`` or ``transfer`` and its details."""
     kinds = tuple(action.value for action in GraspAction)
-    event.refuse_unknown(kinds)
+    event.reject_unknown(kinds)
     if len(event.keys) != 1:
         raise event.error(f"an event is exactly one of {', '.join(kinds)}")
     action = GraspAction(event.keys[0])
     details = event.section(action.value)
     if action is GraspAction.RELEASE:
-        details.refuse_unknown(("arm",))
+        details.reject_unknown(("arm",))
         return GraspCommand(action, _arm(details, "arm", robot))
     if action is GraspAction.GRASP:
-        details.refuse_unknown(("arm", "grasp_frame"))
+        details.reject_unknown(("arm", "grasp_frame"))
         return GraspCommand(action, _arm(details, "arm", robot), _grasp_frame(details, "grasp_frame", deputy))
-    details.refuse_unknown(("from", "to", "grasp_frame"))
+    details.reject_unknown(("from", "to", "grasp_frame"))
     frame = _grasp_frame(details, "grasp_frame", deputy)
     return GraspCommand(action, _arm(details, "to", robot), frame, _arm(details, "from", robot))
 
@@ -206,7 +206,7 @@ def _gains(section: Section) -> dict[str, dict[str, object]]:
 
 def _pose(section: Section) -> Pose:
     """Return the pose given by ``xyz`` in m and ``rpy`` in rad (fixed axes, as in URDF)."""
-    section.refuse_unknown(("xyz", "rpy"))
+    section.reject_unknown(("xyz", "rpy"))
     return pose_from_xyz_rpy(
         np.array(section.vector("xyz", 3, "m")), np.array(section.vector("rpy", 3, "rad"))
     )

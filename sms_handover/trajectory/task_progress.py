@@ -35,7 +35,7 @@ class _Issue:
 
     @property
     def answered(self) -> bool:
-        """Tell whether it is known of every command what came of it."""
+        """Whether it is known of every command what came of it."""
         return len(self.answers) == len(self.commands)
 
     @property
@@ -76,7 +76,7 @@ class TaskProgress:
 
     @property
     def awaits_grasps(self) -> bool:
-        """Tell whether a command has been given of which it is not known yet what came of it."""
+        """Whether a command has been given of which it is not known yet what came of it."""
         return any(not issue.answered for issue in self._issues)
 
     def grasped(self, events: Iterable[GraspEvent]) -> None:

@@ -31,5 +31,5 @@ def absence() -> str:
 
 
 def is_needed() -> bool:
-    """Tell whether a missing Chromium is a failure."""
+    """Whether a missing Chromium is a failure."""
     return bool(os.environ.get(NEEDED))

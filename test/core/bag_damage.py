@@ -103,6 +103,6 @@ def scanned(path: Path) -> list[Message]:
 
 
 def is_subsequence(part: list[Message], whole: list[Message]) -> bool:
-    """Tell whether ``part`` is ``whole`` with some left out: nothing invented, altered or swapped."""
+    """Whether ``part`` is ``whole`` with some left out: nothing invented, altered or swapped."""
     rest: Iterator[Message] = iter(whole)
     return all(message in rest for message in part)

@@ -55,7 +55,7 @@ class Terminal:
 
     @property
     def echoes(self) -> bool:
-        """Tell whether keys are shown as they are pressed, as by default."""
+        """Whether keys are shown as they are pressed, as by default."""
         return bool(self.settings[3] & termios.ECHO)
 
     def press(self, keys: bytes) -> None:

@@ -14,7 +14,7 @@ from sms_handover.compiled import dynamics
 from sms_handover.compiled.compiler import library_of
 from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
 from sms_handover.errors import ConfigurationError, MissingDependencyError, UnknownNameError
-from sms_handover.model.conserved import physics_receipt
+from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.description import load_robot
 from sms_handover.model.reduced import reduced_dynamics, reduced_inverse_dynamics
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
@@ -153,7 +153,7 @@ def test_a_whole_run_differs_by_rounding_alone() -> None:
         np.concatenate([compiled.base_pose[-1], compiled.joint_position[-1]]),
         np.concatenate([compiled.base_twist[-1], compiled.joint_velocity[-1]]),
     )
-    receipt = physics_receipt(robot, *end)
+    receipt = conserved_quantities(robot, *end)
     assert np.abs(receipt.linear_momentum).max() < 1e-12
     assert np.abs(receipt.angular_momentum).max() < 1e-12
 

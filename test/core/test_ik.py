@@ -44,7 +44,7 @@ def _errors(
 
 
 def _within_limits(robot: RobotModel, joints: Array) -> bool:
-    """Tell whether no joint is beyond a limit, not even by rounding."""
+    """Whether no joint is beyond a limit, not even by rounding."""
     return bool(np.all(joints >= robot.lower) and np.all(joints <= robot.upper))
 
 

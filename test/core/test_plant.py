@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sms_handover.errors import ConfigurationError
-from sms_handover.model.conserved import PhysicsReceipt
+from sms_handover.model.conserved import ConservedQuantities
 from sms_handover.model.poses import pose_distance, pose_of, se3_of
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
@@ -58,7 +58,7 @@ class Drift:
             self._note(plant.receipt, plant.work)
         self.energy = plant.receipt.kinetic_energy
 
-    def _note(self, receipt: PhysicsReceipt, work: float) -> None:
+    def _note(self, receipt: ConservedQuantities, work: float) -> None:
         """Keep the largest departures: momenta, centre of mass, energy less work."""
         departures = [
             float(np.linalg.norm(receipt.linear_momentum)),

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sms_handover.model.conserved import physics_receipt
+from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.poses import pose_distance
 from sms_handover.model.reduced import (
     base_twist_per_joint_rate,
@@ -89,7 +89,7 @@ def test_base_motion_at_zero_momentum(robot: RobotModel, draw: Draw) -> None:
     for _ in range(20):
         q, rates = draw.q(), draw.vector(14)
         v = np.concatenate([base_twist_per_joint_rate(robot, q) @ rates, rates])
-        receipt = physics_receipt(robot, q, v)
+        receipt = conserved_quantities(robot, q, v)
         rounding = _rounding(robot, q) * 254.0
         np.testing.assert_allclose(receipt.linear_momentum, 0.0, atol=rounding)
         np.testing.assert_allclose(receipt.angular_momentum, 0.0, atol=rounding)

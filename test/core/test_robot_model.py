@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 from sms_handover.errors import UnknownNameError
-from sms_handover.model.conserved import physics_receipt
+from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.parts import Inertia, Origin
 from sms_handover.model.poses import pose_distance, pose_row
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
@@ -143,7 +143,7 @@ def test_momentum_and_energy_are_sums_over_the_bodies(robot: RobotModel, draw: D
     """Each body gives m v, (r - c) x m v + I w and (m v^2 + w I w) / 2, its velocity taken by differences."""
     for _ in range(5):
         q, v = draw.q(), draw.v()
-        receipt = physics_receipt(robot, q, v)
+        receipt = conserved_quantities(robot, q, v)
         now, _ = _walk(robot, q)
         before, _ = _walk(robot, _along(robot, q, v, -FD_STEP))
         after, _ = _walk(robot, _along(robot, q, v, FD_STEP))

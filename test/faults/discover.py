@@ -50,7 +50,7 @@ def chosen(
 
 
 def _fits(family: Family, fault: Fault[Any], pattern: str) -> bool:
-    """Tell whether a fault fits a pattern, with or without the name of its family."""
+    """Whether a fault fits a pattern, with or without the name of its family."""
     return fnmatch(f"{family.name}/{fault.name}", pattern) or fnmatch(fault.name, pattern)
 
 

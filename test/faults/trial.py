@@ -26,7 +26,7 @@ class Trial:
 
     @property
     def is_root(self) -> bool:
-        """Tell whether permissions do not hold for this process."""
+        """Whether permissions do not hold for this process."""
         return os.geteuid() == 0
 
     def environment(self, more: Mapping[str, str] | None = None) -> dict[str, str]:

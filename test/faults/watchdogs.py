@@ -144,7 +144,7 @@ def stop_and_go_on(node: str, options: Sequence[object], trial: Trial) -> Ended:
 
 
 def said(run: Running, node: str) -> bool:
-    """Tell whether the watchdog for a stopped node has told the last that it tells."""
+    """Whether the watchdog for a stopped node has told the last that it tells."""
     return ("torque_zero" if node == CONTROLLER else "reference_lost") in run.text
 
 

@@ -25,8 +25,8 @@ from sms_handover.errors import SmsHandoverError
 from sms_handover.frames import BASE, WORLD
 from sms_handover.messages.message_types import MessageTypes
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.ros.codecs.loop_messages import JointStateWire, OdometryWire, PoseWire, arrival_ns
-from sms_handover.ros.codecs.task_phase import PhaseWire
+from sms_handover.ros.codecs.loop_messages import JointStateCodec, OdometryCodec, PoseCodec, arrival_ns
+from sms_handover.ros.codecs.task_phase import PhaseCodec
 from sms_handover.scene.live import LiveScene
 from sms_handover.simulation.scenario import load_parameters
 from sms_handover.trajectory.load import load_schedule
@@ -94,8 +94,8 @@ def _robot_files(data: bytes, folder: Path) -> None:
 @cache
 def _wires() -> tuple[Callable[[bytes], object], ...]:
     names, arms = _robot().joint_names, _robot().arms
-    state, odometry = JointStateWire(names, ("position", "velocity", "effort")), OdometryWire(WORLD, BASE)
-    command, pose, phase = JointStateWire(names, ("effort",)), PoseWire(WORLD), PhaseWire(arms, ("end_a",))
+    state, odometry = JointStateCodec(names, ("position", "velocity", "effort")), OdometryCodec(WORLD, BASE)
+    command, pose, phase = JointStateCodec(names, ("effort",)), PoseCodec(WORLD), PhaseCodec(arms, ("end_a",))
     checked = (state.checked, odometry.checked, command.checked, pose.checked, phase.checked, arrival_ns)
     types = MessageTypes()
     decoders = tuple(_decoder(types, name) for name in _BASE_OF_TYPES)

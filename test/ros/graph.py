@@ -143,7 +143,7 @@ class Graph:
         self.bench.until(self.everything_heard, "all messages")
 
     def everything_heard(self) -> bool:
-        """Tell whether the ear has as many messages as the nodes have published."""
+        """Whether the ear has as many messages as the nodes have published."""
         published: dict[str, int] = {}
         for node in self.nodes.values():
             for name, count in node.endpoints.counts.items():

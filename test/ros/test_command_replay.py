@@ -24,7 +24,7 @@ from sms_handover.launcher.command_replay import PEERS, CommandReplay
 from sms_handover.messages.stamps import stamp_ns
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.ros.codecs.convert import header
-from sms_handover.ros.codecs.loop_messages import JointStateWire, StateWire
+from sms_handover.ros.codecs.loop_messages import JointStateCodec, StateCodec
 from sms_handover.ros.node.endpoints import Endpoints
 from sms_handover.types import Pose, RobotState, Twist
 
@@ -34,8 +34,8 @@ pytestmark = pytest.mark.ros
 
 TICK_NS = 1_000_000
 ROBOT = RobotModel.load()
-COMMANDS = JointStateWire(ROBOT.joint_names, ("effort",))
-STATES = StateWire(ROBOT.joint_names, WORLD, BASE)
+COMMANDS = JointStateCodec(ROBOT.joint_names, ("effort",))
+STATES = StateCodec(ROBOT.joint_names, WORLD, BASE)
 
 
 def state(tick: int, angle: float = 0.0) -> tuple[bytes, bytes]:

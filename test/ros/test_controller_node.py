@@ -26,7 +26,7 @@ from sms_handover.graph.topics import (
 from sms_handover.messages.stamps import stamp_ns
 from sms_handover.nodes.controller import ControllerNode
 from sms_handover.ros.codecs.convert import phase_message
-from sms_handover.ros.codecs.loop_messages import JointStateWire, StateWire
+from sms_handover.ros.codecs.loop_messages import JointStateCodec, StateCodec
 from sms_handover.ros.node.endpoints import CountedPublisher, Endpoints
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.wiring import initial_joints, make_controller
@@ -65,9 +65,9 @@ class Rest:
         endpoints.subscribe(RUN_READY, ready.append)
         bench.until(lambda: ready and not endpoints.unmatched, "the controller")
         names = self.scenario.robot.joint_names
-        self._state_wire = StateWire(names, WORLD, BASE)
-        self._reference_wire = JointStateWire(names, ("position", "velocity"))
-        self._command_wire = JointStateWire(names, ("effort",))
+        self._state_wire = StateCodec(names, WORLD, BASE)
+        self._reference_wire = JointStateCodec(names, ("position", "velocity"))
+        self._command_wire = JointStateCodec(names, ("effort",))
 
     def messages(self, state: RobotState, reference: JointReference, phase: TaskPhase) -> dict[str, Any]:
         """Return the messages of one stamp by topic."""

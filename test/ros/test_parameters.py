@@ -17,7 +17,7 @@ from sms_handover.errors import ConfigurationError, UnknownNameError
 from sms_handover.graph.topics import CONTROLLER, IK, PLANT, RECORDER, TRAJECTORY
 from sms_handover.ik.parameters import IkParameters
 from sms_handover.plant.parameters import PlantParameters
-from sms_handover.ros.parameters import as_arguments, declare, refuse_unknown
+from sms_handover.ros.parameters import as_arguments, declare, reject_unknown
 from sms_handover.simulation.parameters import CommonParameters
 from sms_handover.simulation.scenario import load_parameters
 from sms_handover.trajectory.parameters import TrajectoryParameters
@@ -57,7 +57,7 @@ def test_defaults_are_those_of_the_files(bench: Bench, name: str) -> None:
     assert common == load_parameters().common
     if name != RECORDER:
         assert declared == getattr(load_parameters(), name)
-    refuse_unknown(node, CommonParameters, GROUPS[name])
+    reject_unknown(node, CommonParameters, GROUPS[name])
 
 
 def test_what_is_given_comes_on_top(bench: Bench) -> None:
@@ -76,7 +76,7 @@ def test_parameters_of_other_nodes_are_not_taken(bench: Bench) -> None:
     bench.start({PLANT: {"law": "pid"}})
     node = node_of(bench)
     assert declare(node, ControllerParameters, "controller.yaml", CONTROLLER).law == "nmpc"
-    refuse_unknown(node, ControllerParameters)
+    reject_unknown(node, ControllerParameters)
 
 
 REFUSED: dict[str, tuple[dict[str, object], str]] = {
@@ -146,7 +146,7 @@ def test_an_unknown_parameter_is_refused_with_the_nearest_name(bench: Bench) -> 
     node = node_of(bench)
     declare(node, ControllerParameters, "controller.yaml", CONTROLLER)
     with pytest.raises(UnknownNameError) as caught:
-        refuse_unknown(node, ControllerParameters)
+        reject_unknown(node, ControllerParameters)
     assert "controller: unknown parameter 'proportionl' (did you mean 'proportional'?)" in str(caught.value)
 
 
@@ -154,7 +154,7 @@ def test_parameters_of_ros_itself_are_not_unknown(bench: Bench) -> None:
     bench.start({CONTROLLER: {"use_sim_time": False}})
     node = node_of(bench)
     declare(node, ControllerParameters, "controller.yaml", CONTROLLER)
-    refuse_unknown(node, ControllerParameters)
+    reject_unknown(node, ControllerParameters)
 
 
 @pytest.mark.parametrize("name", list(GROUPS))
@@ -233,7 +233,7 @@ def test_nothing_changes_while_a_node_runs(bench: Bench) -> None:
     """Not the parameter of ROS itself either, which would stop the timers."""
     controller(bench)
     (node,) = bench._nodes
-    refuse_unknown(node, ControllerParameters)
+    reject_unknown(node, ControllerParameters)
     for change in (Parameter("use_sim_time", value=True), Parameter("law", value="pid")):
         (result,) = node.set_parameters([change])
         assert not result.successful and change.name in result.reason
@@ -242,4 +242,4 @@ def test_nothing_changes_while_a_node_runs(bench: Bench) -> None:
 def test_simulated_time_is_refused(bench: Bench) -> None:
     bench.start({CONTROLLER: {"use_sim_time": True}})
     with pytest.raises(ConfigurationError, match="'use_sim_time' is true, allowed is false"):
-        refuse_unknown(node_of(bench))
+        reject_unknown(node_of(bench))

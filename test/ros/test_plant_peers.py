@@ -253,7 +253,7 @@ class StopWhen:
 
     @property
     def asked(self) -> bool:
-        """Tell whether to stop."""
+        """Whether to stop."""
         assert monotonic() < self._deadline, "waited in vain"
         return self._condition()
 

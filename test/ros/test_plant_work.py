@@ -9,8 +9,8 @@ import pytest
 
 from sms_handover.graph.topics import PLANT
 from sms_handover.nodes.plant import PlantNode
-from sms_handover.ros.codecs.loop_messages import JointStateWire
-from sms_handover.ros.codecs.task_phase import PhaseWire
+from sms_handover.ros.codecs.loop_messages import JointStateCodec
+from sms_handover.ros.codecs.task_phase import PhaseCodec
 from sms_handover.types import TaskPhase
 
 from .bench import Bench
@@ -48,7 +48,7 @@ class Loop:
         bench.start({"common": {"peers": (PLANT,), "schedule": str(path)}})
         self.plant = bench.add(PlantNode)
         names = self.plant.robot.joint_names
-        self._command, self._phase = JointStateWire(names, ("effort",)), PhaseWire()
+        self._command, self._phase = JointStateCodec(names, ("effort",)), PhaseCodec()
         bench.until(lambda: self.plant.endpoints.counts["/joint_states"] == 1, "the begin of the run")
 
     def answer(self, tick: int) -> None:

@@ -42,7 +42,7 @@ from sms_handover.nodes.plant import PlantNode
 from sms_handover.nodes.recorder import RecorderNode
 from sms_handover.nodes.trajectory import TrajectoryNode
 from sms_handover.ros.codecs.convert import stamp_ns_of
-from sms_handover.ros.codecs.loop_messages import JointStateWire
+from sms_handover.ros.codecs.loop_messages import JointStateCodec
 from sms_handover.ros.node.endpoints import Endpoints
 from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED
 from sms_handover.ros.qos import LATCHED, LOSSLESS
@@ -69,7 +69,7 @@ class Stop:
 
     @property
     def asked(self) -> bool:
-        """Tell whether to stop."""
+        """Whether to stop."""
         return self._condition()
 
 
@@ -278,10 +278,10 @@ class FakePlant:
         node.create_timer(0.05, lambda: diagnostics.publish(DiagnosticArray()))  # s, well below drain_timeout
         self.recorded: list[int] = []  # stamps in ns up to which the recorder says it has everything
         self._endpoints.subscribe(RUN_RECORDED, lambda m: self.recorded.append(stamp_ns_of(m.stamp)))
-        self._wire = JointStateWire(("joint",), ("position",))
+        self._wire = JointStateCodec(("joint",), ("position",))
 
     def matched(self) -> bool:
-        """Tell whether the recorder listens."""
+        """Whether the recorder listens."""
         return not self._endpoints.unmatched
 
     def publish(self, ticks: Iterable[int]) -> None:

@@ -97,6 +97,6 @@ def narrow_page(browser: Browser, site: Path) -> Page:
 
 
 def is_in_sight(page: Page, selector: str) -> bool:
-    """Tell whether an element is within the window."""
+    """Whether an element is within the window."""
     box = page.locator(selector).first.bounding_box()
     return box is not None and box["x"] + box["width"] > 0

@@ -175,7 +175,7 @@ def nodes_of(launcher: int) -> dict[str, int]:
 
 
 def is_node(pid: int) -> bool:
-    """Tell whether a process is there and one of our nodes; one that has ended but is not reaped is not."""
+    """Whether a process is there and one of our nodes; one that has ended but is not reaped is not."""
     return bool(node_name(pid))
 
 

@@ -23,7 +23,7 @@ class Evidence:
 
     @property
     def holds(self) -> bool:
-        """Tell whether the bound is kept; NaN keeps none."""
+        """Whether the bound is kept; NaN keeps none."""
         return not isnan(self.value) and self.value <= self.bound
 
 

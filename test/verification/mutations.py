@@ -56,7 +56,7 @@ class Result:
 
     @property
     def survived(self) -> bool:
-        """Tell whether no test noticed."""
+        """Whether no test noticed."""
         return self.test == SURVIVED
 
 

@@ -57,7 +57,7 @@ _BREAK_HEADING = ("law broken", "file", "instead of", "it reads", "first test th
 
 
 def kept(entry: Entry) -> bool:
-    """Tell whether a figure keeps its bound; NaN keeps none."""
+    """Whether a figure keeps its bound; NaN keeps none."""
     return bool(entry["value"] <= entry["bound"])
 
 

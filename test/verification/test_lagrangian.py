@@ -13,7 +13,7 @@ import pinocchio as pin
 import pytest
 
 from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
-from sms_handover.model.conserved import physics_receipt
+from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.description import load_robot
 from sms_handover.model.reduced import (
     generalized_jacobian,
@@ -120,7 +120,7 @@ def test_kinetic_energy(pair: Pair, record: Record) -> None:
 
     def error(q: Array, q_pin: Array, v: Array) -> float:
         expected = pair.lagrangian.energy(q, v)
-        return abs(physics_receipt(pair.robot, q_pin, v).kinetic_energy - expected) / expected
+        return abs(conserved_quantities(pair.robot, q_pin, v).kinetic_energy - expected) / expected
 
     claim = f"kinetic energy of {pair.name}, relative, {_STATES} states"
     record(claim, pair.worst(error), _ROUNDING, against=_AGAINST)

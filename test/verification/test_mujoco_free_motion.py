@@ -14,7 +14,7 @@ import pinocchio as pin
 import pytest
 
 from benchmarks.mujoco_model import MujocoRobot, State, apart, order
-from sms_handover.model.conserved import physics_receipt
+from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.integrators import TABLEAUS, LieGroupIntegrator
@@ -84,7 +84,7 @@ def _start(robot: RobotModel, random: np.random.Generator, *, driven: bool) -> t
 
 def _drift(robot: RobotModel, start: State, end: State) -> tuple[float, float]:
     """Return by how much linear and angular momentum differ between two states."""
-    before, after = physics_receipt(robot, *start), physics_receipt(robot, *end)
+    before, after = conserved_quantities(robot, *start), conserved_quantities(robot, *end)
     linear = np.linalg.norm(after.linear_momentum - before.linear_momentum)
     return float(linear), float(np.linalg.norm(after.angular_momentum - before.angular_momentum))
 
@@ -171,7 +171,7 @@ def test_ours_loses_no_more_momentum(robot: RobotModel, motions: list[Motion], r
 
 def test_table_of_steps(robot: RobotModel, motions: list[Motion], table: Table) -> None:
     """What a reader compares: agreement and momentum at every step, the worst of all motions."""
-    receipts = [physics_receipt(robot, *motion.start) for motion in motions]
+    receipts = [conserved_quantities(robot, *motion.start) for motion in motions]
     linear, angular = (
         max(float(np.linalg.norm(getattr(receipt, name))) for receipt in receipts)
         for name in ("linear_momentum", "angular_momentum")

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from benchmarks.mujoco_model import MujocoRobot, State, apart, order
-from sms_handover.model.conserved import physics_receipt
+from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.reduced import base_twist_per_joint_rate, reduced_dynamics
 from sms_handover.run_data import RunData
 from sms_handover.simulation.scenario import Scenario, load_scenario
@@ -133,7 +133,7 @@ def _furthest(a: list[State], b: list[State]) -> Array:
 
 def _drift(scenario: Scenario, states: list[State]) -> tuple[float, float]:
     """Return the largest linear and angular momentum over the run, which starts at rest."""
-    receipts = [physics_receipt(scenario.robot, *state) for state in states]
+    receipts = [conserved_quantities(scenario.robot, *state) for state in states]
     linear = max(float(np.linalg.norm(receipt.linear_momentum)) for receipt in receipts)
     return linear, max(float(np.linalg.norm(receipt.angular_momentum)) for receipt in receipts)
 

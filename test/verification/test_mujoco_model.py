@@ -13,7 +13,7 @@ import pytest
 
 from benchmarks.mujoco_model import MujocoRobot, rotation_matrix
 from sms_handover.model.assembly import RobotDescription
-from sms_handover.model.conserved import physics_receipt
+from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.description import load_robot
 from sms_handover.model.parts import Inertia, JointDescription, Origin
 from sms_handover.model.robot_model import RobotModel
@@ -111,7 +111,7 @@ def test_momentum_is_measured_alike(description: RobotDescription, record: Recor
     errors = np.zeros(2)
     for q, v, effort in _states(robot):
         other.dynamics(q, v, effort)
-        receipt = physics_receipt(robot, q, v)
+        receipt = conserved_quantities(robot, q, v)
         pairs = zip(other.momentum(), (receipt.linear_momentum, receipt.angular_momentum), strict=True)
         errors = np.maximum(errors, [np.linalg.norm(a - b) / np.linalg.norm(b) for a, b in pairs])
     name = "shipped" if description == load_robot() else "skewed"

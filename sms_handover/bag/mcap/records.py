@@ -68,12 +68,12 @@ class ChunkHead:
 
 
 def plausible_head(opcode: int, length: int) -> bool:
-    """Tell whether this may begin a record. What MCAP does not define is none: it could not be kept."""
+    """Whether this may begin a record. What MCAP does not define is none: it could not be kept."""
     return opcode in _KNOWN and length < _LONGEST
 
 
 def fits(opcode: int, body: bytes) -> bool:
-    """Tell whether a body is one of that kind of record: every length in it agrees with the whole."""
+    """Whether a body is one of that kind of record: every length in it agrees with the whole."""
     if opcode == Opcode.CHUNK:
         head = chunk_head(body)
         return head is not None and head.begin + head.size == len(body)
@@ -105,7 +105,7 @@ def chunk_head(body: bytes) -> ChunkHead | None:
 
 
 def attachment_is_sound(body: bytes) -> bool:
-    """Tell whether the checksum of an attachment holds, or there is none."""
+    """Whether the checksum of an attachment holds, or there is none."""
     (stored,) = _CHECKSUM.unpack_from(body, len(body) - _CHECKSUM.size)
     return stored in (0, zlib.crc32(body[: -_CHECKSUM.size]))
 

@@ -100,7 +100,7 @@ class FrameWalk:
         return frame if first >= frame.end else None
 
     def _stray(self, frame: Frame) -> bool:
-        """Tell whether it is a message outside of the chunks of a file that has chunks."""
+        """Whether it is a message outside of the chunks of a file that has chunks."""
         return frame.opcode == Opcode.MESSAGE and self._chunked is True
 
     def _gap(self, place: int) -> Gap:
@@ -126,7 +126,7 @@ class FrameWalk:
         return Gap(place, self._size, reason, opcode, self._bytes(begin, self._size - begin))
 
     def _resumes(self, place: int) -> bool:
-        """Tell whether a record begins at a place for sure, so that the walk can go on there."""
+        """Whether a record begins at a place for sure, so that the walk can go on there."""
         head = self._head(place)
         if head is None:
             return False
@@ -138,7 +138,7 @@ class FrameWalk:
         return head[0] not in _IN_CHUNKS or not self._holds_chunks(frame.end)
 
     def _holds_chunks(self, place: int) -> bool:
-        """Tell whether messages lie in chunks: then what looks like one elsewhere is in a broken chunk."""
+        """Whether messages lie in chunks: then what looks like one elsewhere is in a broken chunk."""
         if self._chunked is None:
             chunks = (c for c in self._candidates(place) if (self._head(c) or (0,))[0] == Opcode.CHUNK)
             self._chunked = any(self._frame(chunk) is not None for chunk in chunks)
@@ -163,7 +163,7 @@ class FrameWalk:
         return opcode == Opcode.CHUNK and head is not None and head.begin + head.size == length
 
     def _goes_on(self, place: int) -> bool:
-        """Tell whether a record, one that the end of the file cuts off, or that end itself is at a place."""
+        """Whether a record, one that the end of the file cuts off, or that end itself is at a place."""
         if place == self._size or self._is_end(place):
             return True
         head = self._head(place)
@@ -174,7 +174,7 @@ class FrameWalk:
         return self._frame(place) is not None
 
     def _is_end(self, place: int) -> bool:
-        """Tell whether the magic that ends a file is at a place."""
+        """Whether the magic that ends a file is at a place."""
         return place == self._size - len(MAGIC) and self._bytes(place, len(MAGIC)) == MAGIC
 
     def _head(self, place: int) -> tuple[int, int] | None:

@@ -1,4 +1,4 @@
-"""Tell whether a bag is complete, and what is missing in it."""
+"""Whether a bag is complete, and what is missing in it."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from sms_handover.bag.metadata import counts_of, metadata_of
 from sms_handover.bag.repair.check_content import ContentCheck
 from sms_handover.bag.repair.check_index import IndexCheck
 from sms_handover.bag.repair.findings import CheckResult, Findings
-from sms_handover.bag.repair.message_counts import Claims
+from sms_handover.bag.repair.message_counts import MessageCounts
 from sms_handover.bag.repair.recover import Progress
 from sms_handover.errors import BagError
 
@@ -31,7 +31,7 @@ def check(path: Path, progress: Progress | None = None) -> CheckResult:
     files = files_of(path)
     with damage_reported(path):
         sizes = [file.stat().st_size for file in files]
-    findings, content, claims = Findings(), ContentCheck(), Claims()
+    findings, content, claims = Findings(), ContentCheck(), MessageCounts()
     counts: Counter[str] = Counter()
     before = 0
     for file, size in zip(files, sizes, strict=True):
@@ -56,7 +56,7 @@ class _Into:
 
     findings: Findings
     content: ContentCheck
-    claims: Claims
+    claims: MessageCounts
     counts: Counter[str]
 
 

@@ -12,7 +12,7 @@ from sms_handover.bag.mcap.scan import ScannedMessage, Source
 from sms_handover.bag.recording import PUBLISHED_COUNTS
 from sms_handover.bag.repair.findings import Findings
 from sms_handover.bag.repair.ledger_rebuild import LedgerRebuild
-from sms_handover.bag.repair.message_counts import Claims
+from sms_handover.bag.repair.message_counts import MessageCounts
 from sms_handover.bag.repair.recovery import RECOVERY_RECORD
 from sms_handover.bag.schemas import SchemaTypes, types_of
 from sms_handover.errors import BagError
@@ -87,7 +87,7 @@ class ContentCheck:
             counts = self._decode(message)
             self._told.add("" if counts is None else str(counts.node))
 
-    def close(self, findings: Findings, claims: Claims) -> None:
+    def close(self, findings: Findings, claims: MessageCounts) -> None:
         """Tell what is wrong."""
         for source, types in self._types.items():
             if isinstance(types, str):
@@ -107,7 +107,7 @@ class ContentCheck:
         if self._run_topic:
             self._close_run(findings)
 
-    def _close_ledger(self, findings: Findings, claims: Claims) -> None:
+    def _close_ledger(self, findings: Findings, claims: MessageCounts) -> None:
         """Compare the messages with the ledger, and with what was published."""
         there = {topic.name: topic for topic in self._rebuild.ledger().topics}
         for topic in there.values():
@@ -139,7 +139,7 @@ class ContentCheck:
             findings.note(f"{topic.name}: {topic.out_of_order} messages came behind a later one")
 
     def _close_run(self, findings: Findings) -> None:
-        """Tell whether the run came to its end, and whether everybody told what was published."""
+        """Whether the run came to its end, and whether everybody told what was published."""
         state = self._state
         over = () if state is None else (state.FINISHED, state.FAILED, state.WAITING)  # the last by a reset
         if state is None or state.state not in over:
@@ -165,7 +165,7 @@ class ContentCheck:
             findings.damaged("the record of its recovery is not readable")
 
     def _is_refused(self, topic: str) -> bool:
-        """Tell whether a topic holds what others published where a node of ours alone was to."""
+        """Whether a topic holds what others published where a node of ours alone was to."""
         return self.is_ours and topics.is_refused(topic)
 
     def _decode(self, message: ScannedMessage) -> Any:

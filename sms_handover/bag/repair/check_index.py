@@ -9,7 +9,7 @@ from mcap.records import AttachmentIndex, ChunkIndex, Footer, MessageIndex, Meta
 from sms_handover.bag.mcap.records import ChunkHead, parse
 from sms_handover.bag.mcap.scan import FileScan, Located, ScannedMessage
 from sms_handover.bag.repair.findings import Findings
-from sms_handover.bag.repair.message_counts import Claims
+from sms_handover.bag.repair.message_counts import MessageCounts
 
 
 class IndexCheck:
@@ -55,7 +55,7 @@ class IndexCheck:
         elif found.record is not None:
             self._summary.append(found.record)
 
-    def close(self, scan: FileScan, findings: Findings, claims: Claims) -> None:
+    def close(self, scan: FileScan, findings: Findings, claims: MessageCounts) -> None:
         """Tell where the two differ; a file without its end says nothing that could be held against it."""
         name = scan.file.name
         self._end_chunk()
@@ -85,7 +85,7 @@ class IndexCheck:
             findings.note(f"{name} does not tell how many messages it holds")
 
     def _hold_statistics(
-        self, statistics: Statistics, scan: FileScan, findings: Findings, claims: Claims
+        self, statistics: Statistics, scan: FileScan, findings: Findings, claims: MessageCounts
     ) -> None:
         """Compare the numbers of messages, and when the first and the last were."""
         told: Counter[str] = Counter()
@@ -97,7 +97,7 @@ class IndexCheck:
             findings.damaged(f"{scan.file.name}: its statistics name another first or last log time")
 
     def _is_chunk(self, index: ChunkIndex) -> bool:
-        """Tell whether there is such a chunk."""
+        """Whether there is such a chunk."""
         length, head = self._chunks.get(index.chunk_start_offset, (0, None))
         return head is not None and (length, head.start_ns, head.end_ns, head.compression) == (
             index.chunk_length,
@@ -107,7 +107,7 @@ class IndexCheck:
         )
 
     def _is_there(self, index: AttachmentIndex | MetadataIndex) -> bool:
-        """Tell whether there is such an attachment or metadata record."""
+        """Whether there is such an attachment or metadata record."""
         opcode = Opcode.ATTACHMENT if isinstance(index, AttachmentIndex) else Opcode.METADATA
         return self._places.get(index.offset) == (index.length, opcode, index.name)
 

@@ -33,12 +33,12 @@ class CheckResult:
 
     @property
     def complete(self) -> bool:
-        """Tell whether nothing is damaged or missing."""
+        """Whether nothing is damaged or missing."""
         return all(finding.severity is Severity.NOTE for finding in self.findings)
 
     @property
     def damaged(self) -> bool:
-        """Tell whether something is damaged, so that a recovery may help."""
+        """Whether something is damaged, so that a recovery may help."""
         return any(finding.severity is Severity.DAMAGED for finding in self.findings)
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from sms_handover.bag.repair.findings import Findings
 
 
-class Claims:
+class MessageCounts:
     """Who says how many messages each topic has."""
 
     def __init__(self) -> None:

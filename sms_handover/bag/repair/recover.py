@@ -174,7 +174,7 @@ class _Salvage:
             self._span = begin_ns, max(end_ns, statistics.message_end_time)
 
     def _is_new(self, name: str, content: bytes) -> bool:
-        """Tell whether this has not been kept before."""
+        """Whether this has not been kept before."""
         same = (name, zlib.crc32(content))
         if same in self._kept:
             return False

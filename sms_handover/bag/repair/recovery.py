@@ -67,7 +67,7 @@ class Recovery:
 
     @property
     def clean(self) -> bool:
-        """Tell whether everything that is in the files was recovered."""
+        """Whether everything that is in the files was recovered."""
         return not self.losses and not any(topic.lost for topic in self.topics)
 
     def to_record(self) -> dict[str, str]:

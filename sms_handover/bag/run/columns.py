@@ -40,7 +40,7 @@ class _Group:
     wanted: list[tuple[int, int, bytearray]] = field(default_factory=list)
 
     def fits(self, data: bytes) -> bool:
-        """Tell whether a message has this layout for sure."""
+        """Whether a message has this layout for sure."""
         return len(data) == self.size and all(data[begin:end] == same for begin, end, same in self.fixed)
 
 

@@ -88,7 +88,7 @@ def _assemble(collector: RunCollector) -> RunData:
 
 
 def holds_run(info: BagInfo) -> bool:
-    """Tell whether a bag is one of ours and holds one run."""
+    """Whether a bag is one of ours and holds one run."""
     try:
         find_namespace(info)
     except BagError:

@@ -83,7 +83,7 @@ class BagPublisher:
         return bool(self._publisher.wait_for_all_acked(patience))
 
     def waits_for_match(self, node: Node) -> bool:
-        """Tell whether a subscription is known that can match and has not yet."""
+        """Whether a subscription is known that can match and has not yet."""
         asked = node.get_subscriptions_info_by_topic(self.topic_name)
         return self.subscription_count < sum(serves(self.profile, item.qos_profile) for item in asked)
 

@@ -23,7 +23,7 @@ from sms_handover.messages.template import head
 from sms_handover.model.poses import pose_row
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant
-from sms_handover.ros.codecs.loop_messages import PoseWire, StateWire, energy_wire, vector_wire
+from sms_handover.ros.codecs.loop_messages import PoseCodec, StateCodec, energy_codec, vector_codec
 from sms_handover.ros.node.endpoints import CountedPublisher
 
 _LOOP = (JOINT_STATES, BASE_ODOMETRY, SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
@@ -40,9 +40,9 @@ class PlantOutputs:
         self._lockstep = lockstep
         names = (*_LOOP, *_PERIOD, CLOCK, *(tool_pose(arm) for arm in robot.arms))
         self._publish: dict[str, Callable[[Any], None]] = {name: publisher(name).publish for name in names}
-        self._state_wire = StateWire(robot.joint_names, WORLD, BASE)
-        self._pose_wire, self._vector_wire = PoseWire(WORLD), vector_wire(WORLD)
-        self._energy_wire = energy_wire(WORLD)
+        self._state_wire = StateCodec(robot.joint_names, WORLD, BASE)
+        self._pose_wire, self._vector_wire = PoseCodec(WORLD), vector_codec(WORLD)
+        self._energy_wire = energy_codec(WORLD)
 
     def publish_loop(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
         """Publish what the other nodes of the loop wait for.

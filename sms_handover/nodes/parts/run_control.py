@@ -24,7 +24,7 @@ class ControlledRun(Protocol):
         """Whether the plant takes part in the run."""
 
     @property
-    def recorder_is_gone(self) -> bool:
+    def recorder_has_ended(self) -> bool:
         """Whether there should be a recorder, but is none any more."""
 
     def ticks_to(self, most: int) -> tuple[int, int]:
@@ -67,11 +67,11 @@ class RunControl:
 
     @property
     def holds(self) -> bool:
-        """Tell whether the run may not go on."""
+        """Whether the run may not go on."""
         state = self._run.run_state
         return not (state == RunState.RUNNING or (state == RunState.PAUSED and self.steps_left))
 
-    def begin_anew(self) -> None:
+    def reset_run(self) -> None:
         """Forget the steps of the run before; a run that was paused begins paused."""
         self.steps_left = 0
         self.finish_asked = False
@@ -84,7 +84,7 @@ class RunControl:
 
     @property
     def _is_over(self) -> bool:
-        """Tell whether the run has ended."""
+        """Whether the run has ended."""
         return self._run.run_state in (RunState.FINISHED, RunState.FAILED)
 
     def _on_pause(self, request: Any, response: Any) -> Any:
@@ -131,7 +131,7 @@ class RunControl:
         response.success = True
         if self._run.run_state == RunState.WAITING:
             response.message = "the run has not begun: it is at its start"
-        elif self._run.recorder_is_gone:
+        elif self._run.recorder_has_ended:
             return _refuse(response, "the run is over, and its recorder has closed the bag and ended")
         else:
             self._run.restart()

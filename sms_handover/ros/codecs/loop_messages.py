@@ -36,7 +36,7 @@ _TWIST = slice(BASE_NQ + _COVARIANCE, BASE_NQ + _COVARIANCE + BASE_NV)
 _LARGEST = 65536  # [byte] of a message of another layout
 
 
-class JointStateWire:
+class JointStateCodec:
     """Packs and reads JointState messages for one list of joints."""
 
     def __init__(self, names: Sequence[str], blocks: Sequence[str]) -> None:
@@ -80,7 +80,7 @@ class JointStateWire:
         return {b: joints_in_order(self._names, message.name, getattr(message, b)) for b in self._blocks}
 
 
-class OdometryWire:
+class OdometryCodec:
     """Packs and reads Odometry messages between two frames; covariances stay zero."""
 
     def __init__(self, frame: str, child_frame: str) -> None:
@@ -133,7 +133,7 @@ class OdometryWire:
         return pose_row(pose_of_message(message.pose.pose)), np.array(twist)
 
 
-class StampedWire:
+class StampedCodec:
     """Packs messages that are a header and then a fixed count of doubles, such as PoseStamped."""
 
     def __init__(
@@ -152,7 +152,7 @@ class StampedWire:
         return self._template.pack(stamp_ns, numbers)
 
 
-class PoseWire(StampedWire):
+class PoseCodec(StampedCodec):
     """Packs and reads PoseStamped in one frame: position, then quaternion x y z w."""
 
     def __init__(self, frame: str) -> None:
@@ -181,25 +181,25 @@ class PoseWire(StampedWire):
         return arrival_ns(data), pose
 
 
-def vector_wire(frame: str) -> StampedWire:
+def vector_codec(frame: str) -> StampedCodec:
     """Return what packs Vector3Stamped."""
     name = "geometry_msgs/msg/Vector3Stamped"
-    return StampedWire(name, frame, 3, lambda types, n: {"vector": _geometry(types, "Vector3", n)})
+    return StampedCodec(name, frame, 3, lambda types, n: {"vector": _geometry(types, "Vector3", n)})
 
 
-def energy_wire(frame: str) -> StampedWire:
+def energy_codec(frame: str) -> StampedCodec:
     """Return what packs EnergyStamped: kinetic energy, then work."""
     name = "sms_handover_interfaces/msg/EnergyStamped"
-    return StampedWire(name, frame, 2, lambda types, n: {"kinetic": float(n[0]), "work": float(n[1])})
+    return StampedCodec(name, frame, 2, lambda types, n: {"kinetic": float(n[0]), "work": float(n[1])})
 
 
-class StateWire:
+class StateCodec:
     """Packs and reads the two messages that carry a robot state."""
 
     def __init__(self, joint_names: Sequence[str], world: str, base: str) -> None:
         """Fix joint and frame names."""
-        self.joints = JointStateWire(joint_names, _BLOCKS)
-        self.odometry = OdometryWire(world, base)
+        self.joints = JointStateCodec(joint_names, _BLOCKS)
+        self.odometry = OdometryCodec(world, base)
 
     def pack(self, state: RobotState) -> tuple[bytes, bytes]:
         """Return the bytes of the JointState and the Odometry of a state."""
@@ -218,7 +218,7 @@ class StateWire:
 
 
 def state_of(stamp_ns: int, joints: tuple[Array, ...], odometry: tuple[Array, Array]) -> RobotState:
-    """Return the state that two messages carry, from what :class:`StateWire` has read in them."""
+    """Return the state that two messages carry, from what :class:`StateCodec` has read in them."""
     return RobotState(stamp_ns, *coordinates(joints, odometry), joints[2])
 
 

@@ -20,7 +20,7 @@ _BODY_AT = len(head(0))
 _TYPE = "sms_handover_interfaces/msg/TaskPhase"
 
 
-class PhaseWire:
+class PhaseCodec:
     """Packs and reads TaskPhase messages; all but the stamp is worked out once per phase."""
 
     def __init__(self, arms: Collection[str] = (), grasp_frames: Collection[str] = ()) -> None:
@@ -75,5 +75,5 @@ class PhaseWire:
 
 
 def _alike(one: TaskPhase, other: TaskPhase) -> bool:
-    """Tell whether two phases differ in nothing but their stamp."""
+    """Whether two phases differ in nothing but their stamp."""
     return replace(one, stamp_ns=0) == replace(other, stamp_ns=0)

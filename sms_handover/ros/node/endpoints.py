@@ -15,7 +15,7 @@ from sms_handover.graph.topics import RECORDER, Rate, Topic
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.qos import profile_of, serves
 from sms_handover.ros.transport.inputs import Deliver, Inputs
-from sms_handover.ros.transport.publisher_identity import Sender
+from sms_handover.ros.transport.publisher_identity import PublisherIdentity
 
 _RclError = rclpy_implementation.RCLError
 
@@ -40,7 +40,7 @@ class Endpoints:
         self._external = frozenset(external) - {node.get_name()}
         self._publishers: dict[str, CountedPublisher] = {}
         self._subscriptions: dict[str, Subscription] = {}
-        self._senders: dict[str, Sender] = {}
+        self._senders: dict[str, PublisherIdentity] = {}
 
     def publisher(self, name: str) -> "CountedPublisher":
         """Return a publisher on a topic of the table."""
@@ -56,14 +56,14 @@ class Endpoints:
             message_class(topic.type), topic.name, profile_of(topic), deliver
         )
 
-    def sender(self, name: str) -> Sender:
+    def sender(self, name: str) -> PublisherIdentity:
         """Return what knows the publishers of a topic.
 
         From now on the endpoints count as unmatched as long as somebody else publishes on the topic.
         """
         several = len(self._topics[name].publishers) > 1
         full_name = self._node.resolve_topic_name(name)
-        self._senders[name] = Sender(self._node, full_name, self._peers, several=several)
+        self._senders[name] = PublisherIdentity(self._node, full_name, self._peers, several=several)
         return self._senders[name]
 
     @property
@@ -143,7 +143,7 @@ class Endpoints:
         """Return how many messages have been published on each topic, by its full name."""
         return {publisher.topic_name: publisher.count for publisher in self._publishers.values()}
 
-    def begin_anew(self) -> None:
+    def reset_run(self) -> None:
         """Count the messages of a new run."""
         for publisher in self._publishers.values():
             publisher.count = 0

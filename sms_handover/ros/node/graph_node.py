@@ -27,9 +27,9 @@ from sms_handover.ros.codecs.convert import time_message
 from sms_handover.ros.codecs.loop_messages import decoded
 from sms_handover.ros.node.endpoints import Endpoints
 from sms_handover.ros.node.event_publisher import EventPublisher
-from sms_handover.ros.node.lifecycle_node import ManagedNode
-from sms_handover.ros.node.message_filter import REFUSED, Read, Receive, Refusals
-from sms_handover.ros.parameters import declare, refuse_unknown
+from sms_handover.ros.node.lifecycle_node import LifecycleNode
+from sms_handover.ros.node.message_filter import REFUSED, MessageFilter, Read, Receive
+from sms_handover.ros.parameters import declare, reject_unknown
 from sms_handover.ros.process.main import EXIT_OK, WAIT_S, RunnableNode, Stop
 from sms_handover.ros.process.realtime import settle
 from sms_handover.ros.transport.direct import DirectInputs
@@ -47,7 +47,7 @@ _NEWS_PERIOD_S = 0.02  # [s] of wall time between two looks for news of the run
 _MATCHING_PERIOD_S = 0.02  # [s] of wall time between two looks at who has matched
 
 
-class GraphNode(ManagedNode, Generic[P]):
+class GraphNode(LifecycleNode, Generic[P]):
     """A node with its parameter group ``P``, its endpoints, and its part in start and end of a run.
 
     A run starts when every node is active, has found the endpoints it needs and has said so on
@@ -69,7 +69,7 @@ class GraphNode(ManagedNode, Generic[P]):
         try:
             self.common: CommonParameters = declare(self, CommonParameters, "common.yaml", EVERY_NODE)
             self.parameters: P = declare(self, group, f"{name}.yaml" if shipped else None, name)
-            refuse_unknown(self, CommonParameters, group)
+            reject_unknown(self, CommonParameters, group)
             self.inputs, self.news = (INPUTS[self.common.transport](self) for _ in range(2))
             self.inputs.awaited = lambda: self.awaited
         except ConfigurationError as error:
@@ -92,7 +92,7 @@ class GraphNode(ManagedNode, Generic[P]):
         self.endpoints = Endpoints(
             self, graph_topics(self.robot.arms), self.common.peers, self.common.external
         )
-        self.refusals = Refusals(self.get_logger().warning, self._on_refusal)
+        self.refusals = MessageFilter(self.get_logger().warning, self._on_refusal)
         self.finished = False
         self._counts = self.endpoints.publisher(RUN_PUBLISHED)
         self.events = EventPublisher(self, self.endpoints.publisher(RUN_EVENTS))
@@ -179,19 +179,19 @@ class GraphNode(ManagedNode, Generic[P]):
         settle(self.common)
 
     def prepared(self) -> bool:
-        """Tell whether this node has what it needs besides its topics; a node may override this."""
+        """Whether this node has what it needs besides its topics; a node may override this."""
         return True
 
     @property
     def has_matched(self) -> bool:
-        """Tell whether every endpoint has matched, and what is due then has been done."""
+        """Whether every endpoint has matched, and what is due then has been done."""
         return bool(self._matching.is_canceled())
 
     def on_matched(self) -> None:
         """Do what is due once every endpoint has matched: by default, say that this node is ready."""
         self._ready.publish(String(data=self.get_name()))
 
-    def begin_anew(self) -> None:
+    def reset_run(self) -> None:
         """Forget the run, as if this node had just been configured; a node overrides this."""
 
     def on_end(self) -> None:
@@ -241,12 +241,12 @@ class GraphNode(ManagedNode, Generic[P]):
             self.on_end()
         self.finished = ended
         if waits:
-            self.begin_anew()
+            self.reset_run()
             self.look_again()
 
     def look_again(self) -> None:
         """Say that this node is ready for the next run as soon as it is."""
-        self.endpoints.begin_anew()
+        self.endpoints.reset_run()
         self._matching.reset()
 
     def publish_diagnostics(self) -> None:

@@ -12,7 +12,7 @@ from sms_handover.ros.process.main import RunnableNode, Stop
 _DONE, _FAILED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.ERROR
 
 
-class ManagedNode(LifecycleNodeMixin, RunnableNode):
+class LifecycleNode(LifecycleNodeMixin, RunnableNode):
     """Offers the lifecycle services and ``~/transition_event``, and keeps to what they ask.
 
     ``ros2 lifecycle`` and the launcher ask by these services, a node that starts itself by
@@ -27,7 +27,7 @@ class ManagedNode(LifecycleNodeMixin, RunnableNode):
         LifecycleNodeMixin.__init__(self)
         self._made_before: set[object] = set()
         self._error: Exception | None = None
-        self._companions: tuple[ManagedNode, ...] = ()
+        self._companions: tuple[LifecycleNode, ...] = ()
         self._change_state = self._service_change_state.callback
         self._service_change_state.callback = self._on_change_state
 
@@ -54,12 +54,12 @@ class ManagedNode(LifecycleNodeMixin, RunnableNode):
 
     @property
     def active(self) -> bool:
-        """Tell whether the node takes part in the run."""
+        """Whether the node takes part in the run."""
         return bool(self._state_machine.current_state[0] == State.PRIMARY_STATE_ACTIVE)
 
     @property
     def configured(self) -> bool:
-        """Tell whether the node has its endpoints."""
+        """Whether the node has its endpoints."""
         return self._state_machine.current_state[0] in (
             State.PRIMARY_STATE_INACTIVE,
             State.PRIMARY_STATE_ACTIVE,
@@ -67,7 +67,7 @@ class ManagedNode(LifecycleNodeMixin, RunnableNode):
 
     @property
     def finalized(self) -> bool:
-        """Tell whether the node was shut down."""
+        """Whether the node was shut down."""
         return bool(self._state_machine.current_state[0] == State.PRIMARY_STATE_FINALIZED)
 
     # For the process
@@ -87,12 +87,12 @@ class ManagedNode(LifecycleNodeMixin, RunnableNode):
         super().destroy_node()
         self.__dict__.pop("_state_machine", None)
 
-    def keep_company(self, others: tuple["ManagedNode", ...]) -> None:
+    def keep_company(self, others: tuple["LifecycleNode", ...]) -> None:
         """Look after other nodes of the same process and thread too."""
         self._companions = others
 
     def goes_on(self, stop: Stop) -> bool:
-        """Tell whether the loop is to have another turn; raises the error of a transition that failed.
+        """Whether the loop is to have another turn; raises the error of a transition that failed.
 
         It ends when it is asked to, or when every node of the process has been shut down.
         """

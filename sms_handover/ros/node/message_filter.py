@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from sms_handover.errors import MessageError, Reason
 from sms_handover.ros.transport.inputs import Deliver
-from sms_handover.ros.transport.publisher_identity import Sender
+from sms_handover.ros.transport.publisher_identity import PublisherIdentity
 
 T = TypeVar("T")
 Read = Callable[[bytes], T]  # CDR bytes to what is in a good message; raises MessageError on others
@@ -19,7 +19,7 @@ REFUSED = "refused "  # begins the keys in the diagnostics of a node that count 
 _TELL_S = 1.0  # [s] of wall time at least between two lines of the log
 
 
-class Refusals:
+class MessageFilter:
     """Counts the messages that a node has refused, by topic and reason, and tells of them.
 
     The first of each topic and reason is told at once; of a thousand more in a second the log has one
@@ -60,7 +60,7 @@ class Refusals:
             self._untold, self._told_at = 0, now
 
     def guarding(
-        self, topic: str, receive: Receive[T], read: Read[T], sender: Sender | None = None
+        self, topic: str, receive: Receive[T], read: Read[T], sender: PublisherIdentity | None = None
     ) -> Deliver:
         """Return what hands on what is in the messages that are good, and counts the others.
 

@@ -15,7 +15,7 @@ _STANDARD_ERROR = 2  # file descriptor, whatever stands in for the stream
 class LauncherWatch:
     """Waits in a thread of its own for the end of the process that has started this one.
 
-    Then ``launcher_is_gone``, and a node that has not ended 90 s later writes to its log where it
+    Then ``launcher_has_ended``, and a node that has not ended 90 s later writes to its log where it
     hangs, and exits with 1. That is done by a thread of faulthandler's, which needs neither the
     interpreter nor any lock: not even a call into the middleware that never returns keeps a node alive.
     """
@@ -23,7 +23,7 @@ class LauncherWatch:
     def __init__(self, launcher: int) -> None:
         """Begin to watch a process, by its id."""
         self._launcher = launcher
-        self.launcher_is_gone = False
+        self.launcher_has_ended = False
         if os.getppid() != launcher:
             self._notice()
         else:
@@ -44,4 +44,4 @@ class LauncherWatch:
     def _notice(self) -> None:
         """Set the time limit, and let the node know."""
         faulthandler.dump_traceback_later(_PATIENCE_S, exit=True, file=_STANDARD_ERROR)
-        self.launcher_is_gone = True
+        self.launcher_has_ended = True

@@ -23,7 +23,7 @@ from sms_handover.ros.process.launcher_process import (
     wake_when_parent_ends,
 )
 from sms_handover.ros.process.launcher_watch import LauncherWatch
-from sms_handover.ros.process.network_scope import settle_reach
+from sms_handover.ros.process.network_scope import apply_network_scope
 from sms_handover.ros.process.shared_memory_check import avoid_full_shared_memory
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
@@ -53,8 +53,8 @@ class Stop:
 
     @property
     def asked(self) -> bool:
-        """Tell whether this process is to end."""
-        return self._signalled or (self._watch is not None and self._watch.launcher_is_gone)
+        """Whether this process is to end."""
+        return self._signalled or (self._watch is not None and self._watch.launcher_has_ended)
 
     def _on_signal(self, number: int, frame: object) -> None:
         self._signalled = True
@@ -172,7 +172,7 @@ def _init(args: list[str]) -> None:
             f"unknown argument {before_ros[0]!r}; give a parameter as --ros-args -p NAME:=VALUE, see --help"
         )
     avoid_full_shared_memory()
-    reach = settle_reach()
+    reach = apply_network_scope()
     if reach.is_open and LAUNCHER_PID not in os.environ:  # else the launcher has said so
         print(f"this process is {reach}", file=sys.stderr)
     try:

@@ -22,7 +22,7 @@ _MOST_HOSTS = 32  # that rmw takes
 
 
 @dataclass(frozen=True)
-class Reach:
+class NetworkScope:
     """Who can be in the graph: this machine, the ``hosts`` that are told of it, the ``subnet`` by multicast.
 
     ``profile`` is the user's own for Fast DDS, "" for ours: what it lets through is not known. With
@@ -36,7 +36,7 @@ class Reach:
 
     @property
     def is_open(self) -> bool:
-        """Tell whether others than this machine can take part."""
+        """Whether others than this machine can take part."""
         return bool(self.hosts) or self.subnet or bool(self.profile)
 
     @property
@@ -61,22 +61,22 @@ class Reach:
         return f"as far as {self.profile} lets it" if self.profile else "this machine only"
 
 
-THIS_MACHINE = Reach()
+THIS_MACHINE = NetworkScope()
 
 
-def reach_of(environment: Mapping[str, str]) -> Reach:
+def network_scope_of(environment: Mapping[str, str]) -> NetworkScope:
     """Return the reach that environment variables ask for; where they say nothing, this machine only."""
     profile = environment.get(_PROFILE, "")
     if Path(profile) in config_file("fastdds.xml").parent.glob("fastdds*.xml"):
         profile = ""  # a launcher has chosen it, or another process like this one
     udp_only = environment.get(_TRANSPORTS) == "UDPv4"
     if environment.get(_LOCALHOST_ONLY) == "1":
-        return Reach(profile=profile, udp_only=udp_only)
+        return NetworkScope(profile=profile, udp_only=udp_only)
     hosts = tuple(host.strip() for host in environment.get(_PEERS, "").split(";") if host.strip())
-    return Reach(hosts, environment.get(_RANGE, "").upper() in _OPEN_RANGES, profile, udp_only)
+    return NetworkScope(hosts, environment.get(_RANGE, "").upper() in _OPEN_RANGES, profile, udp_only)
 
 
-def reach_to(hosts: Sequence[str]) -> Reach:
+def network_scope_to(hosts: Sequence[str]) -> NetworkScope:
     """Return the reach of a graph that is announced to these hosts and to nobody else.
 
     Raises ConfigurationError on a host whose address is not known, and where the environment forbids it.
@@ -92,13 +92,13 @@ def reach_to(hosts: Sequence[str]) -> Reach:
             raise ConfigurationError(
                 f"host {host!r} has no IPv4 address here ({error}); give a name that resolves or an address"
             ) from error
-    here = reach_of(os.environ)
-    return Reach(tuple(hosts), profile=here.profile, udp_only=here.udp_only)
+    here = network_scope_of(os.environ)
+    return NetworkScope(tuple(hosts), profile=here.profile, udp_only=here.udp_only)
 
 
-def settle_reach() -> Reach:
+def apply_network_scope() -> NetworkScope:
     """Set up this process for what its environment asks for, and return that; before ROS is started."""
-    reach = reach_of(os.environ)
+    reach = network_scope_of(os.environ)
     asked = os.environ.get(_RANGE)
     os.environ.update(reach.environment)
     if asked:

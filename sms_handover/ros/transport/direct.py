@@ -19,7 +19,7 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from sms_handover.ros.transport.inputs import Answer, Asker, Deliver, Inputs
-from sms_handover.ros.transport.rcl_take import IDENTIFIES, Taker
+from sms_handover.ros.transport.rcl_take import IDENTIFIES, SerializedTaker
 from sms_handover.units import NS_PER_S
 
 _BATCH = 4096  # taken of one input at most before another has its turn
@@ -180,7 +180,7 @@ class _Messages(_Source):
     def __init__(self, node: Node, subscription: Subscription, deliver: Deliver) -> None:
         """Take over a raw subscription."""
         super().__init__(node, subscription, (1, 0, 0))
-        self._taker = Taker(subscription)
+        self._taker = SerializedTaker(subscription)
         self._take = self._taker.take
         self._deliver = deliver
 
@@ -220,7 +220,7 @@ class _Answers(_Source, Asker):
         self._receive = receive
 
     def ready(self) -> bool:
-        """Tell whether the service is there."""
+        """Whether the service is there."""
         return bool(self._entity.service_is_ready())
 
     def ask(self, request: Any) -> None:

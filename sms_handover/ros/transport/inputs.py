@@ -27,7 +27,7 @@ class Asker(ABC):
 
     @abstractmethod
     def ready(self) -> bool:
-        """Tell whether the service is there."""
+        """Whether the service is there."""
 
     @abstractmethod
     def ask(self, request: Any) -> None:
@@ -170,7 +170,7 @@ class _ExecutorAsker(Asker):
         self._receive = receive
 
     def ready(self) -> bool:
-        """Tell whether the service is there."""
+        """Whether the service is there."""
         return bool(self._client.service_is_ready())
 
     def ask(self, request: Any) -> None:

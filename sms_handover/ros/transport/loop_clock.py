@@ -81,7 +81,7 @@ class LoopClock:
         return min(max(self._deadline - monotonic(), 0.0), _IDLE_S)
 
     def due(self) -> bool:
-        """Tell whether the deadline has come."""
+        """Whether the deadline has come."""
         return self._deadline is not None and monotonic() >= self._deadline
 
     def ticked(self, *, held: bool = False) -> None:

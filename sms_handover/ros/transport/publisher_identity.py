@@ -12,7 +12,7 @@ from sms_handover.ros.transport.rcl_take import IDENTITY
 _NAMELESS = "_NODE_NAME_UNKNOWN_"
 
 
-class Sender:
+class PublisherIdentity:
     """The publishers whose messages on a topic count: of each node of the run one, or one in all.
 
     It is the first that discovery gives to such a node, for as long as it is there. Against one that
@@ -54,7 +54,7 @@ class Sender:
     def _may_be_early(
         self, publisher: bytes, own: list[TopicEndpointInfo], others: list[TopicEndpointInfo]
     ) -> bool:
-        """Tell whether a message may be here before discovery has told of its publisher."""
+        """Whether a message may be here before discovery has told of its publisher."""
         if self._several:
             return publisher not in map(_identity, others)
         return not (self.own or own or others)

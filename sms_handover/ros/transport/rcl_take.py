@@ -67,7 +67,7 @@ class _Info(Structure):
     ]
 
 
-class Taker:
+class SerializedTaker:
     """Takes the messages of one subscription, which nothing else may take from; close it."""
 
     def __init__(self, subscription: Subscription) -> None:

@@ -57,7 +57,7 @@ class StampSync(Generic[V]):
         self.dropped = 0
 
     def begins_anew(self, stamp_ns: int) -> bool:
-        """Tell whether a stamp is the start of a run behind inputs taken of a later time.
+        """Whether a stamp is the start of a run behind inputs taken of a later time.
 
         The start behind the start alone is the same state once more, to which the same answer belongs.
         """
@@ -68,7 +68,7 @@ class StampSync(Generic[V]):
         self._waiting.clear()
         self._taken_ns = -1
 
-    def begin_anew(self) -> None:
+    def reset_run(self) -> None:
         """Begin a run behind another: of each input, what comes before its time zero is still of the other.
 
         Inputs keep their order, each for itself; so nothing of the other run gets into the new one.
@@ -78,7 +78,7 @@ class StampSync(Generic[V]):
         self.dropped = 0
 
     def admits(self, stamp_ns: int, name: str) -> bool:
-        """Tell whether an input belongs to this run, and not to the one before."""
+        """Whether an input belongs to this run, and not to the one before."""
         if self._begun is None or name in self._begun:
             return True
         if stamp_ns == 0:

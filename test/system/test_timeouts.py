@@ -9,12 +9,12 @@ import pytest
 
 from sms_handover.errors import GraphError
 from sms_handover.launcher.processes import Death, NodeProcesses
-from sms_handover.launcher.timeouts import Delay, Suspended, WatchedTime
+from sms_handover.launcher.timeouts import ActiveTime, SuspensionMonitor, WaitNotice
 
 
 def test_time_in_which_nobody_looked_does_not_count() -> None:
     now = [100.0]
-    time = WatchedTime(lambda: now[0])
+    time = ActiveTime(lambda: now[0])
     for _ in range(10):
         now[0] += 0.25
         time.look()
@@ -25,7 +25,7 @@ def test_time_in_which_nobody_looked_does_not_count() -> None:
 
 
 def test_what_a_run_waits_for_is_told_after_a_while_and_when_it_changes() -> None:
-    delay = Delay()
+    delay = WaitNotice()
     reasons = ["plant is waiting for a"] * 25 + ["ik is waiting for b"] * 15
     told = {second: line for second, why in enumerate(reasons) if (line := delay.note(float(second), why))}
     assert told == {
@@ -35,7 +35,7 @@ def test_what_a_run_waits_for_is_told_after_a_while_and_when_it_changes() -> Non
 
 
 def test_a_suspended_node_is_told_once_and_then_given_up(capsys: pytest.CaptureFixture[str]) -> None:
-    suspended = Suspended()
+    suspended = SuspensionMonitor()
     for second in range(20):
         suspended.look({"ik": 4711}, 7.0 + second)
         assert ("kill -CONT 4711" in capsys.readouterr().err) == (second == 6)
@@ -44,7 +44,7 @@ def test_a_suspended_node_is_told_once_and_then_given_up(capsys: pytest.CaptureF
 
 
 def test_a_node_that_goes_on_is_forgiven() -> None:
-    suspended = Suspended()
+    suspended = SuspensionMonitor()
     for second in range(100):
         suspended.look({"ik": 4711} if second % 10 else {}, float(second))
 

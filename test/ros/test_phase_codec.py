@@ -7,7 +7,7 @@ from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
 from sms_handover.messages.message_types import MessageTypes
 from sms_handover.messages.values import task_phase
 from sms_handover.ros.codecs.convert import phase_message
-from sms_handover.ros.codecs.task_phase import PhaseWire
+from sms_handover.ros.codecs.task_phase import PhaseCodec
 from sms_handover.types import GraspAction, GraspCommand, TaskPhase
 
 TYPE = "sms_handover_interfaces/msg/TaskPhase"
@@ -27,7 +27,7 @@ PHASES = [
 
 def test_packed_bytes_are_those_of_rclpy() -> None:
     """But for padding, which rclpy leaves as it finds it, and what it may add behind the end."""
-    wire, types = PhaseWire(), MessageTypes()
+    wire, types = PhaseCodec(), MessageTypes()
     for phase in PHASES:
         data = wire.pack(phase)
         whole = serialize_message(phase_message(phase))
@@ -40,7 +40,7 @@ def test_packed_bytes_are_those_of_rclpy() -> None:
 
 @pytest.mark.parametrize("order", [PHASES, PHASES[::-1]])
 def test_what_is_read_is_what_was_packed(order: list[TaskPhase]) -> None:
-    packing, reading = PhaseWire(), PhaseWire()
+    packing, reading = PhaseCodec(), PhaseCodec()
     for phase in order:
         assert reading.read(packing.pack(phase)) == phase
         assert reading.read(serialize_message(phase_message(phase))) == phase

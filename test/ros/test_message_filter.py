@@ -31,9 +31,9 @@ from sms_handover.graph.topics import (
     TRAJECTORY,
 )
 from sms_handover.ros.codecs.convert import time_message
-from sms_handover.ros.node.message_filter import Refusals
+from sms_handover.ros.node.message_filter import MessageFilter
 from sms_handover.ros.qos import LOSSLESS
-from sms_handover.ros.transport.publisher_identity import Sender
+from sms_handover.ros.transport.publisher_identity import PublisherIdentity
 from sms_handover.simulation.parameters import DIRECT, EXECUTOR
 
 from .bench import Bench
@@ -45,7 +45,7 @@ BAD = MessageError(Reason.NOT_FINITE, "the effort is not finite")
 
 
 class Log:
-    """Refusals with a wall clock that stands still, and what they tell."""
+    """MessageFilter with a wall clock that stands still, and what they tell."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Begin at any time."""
@@ -53,7 +53,7 @@ class Log:
         self.lines: list[str] = []
         self.firsts: list[str] = []
         monkeypatch.setattr("sms_handover.ros.node.message_filter.monotonic", lambda: self.now)
-        self.refusals = Refusals(self.lines.append, lambda topic, error: self.firsts.append(topic))
+        self.refusals = MessageFilter(self.lines.append, lambda topic, error: self.firsts.append(topic))
 
 
 @pytest.fixture
@@ -136,9 +136,9 @@ class Topic:
         """Let these nodes publish on it; the controller is to, or with ``several`` the plant too."""
         self.graph = FakeGraph(**publishers)
         node: Any = self.graph
-        self.sender = Sender(node, "/joint_command", ("plant", "controller"), several=several)
+        self.sender = PublisherIdentity(node, "/joint_command", ("plant", "controller"), several=several)
         self.taken: list[int] = []
-        self.refusals = Refusals(lambda line: None, lambda topic, error: None)
+        self.refusals = MessageFilter(lambda line: None, lambda topic, error: None)
         self._deliver = self.refusals.guarding(
             "t", lambda data, sent_ns: self.taken.append(sent_ns), lambda data: None, self.sender
         )

@@ -23,12 +23,12 @@ from sms_handover.ros.codecs.convert import (
     vector_stamped,
 )
 from sms_handover.ros.codecs.loop_messages import (
-    JointStateWire,
-    OdometryWire,
-    PoseWire,
-    StateWire,
-    energy_wire,
-    vector_wire,
+    JointStateCodec,
+    OdometryCodec,
+    PoseCodec,
+    StateCodec,
+    energy_codec,
+    vector_codec,
 )
 from sms_handover.types import Array, Pose, RobotState, Twist
 from sms_handover.units import NS_PER_S
@@ -140,7 +140,7 @@ def no_general_path(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("blocks", FILLED)
 def test_joint_state_has_the_bytes_of_rosbags(blocks: tuple[str, ...], stamp: int) -> None:
     values = {block: numbers(len(JOINTS), seed) for seed, block in enumerate(blocks)}
-    packed = JointStateWire(JOINTS, blocks).pack(stamp, **values)
+    packed = JointStateCodec(JOINTS, blocks).pack(stamp, **values)
     assert packed == joint_state(JOINTS, values, stamp)
     assert stamp_ns(packed) == stamp
 
@@ -149,7 +149,7 @@ def test_joint_state_has_the_bytes_of_rosbags(blocks: tuple[str, ...], stamp: in
 def test_names_of_any_length_keep_the_alignment(length: int) -> None:
     names = tuple(f"{number}".rjust(length, "j") for number in range(3))
     values = {block: numbers(3, seed) for seed, block in enumerate(BLOCKS)}
-    wire = JointStateWire(names, BLOCKS)
+    wire = JointStateCodec(names, BLOCKS)
     packed = wire.pack(5, **values)
     assert packed == joint_state(names, values, 5)
     read = wire.read(packed)
@@ -159,7 +159,7 @@ def test_names_of_any_length_keep_the_alignment(length: int) -> None:
 def test_rclpy_reads_the_template() -> None:
     values = {block: np.arange(14.0) + seed for seed, block in enumerate(BLOCKS)}
     message: Any = deserialize_message(
-        JointStateWire(JOINTS, BLOCKS).pack(61_234_567_890, **values), JointState
+        JointStateCodec(JOINTS, BLOCKS).pack(61_234_567_890, **values), JointState
     )
     assert tuple(message.name) == JOINTS
     assert message.header.stamp == time_message(61_234_567_890)
@@ -173,7 +173,7 @@ def test_own_messages_are_read_by_the_template(
 ) -> None:
     no_general_path(monkeypatch)
     values = {block: numbers(len(JOINTS), seed) for seed, block in enumerate(blocks)}
-    wire = JointStateWire(JOINTS, blocks)
+    wire = JointStateCodec(JOINTS, blocks)
     read = wire.read(wire.pack(3, **values))
     assert list(read) == list(blocks)
     assert all(same_bits(read[block], values[block]) for block in blocks)
@@ -181,7 +181,7 @@ def test_own_messages_are_read_by_the_template(
 
 
 def test_packing_leaves_nothing_behind() -> None:
-    wire = JointStateWire(JOINTS, BLOCKS)
+    wire = JointStateCodec(JOINTS, BLOCKS)
     first = {block: numbers(14, seed) for seed, block in enumerate(BLOCKS)}
     before = wire.pack(7, **first)
     wire.pack(8, **{block: np.zeros(14) for block in BLOCKS})
@@ -195,13 +195,13 @@ def test_joints_are_found_by_name(order: tuple[int, ...]) -> None:
     sent = joint_state(
         tuple(names[i] for i in order), {block: values[block][list(order)] for block in BLOCKS}
     )
-    read = JointStateWire(names, BLOCKS).read(sent)
+    read = JointStateCodec(names, BLOCKS).read(sent)
     assert all(same_bits(read[block], values[block]) for block in BLOCKS)
 
 
 def test_joints_of_other_robots_are_passed_over() -> None:
     sent = joint_state(("x", "two", "y", "one"), {"effort": np.array([1.0, 2.0, 3.0, 4.0])})
-    assert JointStateWire(("one", "two"), ("effort",)).read(sent)["effort"].tolist() == [4.0, 2.0]
+    assert JointStateCodec(("one", "two"), ("effort",)).read(sent)["effort"].tolist() == [4.0, 2.0]
 
 
 @pytest.mark.parametrize("trailing", [1, 4, 8])
@@ -209,14 +209,14 @@ def test_joints_of_other_robots_are_passed_over() -> None:
 def test_frame_and_bytes_behind_the_end_do_not_matter(frame: str, trailing: int) -> None:
     values = {block: numbers(14, seed) for seed, block in enumerate(BLOCKS)}
     sent = joint_state(JOINTS, values, frame=frame) + b"\xaa" * trailing
-    read = JointStateWire(JOINTS, BLOCKS).read(sent)
+    read = JointStateCodec(JOINTS, BLOCKS).read(sent)
     assert all(same_bits(read[block], values[block]) for block in BLOCKS)
 
 
 def test_messages_of_rclpy_are_read() -> None:
     values = {block: np.arange(14.0) + seed for seed, block in enumerate(BLOCKS)}
     message = JointState(name=list(JOINTS), **{block: array.tolist() for block, array in values.items()})
-    read = JointStateWire(JOINTS, BLOCKS).read(serialize_message(message))
+    read = JointStateCodec(JOINTS, BLOCKS).read(serialize_message(message))
     assert all(same_bits(read[block], values[block]) for block in BLOCKS)
 
 
@@ -227,7 +227,7 @@ def test_padding_may_hold_anything() -> None:
     first_name = clean.index(b"arm_a_joint_1\0")
     assert clean[first_name + 14 : first_name + 16] == b"\0\0"  # up to the next multiple of four
     padded[first_name + 14 : first_name + 16] = b"\xaa\xbb"
-    read = JointStateWire(JOINTS, BLOCKS).read(bytes(padded))
+    read = JointStateCodec(JOINTS, BLOCKS).read(bytes(padded))
     assert all(same_bits(read[block], values[block]) for block in BLOCKS)
 
 
@@ -236,20 +236,20 @@ def test_big_endian_is_read(blocks: tuple[str, ...]) -> None:
     values = {block: numbers(14, seed) for seed, block in enumerate(blocks)}
     sent = joint_state(JOINTS, values, 61_234_567_890, little_endian=False)
     assert stamp_ns(sent) == 61_234_567_890
-    read = JointStateWire(JOINTS, blocks).read(sent)
+    read = JointStateCodec(JOINTS, blocks).read(sent)
     assert all(same_bits(read[block], values[block]) for block in blocks)
 
 
 def test_a_missing_joint_is_named() -> None:
     sent = joint_state(JOINTS[:-1], {"effort": np.zeros(13)})
     with pytest.raises(GraphError, match="lacks 'arm_b_joint_7'"):
-        JointStateWire(JOINTS, ("effort",)).read(sent)
+        JointStateCodec(JOINTS, ("effort",)).read(sent)
 
 
 def test_an_empty_block_is_refused() -> None:
     sent = joint_state(JOINTS, dict.fromkeys(("position", "velocity"), np.zeros(14)))
     with pytest.raises(GraphError, match="14 names and 0 values"):
-        JointStateWire(JOINTS, BLOCKS).read(sent)
+        JointStateCodec(JOINTS, BLOCKS).read(sent)
 
 
 @pytest.mark.parametrize("trailing", [0, 4, 8])
@@ -261,7 +261,7 @@ def test_one_block_is_never_taken_for_another(
     """A message of other blocks may happen to be as long as the template, with bytes behind its end."""
     values = {block: np.arange(14.0) + 100.0 * BLOCKS.index(block) for block in sent}
     data = joint_state(JOINTS, values) + bytes(trailing)
-    wire = JointStateWire(JOINTS, wanted)
+    wire = JointStateCodec(JOINTS, wanted)
     if set(wanted) <= set(sent):
         read = wire.read(data)
         assert all(same_bits(read[block], values[block]) for block in wanted)
@@ -277,14 +277,14 @@ def test_one_block_is_never_taken_for_another(
 @pytest.mark.parametrize("frames", [("world", "base_link"), ("w", "b"), ("map", "spacecraft"), ("", "")])
 def test_odometry_has_the_bytes_of_rosbags(frames: tuple[str, str], stamp: int) -> None:
     pose, twist = numbers(7, 1), numbers(6, 2)
-    packed = OdometryWire(*frames).pack(stamp, pose, twist)
+    packed = OdometryCodec(*frames).pack(stamp, pose, twist)
     assert packed == odometry(frames, stamp, pose, twist)
     assert stamp_ns(packed) == stamp
 
 
 def test_rclpy_reads_the_odometry() -> None:
     pose, twist = np.arange(7.0), np.arange(6.0)
-    packed = OdometryWire("world", "base_link").pack(3_000_000_004, pose, twist)
+    packed = OdometryCodec("world", "base_link").pack(3_000_000_004, pose, twist)
     message: Any = deserialize_message(packed, Odometry)
     assert (message.header.frame_id, message.child_frame_id) == ("world", "base_link")
     assert (message.header.stamp.sec, message.header.stamp.nanosec) == (3, 4)
@@ -296,7 +296,7 @@ def test_rclpy_reads_the_odometry() -> None:
 def test_own_odometry_is_read_by_the_template(monkeypatch: pytest.MonkeyPatch) -> None:
     no_general_path(monkeypatch)
     pose, twist = numbers(7, 1), numbers(6, 2)
-    wire = OdometryWire("world", "base_link")
+    wire = OdometryCodec("world", "base_link")
     read_pose, read_twist = wire.read(wire.pack(8, pose, twist))
     assert same_bits(read_pose, pose)
     assert same_bits(read_twist, twist)
@@ -309,7 +309,7 @@ def test_foreign_odometry_is_read(little_endian: bool, trailing: int) -> None:
     data = odometry(
         ("world", "base_link"), 5, pose, twist, covariance=0.5, little_endian=little_endian
     ) + bytes(trailing)
-    read_pose, read_twist = OdometryWire("world", "base_link").read(data)
+    read_pose, read_twist = OdometryCodec("world", "base_link").read(data)
     assert same_bits(read_pose, pose)
     assert same_bits(read_twist, twist)
 
@@ -322,7 +322,7 @@ def test_foreign_odometry_is_read(little_endian: bool, trailing: int) -> None:
 def test_other_frames_are_refused(frames: tuple[str, str], little_endian: bool) -> None:
     data = odometry(frames, 5, np.arange(7.0), np.arange(6.0), little_endian=little_endian)
     with pytest.raises(GraphError, match=r"between frames .*expected \('world', 'base_link'\)") as caught:
-        OdometryWire("world", "base_link").read(data)
+        OdometryCodec("world", "base_link").read(data)
     assert str(frames) in str(caught.value)
 
 
@@ -340,27 +340,27 @@ def test_stamped_messages_have_the_bytes_of_rosbags(frame: str, stamp: int) -> N
     )
     stamped = rosbags_message("geometry_msgs/msg/PoseStamped", header=header, pose=pose)
     expected = bytes(ROSBAGS.serialize_cdr(stamped, "geometry_msgs/msg/PoseStamped"))
-    assert PoseWire(frame).pack(stamp, values) == expected
+    assert PoseCodec(frame).pack(stamp, values) == expected
     vector = geometry("Vector3", "xyz", values[:3])
     stamped = rosbags_message("geometry_msgs/msg/Vector3Stamped", header=header, vector=vector)
     expected = bytes(ROSBAGS.serialize_cdr(stamped, "geometry_msgs/msg/Vector3Stamped"))
-    assert vector_wire(frame).pack(stamp, values[:3]) == expected
+    assert vector_codec(frame).pack(stamp, values[:3]) == expected
 
 
 def test_rclpy_reads_the_stamped_messages() -> None:
     values = np.arange(1.0, 8.0)
-    pose: Any = deserialize_message(PoseWire("world").pack(3_000_000_004, values), PoseStamped)
+    pose: Any = deserialize_message(PoseCodec("world").pack(3_000_000_004, values), PoseStamped)
     assert pose == pose_stamped(Pose(values[:3], values[3:]), 3_000_000_004)
-    vector: Any = deserialize_message(vector_wire("world").pack(5, values[:3]), Vector3Stamped)
+    vector: Any = deserialize_message(vector_codec("world").pack(5, values[:3]), Vector3Stamped)
     assert vector == vector_stamped(values[:3], 5)
-    energy: Any = deserialize_message(energy_wire("world").pack(6, values[:2]), EnergyStamped)
+    energy: Any = deserialize_message(energy_codec("world").pack(6, values[:2]), EnergyStamped)
     assert energy == energy_message(1.0, 2.0, 6)
 
 
 @pytest.mark.parametrize("size", [0, 2, 4, 7])
 def test_numbers_that_do_not_fill_a_message_are_refused(size: int) -> None:
     with pytest.raises(GraphError, match=f"{size} numbers do not fill"):
-        vector_wire("world").pack(0, np.zeros(size))
+        vector_codec("world").pack(0, np.zeros(size))
 
 
 # Both
@@ -369,7 +369,7 @@ def test_numbers_that_do_not_fill_a_message_are_refused(size: int) -> None:
 def test_a_state_comes_back_bit_for_bit() -> None:
     pose, twist, joints = numbers(7, 1), numbers(6, 2), [numbers(14, seed) for seed in range(3)]
     state = RobotState.of(61_234_567_890, Pose(pose[:3], pose[3:]), Twist(twist[:3], twist[3:]), *joints)
-    wire = StateWire(JOINTS, "world", "base_link")
+    wire = StateCodec(JOINTS, "world", "base_link")
     read = wire.read(*wire.pack(state))
     assert read.stamp_ns == state.stamp_ns
     for name in ("joint_position", "joint_velocity", "joint_effort"):
