@@ -66,7 +66,6 @@ class NmpcTracker:
     """The law for an engine that gives its own H (6 + n, 6 + n) and c (6 + n,), base rows first."""
 
     def __init__(self, task: HandoverTask) -> None:
-        """Start without a reference."""
         self._task = task
         self._track = ReferenceTrack()
         self._phase = 0

@@ -95,7 +95,6 @@ class MujocoRobot:
     """
 
     def __init__(self, description: RobotDescription) -> None:
-        """Compile the model."""
         self.model = mujoco.MjModel.from_xml_string(to_mjcf(description))
         self.data = mujoco.MjData(self.model)
         joints = range(1, self.model.njnt)

@@ -43,7 +43,6 @@ class Side:
     """One of the two nodes: it publishes the messages of a stamp, and sleeps until the other's have come."""
 
     def __init__(self, name: str, sends: tuple[str, ...], takes: tuple[str, ...]) -> None:
-        """Make the endpoints."""
         node = Node(name, start_parameter_services=False, enable_rosout=False)
         endpoints = self._endpoints = Endpoints(node, graph_topics(_ARMS), (PLANT, CONTROLLER))
         self._inputs = DirectInputs(node)

@@ -67,7 +67,6 @@ class Witness:
     """Hears the states of a running graph, with when each was sent."""
 
     def __init__(self, domain: int) -> None:
-        """Join a domain."""
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain)
         self._node = Node("witness", context=self._context, start_parameter_services=False)

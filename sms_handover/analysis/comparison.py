@@ -31,7 +31,6 @@ class Comparison:
     claims: tuple[Claim, ...]
 
     def __post_init__(self) -> None:
-        """Make the mappings immutable."""
         object.__setattr__(self, "runs", MappingProxyType(dict(self.runs)))
         drift = {name: MappingProxyType(dict(phases)) for name, phases in self.drift.items()}
         object.__setattr__(self, "drift", MappingProxyType(drift))

@@ -44,7 +44,6 @@ class LargestDeviation:
     """The largest deviations of a course, where each was, and where the first bit differed."""
 
     def __init__(self) -> None:
-        """Begin without any state."""
         self.compared = 0
         self.first: StateDeviation | None = None
         self.joint: StateDeviation | None = None

@@ -30,7 +30,6 @@ class PhaseMetrics:
     ik: IkOutcomes
 
     def __post_init__(self) -> None:
-        """Make the mapping immutable."""
         object.__setattr__(self, "tools", MappingProxyType(dict(self.tools)))
 
     @property

@@ -33,7 +33,6 @@ class JointTorque:
     ticks_at_peak: Counts
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only."""
         for item in fields(self)[1:]:
             getattr(self, item.name).setflags(write=False)
 

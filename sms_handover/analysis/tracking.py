@@ -55,7 +55,6 @@ class ToolTracking:
     orientation: OrientationTracking
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only."""
         for array in (self.stamp_ns, self.position_error, self.orientation_error):
             array.setflags(write=False)
 

@@ -26,7 +26,6 @@ class JointWork:
     peak_power: Array
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only."""
         for item in fields(self)[1:]:
             getattr(self, item.name).setflags(write=False)
 

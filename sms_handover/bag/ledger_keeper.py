@@ -77,7 +77,6 @@ class LedgerKeeper:
     """The running accounts of all topics of a recording."""
 
     def __init__(self) -> None:
-        """Start without any topic."""
         self._accounts: dict[str, _Account] = {}
 
     def add_topic(self, name: str, period_ns: int = 0) -> None:

@@ -45,7 +45,6 @@ class Recording:
         self._now_ns = 0
 
     def __enter__(self) -> "Recording":
-        """Return the recording."""
         return self
 
     def __exit__(

@@ -91,7 +91,6 @@ class BagWriter:
             raise
 
     def __enter__(self) -> "BagWriter":
-        """Return the writer."""
         return self
 
     def __exit__(

@@ -26,7 +26,6 @@ class ParameterValues(dict[str, object]):
     """Parameters by name, with the file and line that each was read from."""
 
     def __init__(self) -> None:
-        """Begin without any."""
         super().__init__()
         self.places: dict[str, str] = {}
 

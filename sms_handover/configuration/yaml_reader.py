@@ -23,7 +23,6 @@ class Mapping(dict[str | float, Any]):
     """A mapping that remembers the line of each of its keys, counted from 1."""
 
     def __init__(self) -> None:
-        """Begin without keys."""
         super().__init__()
         self.lines: dict[str | float, int] = {}
 

@@ -25,7 +25,6 @@ class Guidance:
     tool_in_world: Mapping[str, Pose]
 
     def __post_init__(self) -> None:
-        """Make the mapping immutable."""
         object.__setattr__(self, "tool_in_world", MappingProxyType(dict(self.tool_in_world)))
 
 

@@ -18,7 +18,6 @@ class CsvFormat(Format):
     suffix = ".csv"
 
     def __init__(self, folder: Path) -> None:
-        """Write to ``folder``."""
         self._folder = folder
 
     def open(self, stem: str, columns: Sequence[Column]) -> TableFile:
@@ -30,7 +29,6 @@ class _CsvFile(TableFile):
     """One CSV file."""
 
     def __init__(self, path: Path, columns: Sequence[Column]) -> None:
-        """Create the file."""
         self._special = [
             (place, column.kind)
             for place, column in enumerate(columns)

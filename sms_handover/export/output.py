@@ -15,7 +15,6 @@ class Tables:
     """The tables of an export as they are written."""
 
     def __init__(self, folder: Path, file_format: Format) -> None:
-        """Begin without a table."""
         self.rows: dict[str, int] = {}
         self.skipped: dict[str, str] = {}
         self._folder, self._format = folder, file_format

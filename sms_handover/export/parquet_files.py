@@ -55,7 +55,6 @@ class _ParquetFile(TableFile):
     """One Parquet file; each batch of rows becomes a row group."""
 
     def __init__(self, arrow: Any, writer: Any, schema: Any) -> None:
-        """Take an open writer."""
         self._arrow, self._writer, self._schema = arrow, writer, schema
 
     def write(self, rows: Sequence[Sequence[Any]]) -> None:

@@ -38,7 +38,6 @@ class _Columns:
     """Columns as they are added, each cut to the rows wanted."""
 
     def __init__(self, stamps: Stamps, wanted: Wanted) -> None:
-        """Begin with the stamps."""
         self._mask = wanted(stamps)
         self.columns = [Column("stamp_ns", INTEGER, "ns")]
         self.values: list[Any] = [stamps[self._mask]]

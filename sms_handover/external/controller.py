@@ -83,7 +83,6 @@ class GuidedController:
     """
 
     def __init__(self, controller: Controller, robot: RobotModel) -> None:
-        """Begin a run."""
         self._controller, self._robot = controller, robot
         self.reset()
 

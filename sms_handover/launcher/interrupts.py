@@ -17,7 +17,6 @@ class Interrupts:
     """
 
     def __init__(self) -> None:
-        """Know of none."""
         self._count = self._told = 0
         self._before: dict[int, Any] = {}
 

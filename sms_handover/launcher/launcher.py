@@ -169,7 +169,6 @@ class _Watch:
         interrupts: Interrupts,
         memory: SharedMemory,
     ) -> None:
-        """Begin to watch."""
         common = plan.scenario.parameters.common
         end_ns = common.last_tick(plan.scenario.schedule.end_ns) * common.tick_ns
         self._plan, self._monitor, self._executor, self._processes = plan, monitor, executor, processes

@@ -53,7 +53,6 @@ class NodeProcesses:
         self._logs: dict[str, NodeLog] = {}
 
     def __enter__(self) -> "NodeProcesses":
-        """Return the processes."""
         return self
 
     def __exit__(

@@ -55,7 +55,6 @@ class SharedMemory:
     """The list of one run; use it as a context manager around everything that takes part in it."""
 
     def __init__(self, folder: Path = FOLDER) -> None:
-        """Make nothing yet."""
         self._folder = folder
         self._list: TextIO | None = None
         self._held: dict[str, _Inodes] = {}

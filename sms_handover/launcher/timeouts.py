@@ -20,7 +20,6 @@ class ActiveTime:
     """
 
     def __init__(self, clock: Callable[[], float] = monotonic) -> None:
-        """Begin at zero."""
         self._clock = clock
         self._seen = clock()
         self.seconds = 0.0
@@ -36,7 +35,6 @@ class SuspensionMonitor:
     """Notices nodes that are suspended, by SIGSTOP or a debugger: the run waits for them, not for ever."""
 
     def __init__(self) -> None:
-        """Know of none."""
         self._since: dict[str, float] = {}
         self._told: set[str] = set()
 
@@ -65,7 +63,6 @@ class WaitNotice:
     """Tells what something that has not begun waits for: after a while, and again when the reason changes."""
 
     def __init__(self) -> None:
-        """Have told nothing."""
         self._told, self._next_s = "", _DELAY_S
 
     def note(self, seconds: float, reason: str) -> str:

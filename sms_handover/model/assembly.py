@@ -74,7 +74,6 @@ class Panel:
     size: Floats
 
     def __post_init__(self) -> None:
-        """Check position and size."""
         vector(self.xyz, 3, "panel xyz", "m")
         positive_vector(self.size, 3, "panel size", "m")
 
@@ -88,7 +87,6 @@ class Base:
     panels: tuple[Panel, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check the size."""
         positive_vector(self.size, 3, f"{self.inertia.body}: size", "m")
 
 

@@ -41,7 +41,6 @@ class Origin:
     rpy: Floats
 
     def __post_init__(self) -> None:
-        """Check lengths and values."""
         vector(self.xyz, 3, "origin xyz", "m")
         vector(self.rpy, 3, "origin rpy", "rad")
 
@@ -90,7 +89,6 @@ class JointDescription:
     rotor_inertia: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check axis and limits."""
         vector(self.axis, 3, f"{self.name}: axis")
         check_unit_axis(self.axis, f"{self.name}: axis")
         check_position_limits(self.lower, self.upper, f"{self.name}: position limit")
@@ -108,7 +106,6 @@ class LinkDescription:
     radius: float
 
     def __post_init__(self) -> None:
-        """Check the radius."""
         positive(self.radius, f"{self.name}: radius", "m")
 
 
@@ -125,7 +122,6 @@ class Gripper:
     length: float
 
     def __post_init__(self) -> None:
-        """Check mass and dimensions."""
         positive(self.mass, f"{self.name}: mass", "kg")
         positive(self.radius, f"{self.name}: radius", "m")
         positive(self.length, f"{self.name}: length", "m")

@@ -55,7 +55,6 @@ class AnsweringNode(GraphNode[P]):
     """
 
     def __init__(self, group: type[P], *, shipped: bool = True) -> None:
-        """Declare the parameters."""
         super().__init__(CONTROLLER, group, shipped=shipped)
 
     def prepare(self) -> None:
@@ -194,7 +193,6 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
     """
 
     def __init__(self) -> None:
-        """Declare the parameters."""
         super().__init__(ControllerParameters)
 
     def prepare(self) -> None:

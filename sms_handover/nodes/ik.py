@@ -28,7 +28,6 @@ class IkNode(GraphNode[IkParameters]):
     """Answers ``solve_ik``: the joints that bring the tools to their targets with the base locked."""
 
     def __init__(self) -> None:
-        """Declare the parameters."""
         super().__init__(IK, IkParameters)
 
     def prepare(self) -> None:

@@ -59,7 +59,6 @@ class PlantNode(GraphNode[PlantParameters]):
     """
 
     def __init__(self) -> None:
-        """Declare the parameters."""
         super().__init__(PLANT, PlantParameters)
         self.runs = 0
 

@@ -67,7 +67,6 @@ class RecorderNode(GraphNode[RecorderParameters]):
     """
 
     def __init__(self) -> None:
-        """Declare the parameters."""
         super().__init__(RECORDER, RecorderParameters)
         self._told = True
         self._poll_s = _POLL_S

@@ -62,7 +62,6 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
     """
 
     def __init__(self) -> None:
-        """Declare the parameters."""
         super().__init__(TRAJECTORY, TrajectoryParameters)
 
     def prepare(self) -> None:

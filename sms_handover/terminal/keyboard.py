@@ -56,7 +56,6 @@ class Keyboard(AbstractContextManager["Keyboard"]):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Put the terminal back."""
         if self._stop_handler is not None:
             signal.signal(signal.SIGTSTP, self._stop_handler)
         self._give_back()

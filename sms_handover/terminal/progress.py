@@ -18,11 +18,9 @@ class ProgressLine:
         self._begin = monotonic()
 
     def __enter__(self) -> "ProgressLine":
-        """Return the line."""
         return self
 
     def __exit__(self, *error: object) -> None:
-        """Leave the line."""
         self._line.stay()
 
     def __call__(self, done: int, size: int) -> None:

@@ -12,7 +12,6 @@ class StatusLine:
     """One line on standard error."""
 
     def __init__(self) -> None:
-        """Show nothing yet."""
         self._terminal = sys.stderr.isatty()
         self._period_s = _TERMINAL_PERIOD_S if self._terminal else _LOG_PERIOD_S
         self._next = 0.0

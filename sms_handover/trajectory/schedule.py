@@ -77,7 +77,6 @@ class Phase:
     on_miss: OnMiss = OnMiss()
 
     def __post_init__(self) -> None:
-        """Make the mappings immutable."""
         object.__setattr__(self, "targets", MappingProxyType(dict(self.targets)))
         object.__setattr__(self, "gains", MappingProxyType(dict(self.gains)))
 

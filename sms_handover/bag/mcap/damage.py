@@ -45,7 +45,6 @@ class Hole:
     """Follows the log times of messages and the damage between them."""
 
     def __init__(self) -> None:
-        """Begin without a message."""
         self.first_ns: int | None = None
         self.newest_ns: int | None = None
         self._begin_ns: int | None = None  # of a hole that no message has ended yet

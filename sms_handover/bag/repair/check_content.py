@@ -27,7 +27,6 @@ class ContentCheck:
     """What the messages and records of a bag tell, gathered in one pass."""
 
     def __init__(self) -> None:
-        """Begin without any."""
         self.any_record = False
         self.is_ours = False
         self._types: dict[Source, SchemaTypes | str] = {}  # or why there are none

@@ -16,7 +16,6 @@ class IndexCheck:
     """What one file holds and what it says that it holds."""
 
     def __init__(self) -> None:
-        """Begin with nothing."""
         self._counts: Counter[str] = Counter()
         self._first_ns: int | None = None
         self._last_ns = 0

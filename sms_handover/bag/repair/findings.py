@@ -46,7 +46,6 @@ class Findings:
     """Collects findings."""
 
     def __init__(self) -> None:
-        """Begin without any."""
         self._found: list[Finding] = []
 
     def damaged(self, text: str) -> None:

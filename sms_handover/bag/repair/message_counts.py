@@ -9,7 +9,6 @@ class MessageCounts:
     """Who says how many messages each topic has."""
 
     def __init__(self) -> None:
-        """Begin without a claim."""
         self._claims: dict[str, dict[str, int]] = {}
 
     def add(self, who: str, counts: Mapping[str, int]) -> None:

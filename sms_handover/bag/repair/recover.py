@@ -62,7 +62,6 @@ class _Salvage:
     """Puts what is found into the new bag and keeps account of it."""
 
     def __init__(self, writer: BagWriter) -> None:
-        """Begin without anything."""
         self._writer = writer
         self._keys: dict[Source, str] = {}
         self._same: dict[tuple[str, str, str, bytes], str] = {}

@@ -39,7 +39,6 @@ class LoopRecord:
     period_max: Array
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only."""
         for item in fields(self):
             getattr(self, item.name).setflags(write=False)
 

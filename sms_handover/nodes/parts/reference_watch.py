@@ -9,7 +9,6 @@ class ReferenceWatch:
     """Compares the age of the last reference with what is tolerated."""
 
     def __init__(self, longest_ns: int) -> None:
-        """Tolerate an age."""
         self._longest_ns = longest_ns
         self.reset()
 

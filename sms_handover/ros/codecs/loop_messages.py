@@ -156,7 +156,6 @@ class PoseCodec(StampedCodec):
     """Packs and reads PoseStamped in one frame: position, then quaternion x y z w."""
 
     def __init__(self, frame: str) -> None:
-        """Fix the frame."""
         super().__init__(
             "geometry_msgs/msg/PoseStamped", frame, BASE_NQ, lambda types, n: {"pose": _pose(types, n)}
         )

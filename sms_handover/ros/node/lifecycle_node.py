@@ -22,7 +22,6 @@ class LifecycleNode(LifecycleNodeMixin, RunnableNode):
     """
 
     def __init__(self, name: str) -> None:
-        """Be there, unconfigured."""
         RunnableNode.__init__(self, name, automatically_declare_parameters_from_overrides=True)
         LifecycleNodeMixin.__init__(self)
         self._made_before: set[object] = set()

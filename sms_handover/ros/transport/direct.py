@@ -34,7 +34,6 @@ class DirectInputs(Inputs):
     identifies = IDENTIFIES
 
     def __init__(self, node: Node) -> None:
-        """Serve a node."""
         self._node = node
         self._sources: dict[str, _Source] = {}
         self._company: tuple[DirectInputs, ...] = ()
@@ -214,7 +213,6 @@ class _Answers(_Source, Asker):
     """Asks a service, and takes its answers."""
 
     def __init__(self, node: Node, client: Any, receive: Callable[[Any], None]) -> None:
-        """Take over a client."""
         super().__init__(node, client, (0, 1, 0))
         self._response = client.srv_type.Response
         self._receive = receive
@@ -243,7 +241,6 @@ class _Requests(_Source):
     """Takes the requests of a service, and answers them."""
 
     def __init__(self, node: Node, service: Any, answer: Answer) -> None:
-        """Take over a service."""
         super().__init__(node, service, (0, 0, 1))
         self._kind = service.srv_type
         self._answer = answer

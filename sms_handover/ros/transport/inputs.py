@@ -103,7 +103,6 @@ class ExecutorInputs(Inputs):
     """Leaves everything to the executor that spins the node."""
 
     def __init__(self, node: Node) -> None:
-        """Serve a node."""
         self._node = node
         self._waiting: list[Callable[[], object]] = []
 
@@ -165,7 +164,6 @@ class _ExecutorAsker(Asker):
     """Asks a service by rclpy's futures."""
 
     def __init__(self, node: Node, kind: Any, service: str, receive: Callable[[Any], None]) -> None:
-        """Make the client."""
         self._client = node.create_client(kind, service)
         self._receive = receive
 
