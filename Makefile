@@ -6,6 +6,7 @@ FIGURES ?= figures
 REPORT ?= report
 FUZZ_SECONDS ?= 600
 TEST_SECONDS ?= 600
+TEST_WORKERS ?= 2
 MEASURED := build/verification
 SITE := build/docs/html
 
@@ -36,8 +37,8 @@ report: install  ## write an HTML page on the runs of `make handover`
 simulate: install  ## the same handover in one process, without DDS or a recording
 	$(BIN)/sms-handover simulate
 
-test: lint  ## check style and types, then run every test but those of verify, none longer than TEST_SECONDS
-	$(BIN)/python -m pytest --timeout $(TEST_SECONDS) --durations 20
+test: lint  ## check style and types, then run every test but those of verify in TEST_WORKERS processes
+	$(BIN)/python -m pytest --numprocesses $(TEST_WORKERS) --dist loadfile --timeout $(TEST_SECONDS) --durations 20
 
 verify: $(VENV)/.verify  ## measure against independent answers, break every law on purpose, write docs/verification.md
 	@mkdir -p $(MEASURED)

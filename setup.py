@@ -96,6 +96,7 @@ setup(
             "pyarrow>=18,<27",
             "pytest>=8.4",
             "pytest-timeout>=2.4,<3",
+            "pytest-xdist>=3.8,<4",
             "rerun-sdk>=0.41,<0.42",  # another reader of our bags
             "ruff>=0.6",
             "types-PyYAML",

@@ -7,6 +7,7 @@ import yaml
 
 from sms_handover.configuration.package_files import config_file
 
+from .conftest import Command
 from .runs import sms_handover
 
 pytestmark = pytest.mark.system
@@ -113,11 +114,11 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_nothing_is_started(case: str, folder: Path) -> None:
+def test_nothing_is_started(case: str, folder: Path, called: Command) -> None:
     """One line names the value and what is allowed; nothing is made or changed, so no node has run."""
     before = tree(folder)
     arguments, told = WRONG[case]
-    done = sms_handover("run", *arguments, cwd=folder)
+    done = called("run", *arguments, cwd=folder)
     assert done.code == 2, done
     assert len(done.errors) == 1 and told in done.errors[0], done
     assert "Traceback" not in done.err
@@ -126,31 +127,36 @@ def test_nothing_is_started(case: str, folder: Path) -> None:
     assert tree(folder) == before
 
 
-def test_simulate_refuses_the_same(folder: Path) -> None:
+def test_the_command_of_a_shell_says_and_returns_the_same(folder: Path, called: Command) -> None:
+    arguments, _ = WRONG["target out of reach"]
+    assert sms_handover("run", *arguments, cwd=folder) == called("run", *arguments, cwd=folder)
+
+
+def test_simulate_refuses_the_same(folder: Path, called: Command) -> None:
     for case in ("target out of reach", "parameter value", "unstable loop"):
         arguments, told = WRONG[case]
-        done = sms_handover("simulate", *arguments, cwd=folder)
+        done = called("simulate", *arguments, cwd=folder)
         assert done.code == 2, done
         assert len(done.errors) == 1 and told in done.errors[0], done
 
 
-def test_numbers_are_read_as_ros_reads_them(schedule: Path, tmp_path: Path) -> None:
+def test_numbers_are_read_as_ros_reads_them(schedule: Path, tmp_path: Path, called: Command) -> None:
     """An exponent without a decimal point makes a number too."""
     arguments = ("-p", "common.tick:=1e-3", "--duration", "0.02", "--schedule", schedule)
-    done = sms_handover("simulate", *arguments, cwd=tmp_path)
+    done = called("simulate", *arguments, cwd=tmp_path)
     assert done.code == 0, done
 
 
 @pytest.mark.parametrize("command", [[], ["run"], ["simulate"], ["compare"], ["reproduce"]])
-def test_help_teaches(command: list[str], tmp_path: Path) -> None:
+def test_help_teaches(command: list[str], tmp_path: Path, called: Command) -> None:
     """Every command tells what it does and exits with 0."""
-    done = sms_handover(*command, "--help", cwd=tmp_path)
+    done = called(*command, "--help", cwd=tmp_path)
     assert done.code == 0
     assert "usage: sms-handover" in done.out
     assert done.err == ""
 
 
 @pytest.mark.parametrize("arguments", [[], ["fly"], ["compare"], ["reproduce"]])
-def test_a_command_must_be_whole(arguments: list[str], tmp_path: Path) -> None:
-    done = sms_handover(*arguments, cwd=tmp_path)
+def test_a_command_must_be_whole(arguments: list[str], tmp_path: Path, called: Command) -> None:
+    done = called(*arguments, cwd=tmp_path)
     assert (done.code, len(done.errors)) == (2, 1)
