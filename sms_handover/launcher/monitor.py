@@ -118,7 +118,7 @@ class RunMonitor:
         )  # a display must never hold the loop back
 
         def receive(data: bytes, sent_ns: int, publisher: bytes) -> None:
-            with suppress(MessageError, IndexError):
+            with suppress(MessageError, KeyError):
                 show(decoded(data, kind))
 
         self._inputs.subscribe(kind, topic, profile, receive)

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped, Vector3Stamped
+from geometry_msgs.msg import Pose as PoseMessage
+from geometry_msgs.msg import PoseStamped, Vector3, Vector3Stamped
 from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_typestore
@@ -15,13 +16,7 @@ from sms_handover_interfaces.msg import EnergyStamped
 
 from sms_handover.errors import GraphError
 from sms_handover.messages.stamps import stamp_ns
-from sms_handover.ros.codecs.convert import (
-    energy_message,
-    pose_message,
-    pose_stamped,
-    time_message,
-    vector_stamped,
-)
+from sms_handover.ros.codecs.convert import header, set_pose, time_message
 from sms_handover.ros.codecs.loop_messages import (
     JointStateCodec,
     OdometryCodec,
@@ -288,7 +283,7 @@ def test_rclpy_reads_the_odometry() -> None:
     message: Any = deserialize_message(packed, Odometry)
     assert (message.header.frame_id, message.child_frame_id) == ("world", "base_link")
     assert (message.header.stamp.sec, message.header.stamp.nanosec) == (3, 4)
-    assert message.pose.pose == pose_message(Pose(pose[:3], pose[3:]))
+    assert message.pose.pose == set_pose(PoseMessage(), Pose(pose[:3], pose[3:]))
     assert (message.twist.twist.linear.z, message.twist.twist.angular.x) == (2.0, 3.0)
     assert not np.any(message.pose.covariance) and not np.any(message.twist.covariance)
 
@@ -350,11 +345,14 @@ def test_stamped_messages_have_the_bytes_of_rosbags(frame: str, stamp: int) -> N
 def test_rclpy_reads_the_stamped_messages() -> None:
     values = np.arange(1.0, 8.0)
     pose: Any = deserialize_message(PoseCodec("world").pack(3_000_000_004, values), PoseStamped)
-    assert pose == pose_stamped(Pose(values[:3], values[3:]), 3_000_000_004)
+    assert (pose.header, pose.pose) == (
+        header(3_000_000_004),
+        set_pose(PoseMessage(), Pose(values[:3], values[3:])),
+    )
     vector: Any = deserialize_message(vector_codec("world").pack(5, values[:3]), Vector3Stamped)
-    assert vector == vector_stamped(values[:3], 5)
+    assert vector == Vector3Stamped(header=header(5), vector=Vector3(x=1.0, y=2.0, z=3.0))
     energy: Any = deserialize_message(energy_codec("world").pack(6, values[:2]), EnergyStamped)
-    assert energy == energy_message(1.0, 2.0, 6)
+    assert energy == EnergyStamped(header=header(6), kinetic=1.0, work=2.0)
 
 
 @pytest.mark.parametrize("size", [0, 2, 4, 7])

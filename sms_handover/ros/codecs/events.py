@@ -29,6 +29,6 @@ def _read(data: bytes, kind: Any, value: Callable[[Any], V]) -> V:
     """Return the value of a message; raises MessageError if a number in it stands for nothing known."""
     try:
         return value(decoded(data, kind))
-    except IndexError as error:
+    except KeyError as error:
         text = f"a {kind.__name__} has an action, status or severity that is not known"
         raise MessageError(Reason.NAMES, text) from error

@@ -43,7 +43,7 @@ class PhaseCodec:
             message = decoded(data, TaskPhaseMessage)
             try:
                 self._read = rest, task_phase(message)
-            except IndexError as error:
+            except KeyError as error:
                 text = "a phase has a grasp command of no known action"
                 raise MessageError(Reason.NAMES, text) from error
         return replace(self._read[1], stamp_ns=stamp_ns(data))
