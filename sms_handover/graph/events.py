@@ -14,6 +14,7 @@ from sms_handover.units import ns_to_seconds
 COMMAND_LOST, TORQUE_ZERO, COMMAND_BACK = "command_lost", "torque_zero", "command_back"
 REFERENCE_LOST, REFERENCE_BACK = "reference_lost", "reference_back"
 NO_ANSWER = "no_answer"
+RESYNCHRONISED = "resynchronised"
 GRASP_MISSED, PHASE_RETRIED, GRASP_FAILED = "grasp_missed", "phase_retried", "grasp_failed"
 IK_FAILED = "ik_failed"
 MESSAGE_REFUSED = "refused"

@@ -19,6 +19,7 @@ from sms_handover.ros.codecs.convert import (
     stamp_ns_of,
 )
 from sms_handover.ros.codecs.validation import check_finite
+from sms_handover.ros.node.diagnostics import NodeReport
 from sms_handover.ros.node.graph_node import GraphNode
 from sms_handover.ros.process.main import run_node
 from sms_handover.types import IkRequest, IkStatus, Pose
@@ -37,12 +38,12 @@ class IkNode(GraphNode[IkParameters]):
         self._response = SolveIK.Response(valid=True)  # filled anew each time: most of it never changes
         self._response.solution.name = self._names
         self._response.status.header.frame_id = WORLD
-        self.inputs.serve(SolveIK, SOLVE_IK, self._on_request)
+        self.inputs.loop.create_service(SolveIK, SOLVE_IK, self._on_request)
 
     def reset_run(self) -> None:
         """Forget the run: only counts are kept of it, as a solution rests on its request alone."""
         self._solved = dict.fromkeys(IkStatus, 0)
-        self._refused = 0
+        self._rejected = 0
         self._stamp_ns = 0
 
     @property
@@ -50,21 +51,17 @@ class IkNode(GraphNode[IkParameters]):
         """Return the service: nothing else is waited for."""
         return SOLVE_IK
 
-    def diagnostic_values(self) -> dict[str, object]:
+    def report(self) -> NodeReport:
         """Return how many requests ended in which way."""
-        solved: dict[str, object] = {status.name.lower(): count for status, count in self._solved.items()}
-        return {**solved, "refused": self._refused}
-
-    def diagnostic_stamp_ns(self) -> int:
-        """Return the stamp of the last request."""
-        return self._stamp_ns
+        solved = {status.name.lower(): count for status, count in self._solved.items()}
+        return NodeReport(self._stamp_ns, {**solved, "refused": self._rejected})
 
     def _on_request(self, request: Any) -> Any:
         """Solve one request; a malformed one is answered with ``valid`` false and the reason."""
         try:
             question = self._question(request)
         except (SmsHandoverError, ValueError) as error:
-            self._refused += 1
+            self._rejected += 1
             return SolveIK.Response(message=str(error))
         result = solve_ik(self.robot, question, self.parameters)
         self._solved[result.status] += 1

@@ -11,6 +11,7 @@ from sms_handover_interfaces.msg import RunState
 from std_msgs.msg import String
 
 from sms_handover.errors import MessageError, Reason
+from sms_handover.graph.events import RESYNCHRONISED, Severity
 from sms_handover.graph.topics import (
     DEPUTY_MARKER,
     GRASP_EVENT,
@@ -24,15 +25,15 @@ from sms_handover.graph.topics import (
     RUN_STATE,
     TASK_PHASE,
 )
-from sms_handover.nodes.parts.answer_watch import AnswerWatch
-from sms_handover.nodes.parts.command_watch import CommandWatch
 from sms_handover.nodes.parts.marker import deputy_marker
 from sms_handover.nodes.parts.plant_outputs import PlantOutputs
 from sms_handover.nodes.parts.run_control import RunControl
+from sms_handover.nodes.parts.watchdogs import AnswerWatchdog, CommandWatchdog
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.ros.codecs.convert import event_message, header
 from sms_handover.ros.codecs.loop_messages import JointStateCodec, Stamped, stamped
 from sms_handover.ros.codecs.task_phase import PhaseCodec
+from sms_handover.ros.node.diagnostics import NodeReport
 from sms_handover.ros.node.graph_node import GraphNode
 from sms_handover.ros.process.main import run_node
 from sms_handover.ros.transport.loop_clock import LoopClock
@@ -71,13 +72,15 @@ class PlantNode(GraphNode[PlantParameters]):
         self.lockstep = self.common.mode == LOCKSTEP
         self._tick_ns, self._per_reference = self.common.tick_ns, self.common.ticks_per_reference
         self._is_recorded = RECORDER in self.common.peers
-        self._command_wire = JointStateCodec(self.robot.joint_names, ("effort",))
-        self._phase_wire = PhaseCodec(self.robot.arms, tuple(schedule.deputy.grasp_frames))
+        self._command_codec = JointStateCodec(self.robot.joint_names, ("effort",))
+        self._phase_codec = PhaseCodec(self.robot.arms, tuple(schedule.deputy.grasp_frames))
         self._inputs: StampSync[Any] = StampSync(ahead_ns=self._tick_ns)
         self._orders = {topic: StampOrder(0) for topic in _PHASE_AND_COMMAND}
-        self._loop_clock = LoopClock(self.common.tick_ns, paced=not self.lockstep)
-        self._command_watch = CommandWatch(self.parameters)
-        self._answer_watch = AnswerWatch(self.parameters)
+        self._loop_clock = LoopClock(
+            self.common.tick_ns, paced=not self.lockstep, catch_up_s=self.parameters.catch_up
+        )
+        self._command_watchdog = CommandWatchdog(self.parameters)
+        self._answer_watchdog = AnswerWatchdog(self.parameters)
         self.run_state = int(RunState.WAITING)
         self._configured_anew = self.runs > 0
         self._wait_for_others()
@@ -90,24 +93,19 @@ class PlantNode(GraphNode[PlantParameters]):
     def on_matched(self) -> None:
         """Say what robot and deputy these are; the run begins when the other nodes are ready too."""
         if self._configured_anew:
-            self._configured_anew, self.finished = False, True
+            self._configured_anew, self.membership.finished = False, True
             self.restart()  # the others may still know of a run before
         elif not self.runs:
             self._describe()
         self._begin_if_ready()
 
-    def diagnostic_values(self) -> dict[str, object]:
-        """Return how far the run is and which joints were saturated."""
-        saturated = {f"saturated_{k}": v for k, v in self._plant.saturated_ticks.items() if v}
-        return {"tick": self._plant.tick, "holder": self._plant.deputy.holder or "none", **saturated}
-
-    def diagnosis(self) -> tuple[int, str]:
-        """Return how well real time is kept."""
-        return self._loop_clock.diagnosis
-
-    def diagnostic_stamp_ns(self) -> int:
-        """Return simulation time."""
-        return self._plant.stamp_ns
+    def report(self) -> NodeReport:
+        """Return how far the run is, which joints were saturated, and how well real time is kept."""
+        values: dict[str, object] = {"tick": self._plant.tick, "holder": self._plant.deputy.holder or "none"}
+        if self._loop_clock.skipped_s:
+            values["skipped_s"] = self._loop_clock.skipped_s
+        values.update({f"saturated_{k}": v for k, v in self._plant.saturated_ticks.items() if v})
+        return NodeReport(self._plant.stamp_ns, values, *self._loop_clock.diagnosis)
 
     def activate(self) -> None:
         """Begin, or go on at the tick where the plant was deactivated."""
@@ -120,7 +118,7 @@ class PlantNode(GraphNode[PlantParameters]):
 
     def deactivate(self) -> None:
         """Hold the run at this tick."""
-        self.inputs.close(drop=False)
+        self.inputs.loop.close(drop=False)
         if self.run_state == RunState.RUNNING:
             self.enter(RunState.PAUSED, "deactivated")
         gc.enable()
@@ -139,13 +137,13 @@ class PlantNode(GraphNode[PlantParameters]):
         clock = self._loop_clock
         left_s = clock.wait_s() - self.parameters.busy_wait
         if left_s > 0.0:
-            self.inputs.spin_once(executor, left_s)
+            self.inputs.loop.spin_once(executor, left_s)
             return
-        self.inputs.look(executor)
+        self.inputs.loop.spin_some(executor)
         if clock.due():
             self._give_last_turns()
             self._tick_now()
-            self.inputs.give_turn(executor)
+            self.inputs.loop.give_turn(executor)
 
     @property
     def awaited(self) -> str:
@@ -165,10 +163,10 @@ class PlantNode(GraphNode[PlantParameters]):
         names = [GRASP_EVENT, ROBOT_DESCRIPTION, DEPUTY_MARKER, RUN_STATE, LOOP_TIMING]
         self._publish = {name: self.endpoints.publisher(name) for name in names}
         self._outputs = PlantOutputs(self.robot, self.endpoints.publisher, lockstep=self.lockstep)
-        self.receive(TASK_PHASE, self._on_phase, self._phase_wire.checked)
-        self.receive(JOINT_COMMAND, self._on_command, self._command_wire.checked)
-        self.receive(RUN_RECORDED, self._on_recorded, stamped)
-        self.hear(RUN_READY, String, self._on_ready)
+        self.inputs.subscribe(TASK_PHASE, self._on_phase, self._phase_codec.checked)
+        self.inputs.subscribe(JOINT_COMMAND, self._on_command, self._command_codec.checked)
+        self.inputs.subscribe(RUN_RECORDED, self._on_recorded, stamped)
+        self.inputs.subscribe_news(RUN_READY, String, self._on_ready)
         self._control = RunControl(self, self)
 
     # The start of a run
@@ -180,9 +178,9 @@ class PlantNode(GraphNode[PlantParameters]):
 
     def _begin_if_ready(self) -> None:
         """Begin the run once the plant is active and has matched, and every node is ready."""
-        if self.run_state != RunState.WAITING or not self.active or not self.has_matched:
+        if self.run_state != RunState.WAITING or not self.active or not self.membership.has_matched:
             return
-        if self.endpoints.unmatched or not self._waiting_for <= self.endpoints.silent(RUN_READY):
+        if self.endpoints.unmatched or not self._waiting_for <= self.endpoints.not_publishing(RUN_READY):
             return
         if self.runs:
             self._describe()
@@ -202,7 +200,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self._waiting_for = set(self.common.peers) - {PLANT}
         self._last_tick, self._failed_phase = self.common.last_tick(self._end_ns), ""
         self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
-        self._command_watch.reset()
+        self._command_watchdog.reset()
         self._needed: tuple[str, ...] = _PHASE_AND_COMMAND  # what completes this tick; the last comes last
         self._recorded_ns = 0
         self._silent_tick = -1
@@ -235,7 +233,7 @@ class PlantNode(GraphNode[PlantParameters]):
         """End the run as failed if nothing has answered this tick for too long (lock step)."""
         waits = self.active and not self._control.holds
         stamp = self._plant.stamp_ns if waits else None
-        event = self._answer_watch.look(stamp, self.awaited, monotonic())
+        event = self._answer_watchdog.poll(stamp, self.awaited, monotonic())
         if event is not None:
             self.events.publish(event)
             self.finish(event.detail, RunState.FAILED)
@@ -302,17 +300,28 @@ class PlantNode(GraphNode[PlantParameters]):
         another process gets no more time by this.
         """
         for _ in range(_LAST_TURNS):
-            if self._command.stamp_ns == self._plant.stamp_ns or not self.inputs.poll():
+            if self._command.stamp_ns == self._plant.stamp_ns or not self.inputs.loop.poll():
                 return
 
     def _tick_now(self) -> None:
         """Integrate one tick with the last command that came (real time)."""
         self._loop_clock.ticked(held=self._command.stamp_ns != self._plant.stamp_ns)
-        command, event = self._command_watch.look(self._command, self._plant.stamp_ns)
+        command, event = self._command_watchdog.poll(self._command, self._plant.stamp_ns)
         self._plant.step(command)
         self._publish_state()
         if event is not None:
             self.events.publish(event)
+        if skipped_s := self._loop_clock.take_skipped():
+            detail = "the plant was too far behind the wall clock; simulated time stays behind by as much"
+            self.events.report(
+                RESYNCHRONISED,
+                Severity.WARNING,
+                detail,
+                self._plant.stamp_ns,
+                value=skipped_s,
+                limit=self.parameters.catch_up,
+                unit="s of wall time",
+            )
         if self._plant.tick >= self._last_tick:
             self._end_task()
 
@@ -341,9 +350,8 @@ class PlantNode(GraphNode[PlantParameters]):
         """Say that this run is over and the next is to begin, and go back to time zero."""
         self.enter(RunState.WAITING, "reset")
         if not self.finished:
-            self.publish_diagnostics()
-            self.publish_counts()
-        self.finished = False
+            self.membership.end()
+        self.membership.finished = False
         self._control.reset_run()
         self._plant.reset()
         self._inputs.reset_run()
@@ -351,23 +359,22 @@ class PlantNode(GraphNode[PlantParameters]):
             order.reset()
         self._loop_clock.reset()
         self._wait_for_others()
-        self.look_again()
+        self.membership.rejoin()
 
     def _end_task(self) -> None:
         """End the run where the task has ended."""
         if self._failed_phase:
             self.finish(f"phase {self._failed_phase!r} has failed", RunState.FAILED)
         else:
-            self.finish("the whole run is done")
+            self.finish("run complete")
 
     def finish(self, detail: str, state: int = RunState.FINISHED) -> None:
         """Say that the run is over, and what real time has cost; every node then tells its counts."""
         if not self.lockstep and self._loop_clock.misses:
             detail = f"{detail}; {self._loop_clock.misses}"
-        self.finished = True
+        self.membership.finished = True
         self.enter(state, detail)
-        self.publish_diagnostics()
-        self.publish_counts()
+        self.membership.end()
 
     def enter(self, state: int, detail: str) -> None:
         """Change the state of the run, with the clock of the loop, and tell everybody."""

@@ -40,11 +40,12 @@ from sms_handover.nodes.parts.peer_parameters import PeerParameters
 from sms_handover.ros.codecs.convert import time_message
 from sms_handover.ros.codecs.loop_messages import PoseCodec, Stamped, StateCodec, decoded, stamped, state_of
 from sms_handover.ros.message_types import message_class
+from sms_handover.ros.node.diagnostics import NodeReport
 from sms_handover.ros.node.graph_node import GraphNode
-from sms_handover.ros.node.message_filter import Read, Receive
+from sms_handover.ros.node.message_filter import Decode, OnMessage
 from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, Stop, run_node
 from sms_handover.ros.qos import LOSSLESS, profile_of, stored, weakest
-from sms_handover.ros.transport.inputs import Deliver
+from sms_handover.ros.transport.inputs import OnSerialized
 from sms_handover.ros.transport.publisher_identity import PublisherIdentity
 from sms_handover.ros.transport.stamp_sync import StampSync
 from sms_handover.simulation.parameters import LOCKSTEP
@@ -85,12 +86,12 @@ class RecorderNode(GraphNode[RecorderParameters]):
             self._poll_s = _LOCKSTEP_POLL_S
         self._others = [peer for peer in self.common.peers if peer != RECORDER]
         self._peer_parameters = PeerParameters(self, self.common.peers)
-        self._state_wire = StateCodec(self.robot.joint_names, WORLD, BASE)
-        self._pose_wire = PoseCodec(WORLD)
+        self._state_codec = StateCodec(self.robot.joint_names, WORLD, BASE)
+        self._pose_codec = PoseCodec(WORLD)
         self._tf: StampSync[Any] = StampSync(_BEHIND)
         self._links = LinkTree(self.robot)
         frames = [*self._links.frames, (WORLD, DEPUTY)]
-        self._tf_wire = TransformsCodec(self._recordings.types, frames)
+        self._tf_codec = TransformsCodec(self._recordings.types, frames)
         self._topics: set[str] = set()
         self._recorded = self.endpoints.publisher(RUN_RECORDED)
         self._take_over(self._recordings.current)
@@ -112,10 +113,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
         """Return how far the process stands back behind others, as its parameter says."""
         return self.parameters.niceness
 
-    def settle(self) -> None:
-        """Do nothing: processor and priority are for the nodes of the loop, before this one."""
-
-    def prepared(self) -> bool:
+    def is_ready(self) -> bool:
         """Whether a bag is open, and the parameters of every node have been written into it."""
         if not self._run_is_over and not self._described and self._peer_parameters.poll():
             self._recording.describe(parameters=self._peer_parameters.values)
@@ -126,29 +124,22 @@ class RecorderNode(GraphNode[RecorderParameters]):
         """Keep in mind that the bag is to be closed when all of the run has come."""
         self._run_is_over, self._described = True, False
 
-    def on_end(self) -> None:
-        """Do nothing: the recorder ends when everything has come."""
-
     @property
     def counts(self) -> dict[str, int]:
         """Return the number of messages recorded so far, by topic."""
         return self._recording.writer.message_counts
 
-    def diagnostic_values(self) -> dict[str, object]:
+    def report(self) -> NodeReport:
         """Return how much has been recorded."""
-        counts = self.counts
-        return {"messages": sum(counts.values()), "topics": len(counts)}
-
-    def diagnostic_stamp_ns(self) -> int:
-        """Return the newest simulation time recorded."""
-        return self._recording.simulation_ns
+        values = {"messages": sum(self.counts.values()), "topics": len(self.counts)}
+        return NodeReport(self._recording.simulation_ns, values)
 
     def run(self, executor: Executor, stop: Stop) -> int:
         """Record until the run is over and everything has come, or until asked to stop; close the bag."""
         try:
-            while self.goes_on(stop) and not (self.finished and self._drained()):
+            while self.should_run(stop) and not (self.finished and self._drained()):
                 self.turn(executor)
-                self.look_for_news()
+                self.inputs.poll_news()
             if stop.asked and self.active:
                 self._take_the_rest(executor)
         finally:
@@ -163,7 +154,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
     def turn(self, executor: Executor) -> None:
         """Record what has come; between two runs, go on with the next bag."""
         executor.spin_once(timeout_sec=self._poll_s)
-        nothing = not self.inputs.poll()
+        nothing = not self.inputs.loop.poll()
         if not self.active:
             return
         self._flush(idle=nothing and monotonic() - self._last_message > _POLL_S)
@@ -207,7 +198,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
 
     def _drained(self) -> bool:
         """Whether nothing is to be expected any more of a run that is over."""
-        silent = self.endpoints.silent(RUN_PUBLISHED)
+        silent = self.endpoints.not_publishing(RUN_PUBLISHED)
         if (self._reported | silent).issuperset(self._others) and self._recording.ledger.complete:
             return True
         return monotonic() - self._last_message > self.parameters.drain_timeout
@@ -215,7 +206,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
     def _take_the_rest(self, executor: Executor) -> None:
         """Take what is on the way when the recorder is asked to stop; a graph that goes on is left alone."""
         begin = self._last_message = monotonic()
-        while self.inputs.poll() or monotonic() - self._last_message < _QUIET_S:
+        while self.inputs.loop.poll() or monotonic() - self._last_message < _QUIET_S:
             if monotonic() - begin > _REST_S:
                 break
             executor.spin_once(timeout_sec=_POLL_S)
@@ -232,26 +223,28 @@ class RecorderNode(GraphNode[RecorderParameters]):
         evenly = self.common.mode == LOCKSTEP or topic.publishers == (PLANT,)
         self._open(name, topic.type, profile, periods.get(topic.rate, 0) if evenly else 0)
         receive = self._receive_anyway if topic.rate is Rate.WALL else self._receive
-        self.endpoints.receive(topic.name, self.inputs, self._then(topic, partial(receive, name)))
+        self.endpoints.subscribe_serialized(
+            topic.name, self.inputs.loop, self._then(topic, partial(receive, name))
+        )
 
-    def _then(self, topic: Topic, record: Receive[bytes]) -> Deliver:
+    def _then(self, topic: Topic, record: OnMessage[bytes]) -> OnSerialized:
         """Return what records every message, good or bad, and then uses the good ones for what needs them."""
         add_to_tf = partial(self._add_to_tf, topic.name)
-        uses: dict[str, tuple[Receive[Any], Read[Any]]] = {
+        uses: dict[str, tuple[OnMessage[Any], Decode[Any]]] = {
             JOINT_STATES: (self._follow, stamped),
             RUN_PUBLISHED: (self._note_counts, lambda data: decoded(data, PublishedCounts)),
-            SAMPLED_JOINT_STATES: (add_to_tf, self._state_wire.joints.checked),
-            SAMPLED_BASE_ODOMETRY: (add_to_tf, self._state_wire.odometry.checked),
-            DEPUTY_POSE: (add_to_tf, self._pose_wire.checked),
+            SAMPLED_JOINT_STATES: (add_to_tf, self._state_codec.joints.checked),
+            SAMPLED_BASE_ODOMETRY: (add_to_tf, self._state_codec.odometry.checked),
+            DEPUTY_POSE: (add_to_tf, self._pose_codec.checked),
         }
-        use = self.refusals.guarding(topic.name, *uses[topic.name]) if topic.name in uses else None
+        use = self.message_filter.wrap(topic.name, *uses[topic.name]) if topic.name in uses else None
 
         def receive(data: bytes, sent_ns: int) -> None:
             record(data, sent_ns)
             if use is not None:
                 use(data, sent_ns, b"")
 
-        sender = None if topic.name.startswith("/") else self.endpoints.sender(topic.name)
+        sender = None if topic.name.startswith("/") else self.endpoints.identity(topic.name)
         if sender is None:
             return lambda data, sent_ns, publisher: receive(data, sent_ns)
 
@@ -273,7 +266,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
             if publisher and publisher not in sender.own:
                 decoded(data, message_class(topic.type))
         except MessageError as error:
-            self.refusals.add(topic.name, error)
+            self.message_filter.reject(topic.name, error)
             return False
         return True
 
@@ -313,7 +306,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
     def _add_to_tf(self, topic: str, message: Stamped[Any], sent_ns: int) -> None:
         """Keep a message, and when its companions are there too record the transforms that follow."""
         stamp, content = message
-        if self._tf.begins_anew(stamp):
+        if self._tf.restarts_run(stamp):
             self._tf.reset()
         self._tf.add(stamp, topic, content)
         inputs = self._tf.take(stamp, _TF_INPUTS)
@@ -322,7 +315,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
         state = state_of(stamp, inputs[SAMPLED_JOINT_STATES], inputs[SAMPLED_BASE_ODOMETRY])
         poses = self._links.poses(state.base_in_world, state.joint_position)
         poses.append(inputs[DEPUTY_POSE])
-        self._recording.receive_at(TF, self._tf_wire.pack(stamp, poses), stamp, sent_ns)
+        self._recording.receive_at(TF, self._tf_codec.pack(stamp, poses), stamp, sent_ns)
 
     def _look_for_topics(self) -> None:
         """Record topics beyond the graph, with the quality of service that their publishers offer."""

@@ -39,9 +39,10 @@ from sms_handover.ros.codecs.loop_messages import (
     state_of,
 )
 from sms_handover.ros.codecs.task_phase import PhaseCodec
+from sms_handover.ros.node.diagnostics import NodeReport
 from sms_handover.ros.node.endpoints import CountedPublisher
 from sms_handover.ros.node.graph_node import GraphNode
-from sms_handover.ros.node.message_filter import Receive
+from sms_handover.ros.node.message_filter import OnMessage
 from sms_handover.ros.process.main import run_node
 from sms_handover.ros.transport.stamp_sync import StampSync
 from sms_handover.simulation.feasibility import check_feasibility
@@ -69,15 +70,15 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         schedule = load_task(self.common, self.robot)
         check_feasibility(Scenario(_for_any_plant(load_parameters()), self.robot, schedule))
         self._generator = TrajectoryGenerator(self.robot, schedule, self.parameters)
-        self._reference_wire = JointStateCodec(self.robot.joint_names, ("position", "velocity"))
-        self._pose_wire, self._phase_wire = PoseCodec(WORLD), PhaseCodec()
+        self._reference_codec = JointStateCodec(self.robot.joint_names, ("position", "velocity"))
+        self._pose_codec, self._phase_codec = PoseCodec(WORLD), PhaseCodec()
         self._lockstep = self.common.mode == LOCKSTEP
         ahead_ns = self.common.reference_ns if self._lockstep else NS_PER_S
         self._inputs: StampSync[Any] = StampSync(ahead_ns=ahead_ns, paced=not self._lockstep)
         self._stamp_ns = self._newest_ns = self._asked_ns = 0
         self._answer: list[tuple[CountedPublisher, bytes]] = []
         self._failures = self._overdue = 0
-        self._solver = self.inputs.asker(SolveIK, SOLVE_IK, self._on_solution)
+        self._solver = self.inputs.loop.create_client(SolveIK, SOLVE_IK, self._on_solution)
         self._names = list(self.robot.joint_names)
         self._request = SolveIK.Request()  # filled anew each time: most of it never changes
         self._request.seed.name = self._names
@@ -86,15 +87,15 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._ik_status = self.endpoints.publisher(IK_STATUS)
         self._reference = self.endpoints.publisher(JOINT_REFERENCE)
         self._targets = {arm: self.endpoints.publisher(target_pose(arm)) for arm in self.robot.arms}
-        self.receive(GRASP_EVENT, self._on_grasp, stamped)
+        self.inputs.subscribe(GRASP_EVENT, self._on_grasp, stamped)
         state = StateCodec(self.robot.joint_names, WORLD, BASE)
-        self.receive(SAMPLED_JOINT_STATES, self._taker(SAMPLED_JOINT_STATES), state.joints.checked)
-        self.receive(SAMPLED_BASE_ODOMETRY, self._taker(SAMPLED_BASE_ODOMETRY), state.odometry.checked)
-        self.receive(DEPUTY_POSE, self._taker(DEPUTY_POSE), self._pose_wire.checked)
+        checks = (state.joints.checked, state.odometry.checked, self._pose_codec.checked)
+        for topic, checked in zip(_INPUTS, checks, strict=True):
+            self.inputs.subscribe(topic, self._taker(topic), checked)
 
-    def prepared(self) -> bool:
+    def is_ready(self) -> bool:
         """Whether the IK service is there."""
-        return self._solver.ready()
+        return self._solver.service_is_ready()
 
     def reset_run(self) -> None:
         """Forget the run: phases, what waits of it, and the question that is under way."""
@@ -105,13 +106,10 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._answer = []
         self._asked = None
 
-    def diagnostic_values(self) -> dict[str, object]:
+    def report(self) -> NodeReport:
         """Return how many references were given and how many IK requests did not converge."""
-        return {"references": self._reference.count, "ik_not_converged": self._failures}
-
-    def diagnostic_stamp_ns(self) -> int:
-        """Return the stamp of the last reference."""
-        return self._stamp_ns
+        values = {"references": self._reference.count, "ik_not_converged": self._failures}
+        return NodeReport(self._stamp_ns, values)
 
     @property
     def awaited(self) -> str:
@@ -123,13 +121,13 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         stamp = self._inputs.oldest_ns
         return (self._inputs.missing(stamp, _INPUTS) if stamp is not None else "") or DEPUTY_POSE
 
-    def _taker(self, topic: str) -> Receive[Stamped[Any]]:
+    def _taker(self, topic: str) -> OnMessage[Stamped[Any]]:
         """Return the callback of a topic."""
         return lambda content, sent_ns: self._take(topic, *content)
 
     def _take(self, topic: str, stamp: int, content: Any) -> None:
         """Take one input; time zero behind a later time begins the run anew."""
-        if self._inputs.begins_anew(stamp):
+        if self._inputs.restarts_run(stamp):
             self._inputs.reset()
             self._generator.reset()
         if topic == DEPUTY_POSE and self._asked is not None:
@@ -181,7 +179,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         for message, pose in zip(request.tool_in_world, poses, strict=True):
             set_pose(message, pose)
         self._asked, self._asked_ns = (state, phase, targets), state.stamp_ns
-        self._solver.ask(request)
+        self._solver.call(request)
 
     def _ask_again(self, stamp: int) -> None:
         """Repeat a request that has no answer when the plant asks again or, in real time, after a second.
@@ -191,7 +189,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         if stamp == self._stamp_ns or stamp - self._asked_ns > NS_PER_S:
             self._asked_ns = stamp
             self._overdue += 1
-            self._solver.ask(self._request)
+            self._solver.call(self._request)
 
     def _on_solution(self, answer: Any) -> None:
         """Publish the reference that follows from a solution, converged or not."""
@@ -216,10 +214,10 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         """Publish phase, reference and targets of one period; what the loop waits for goes first."""
         reference, targets_in_world = self._generator.reference(state, targets, joints)
         position, velocity = reference.position, reference.velocity
-        packed = self._reference_wire.pack(state.stamp_ns, position=position, velocity=velocity)
-        self._answer = [(self._phase, self._phase_wire.pack(phase)), (self._reference, packed)]
+        packed = self._reference_codec.pack(state.stamp_ns, position=position, velocity=velocity)
+        self._answer = [(self._phase, self._phase_codec.pack(phase)), (self._reference, packed)]
         for arm, pose in targets_in_world.items():
-            data = self._pose_wire.pack(state.stamp_ns, pose_row(pose))
+            data = self._pose_codec.pack(state.stamp_ns, pose_row(pose))
             self._answer.append((self._targets[arm], data))
         self._publish_again()
 

@@ -28,7 +28,7 @@ from sms_handover.ros.codecs.events import read_grasp_event
 from sms_handover.ros.codecs.loop_messages import PoseCodec, Stamped, StateCodec, stamped, state_of
 from sms_handover.ros.codecs.task_phase import PhaseCodec
 from sms_handover.ros.message_types import message_class
-from sms_handover.ros.node.message_filter import MessageFilter, Read, Receive
+from sms_handover.ros.node.message_filter import Decode, MessageFilter, OnMessage
 from sms_handover.ros.parameters import declare, reject_unknown
 from sms_handover.ros.process.main import EXIT_OK, RunnableNode, Stop, run_node
 from sms_handover.ros.qos import LATCHED
@@ -65,9 +65,9 @@ class ViewerNode(RunnableNode):
         self._deputy_size: tuple[float, ...] = ()
         self._scene: LiveScene | None = None
         self._inputs: StampSync[Any] = StampSync()
-        self.refusals = MessageFilter(self.get_logger().warning, lambda topic, error: None)
-        self._pose_wire = PoseCodec(WORLD)
-        self._state_wire: StateCodec | None = None  # known with the robot
+        self.message_filter = MessageFilter(self.get_logger().warning, lambda topic, error: None)
+        self._pose_codec = PoseCodec(WORLD)
+        self._state_codec: StateCodec | None = None  # known with the robot
         self._shown_ns = -1  # stamp of what is shown
         self._wanted: tuple[str, ...] = (SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
         self._listen(ROBOT_DESCRIPTION, self._on_robot, LATCHED)
@@ -102,9 +102,9 @@ class ViewerNode(RunnableNode):
         """Take the messages of a topic of the graph as they come."""
         self.create_subscription(self._kind(name), name, take, profile)
 
-    def _take(self, name: str, take: Receive[T], read: Read[T], profile: QoSProfile) -> None:
+    def _take(self, name: str, take: OnMessage[T], read: Decode[T], profile: QoSProfile) -> None:
         """Take what is in the good messages of a topic of the graph; the others are counted and told."""
-        deliver = self.refusals.guarding(name, take, read)
+        deliver = self.message_filter.wrap(name, take, read)
 
         def callback(data: Any) -> None:
             deliver(data, 0, b"")
@@ -139,7 +139,7 @@ class ViewerNode(RunnableNode):
         except SmsHandoverError as error:
             self.get_logger().error(f"the robot cannot be shown: {error}")
             return
-        self._state_wire = StateCodec(self._scene.joint_names, WORLD, BASE)
+        self._state_codec = StateCodec(self._scene.joint_names, WORLD, BASE)
         targets = tuple(target_pose(arm) for arm in self._arms)
         self._wanted += targets
         for name in targets:
@@ -157,14 +157,14 @@ class ViewerNode(RunnableNode):
 
     def _add(self, name: str, message: Stamped[bytes], sent_ns: int) -> None:
         """Keep what is in a good message until all of its stamp are there, then show them."""
-        scene, wire = self._scene, self._state_wire
-        if scene is None or wire is None:
+        scene, codec = self._scene, self._state_codec
+        if scene is None or codec is None:
             return
-        reads: dict[str, Read[Stamped[Any]]] = {
-            SAMPLED_JOINT_STATES: wire.joints.checked,
-            SAMPLED_BASE_ODOMETRY: wire.odometry.checked,
+        reads: dict[str, Decode[Stamped[Any]]] = {
+            SAMPLED_JOINT_STATES: codec.joints.checked,
+            SAMPLED_BASE_ODOMETRY: codec.odometry.checked,
         }
-        stamp_ns, content = reads.get(name, self._pose_wire.checked)(message[1])
+        stamp_ns, content = reads.get(name, self._pose_codec.checked)(message[1])
         if stamp_ns < self._shown_ns:  # another run, or a playback that goes back
             self._inputs.reset()
             self._shown_ns = stamp_ns

@@ -19,7 +19,7 @@ def test_events_of_every_severity_reach_even_who_comes_late(bench: Bench) -> Non
     plant = bench.plain("plant")
     events = EventPublisher(plant, Endpoints(plant, TOPICS, ()).publisher(RUN_EVENTS))
     for number, severity in enumerate((*Severity, *Severity)):
-        events.tell("made_up", severity, "a test", number, phase="carry", value=2.0, limit=1.0, unit="s")
+        events.report("made_up", severity, "a test", number, phase="carry", value=2.0, limit=1.0, unit="s")
     heard: list[RunEvent] = []
     ear = Endpoints(bench.plain("ear"), TOPICS, ())
     ear.subscribe(RUN_EVENTS, lambda message: heard.append(run_event(message)))

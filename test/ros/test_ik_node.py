@@ -88,7 +88,7 @@ def test_answer_is_that_of_the_solver_bit_for_bit(asker: Asker) -> None:
         expected.position_error,
         expected.limit_margin,
     )
-    assert asker.node.diagnostic_values()["converged"] == 1
+    assert asker.node.report().values["converged"] == 1
 
 
 def test_seed_is_matched_by_name(asker: Asker) -> None:
@@ -124,7 +124,7 @@ def test_a_stall_is_told(bench: Bench) -> None:
     assert answer.valid
     assert answer.status.status == IkStatusMessage.STALLED
     assert answer.message == IkStatus.STALLED.value
-    assert asker.node.diagnostic_values()["stalled"] == 1
+    assert asker.node.report().values["stalled"] == 1
 
 
 Spoil = Callable[[Any], None]
@@ -215,7 +215,7 @@ def test_a_malformed_request_is_refused_with_the_reason(asker: Asker, spoil: Spo
     assert MALFORMED[spoil] in answer.message
     assert "\n" not in answer.message
     assert len(answer.solution.position) == 0
-    assert asker.node.diagnostic_values()["refused"] == 1
+    assert asker.node.report().values["refused"] == 1
     good = asker.ask(asker.request(arm_a=asker.near("arm_a", np.array([0.01, 0.0, 0.0]))))
     assert good.valid and good.status.status == IkStatusMessage.CONVERGED
 

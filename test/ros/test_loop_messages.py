@@ -144,10 +144,10 @@ def test_joint_state_has_the_bytes_of_rosbags(blocks: tuple[str, ...], stamp: in
 def test_names_of_any_length_keep_the_alignment(length: int) -> None:
     names = tuple(f"{number}".rjust(length, "j") for number in range(3))
     values = {block: numbers(3, seed) for seed, block in enumerate(BLOCKS)}
-    wire = JointStateCodec(names, BLOCKS)
-    packed = wire.pack(5, **values)
+    codec = JointStateCodec(names, BLOCKS)
+    packed = codec.pack(5, **values)
     assert packed == joint_state(names, values, 5)
-    read = wire.read(packed)
+    read = codec.read(packed)
     assert all(same_bits(read[block], values[block]) for block in BLOCKS)
 
 
@@ -168,19 +168,19 @@ def test_own_messages_are_read_by_the_template(
 ) -> None:
     no_general_path(monkeypatch)
     values = {block: numbers(len(JOINTS), seed) for seed, block in enumerate(blocks)}
-    wire = JointStateCodec(JOINTS, blocks)
-    read = wire.read(wire.pack(3, **values))
+    codec = JointStateCodec(JOINTS, blocks)
+    read = codec.read(codec.pack(3, **values))
     assert list(read) == list(blocks)
     assert all(same_bits(read[block], values[block]) for block in blocks)
     assert not any(array.flags.writeable for array in read.values())
 
 
 def test_packing_leaves_nothing_behind() -> None:
-    wire = JointStateCodec(JOINTS, BLOCKS)
+    codec = JointStateCodec(JOINTS, BLOCKS)
     first = {block: numbers(14, seed) for seed, block in enumerate(BLOCKS)}
-    before = wire.pack(7, **first)
-    wire.pack(8, **{block: np.zeros(14) for block in BLOCKS})
-    assert wire.pack(7, **first) == before
+    before = codec.pack(7, **first)
+    codec.pack(8, **{block: np.zeros(14) for block in BLOCKS})
+    assert codec.pack(7, **first) == before
 
 
 @pytest.mark.parametrize("order", list(permutations(range(3))))
@@ -256,13 +256,13 @@ def test_one_block_is_never_taken_for_another(
     """A message of other blocks may happen to be as long as the template, with bytes behind its end."""
     values = {block: np.arange(14.0) + 100.0 * BLOCKS.index(block) for block in sent}
     data = joint_state(JOINTS, values) + bytes(trailing)
-    wire = JointStateCodec(JOINTS, wanted)
+    codec = JointStateCodec(JOINTS, wanted)
     if set(wanted) <= set(sent):
-        read = wire.read(data)
+        read = codec.read(data)
         assert all(same_bits(read[block], values[block]) for block in wanted)
     else:
         with pytest.raises(GraphError, match="14 names and 0 values"):
-            wire.read(data)
+            codec.read(data)
 
 
 # Odometry
@@ -291,8 +291,8 @@ def test_rclpy_reads_the_odometry() -> None:
 def test_own_odometry_is_read_by_the_template(monkeypatch: pytest.MonkeyPatch) -> None:
     no_general_path(monkeypatch)
     pose, twist = numbers(7, 1), numbers(6, 2)
-    wire = OdometryCodec("world", "base_link")
-    read_pose, read_twist = wire.read(wire.pack(8, pose, twist))
+    codec = OdometryCodec("world", "base_link")
+    read_pose, read_twist = codec.read(codec.pack(8, pose, twist))
     assert same_bits(read_pose, pose)
     assert same_bits(read_twist, twist)
 
@@ -367,8 +367,8 @@ def test_numbers_that_do_not_fill_a_message_are_refused(size: int) -> None:
 def test_a_state_comes_back_bit_for_bit() -> None:
     pose, twist, joints = numbers(7, 1), numbers(6, 2), [numbers(14, seed) for seed in range(3)]
     state = RobotState.of(61_234_567_890, Pose(pose[:3], pose[3:]), Twist(twist[:3], twist[3:]), *joints)
-    wire = StateCodec(JOINTS, "world", "base_link")
-    read = wire.read(*wire.pack(state))
+    codec = StateCodec(JOINTS, "world", "base_link")
+    read = codec.read(*codec.pack(state))
     assert read.stamp_ns == state.stamp_ns
     for name in ("joint_position", "joint_velocity", "joint_effort"):
         assert same_bits(getattr(read, name), getattr(state, name))

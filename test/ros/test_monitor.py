@@ -31,7 +31,7 @@ from sms_handover.ros.codecs.convert import (
     phase_message,
     run_event_message,
 )
-from sms_handover.ros.node.graph_node import INPUTS
+from sms_handover.ros.node.node_inputs import INPUTS
 from sms_handover.ros.qos import LATCHED, LOSSLESS
 from sms_handover.ros.transport.inputs import ExecutorInputs, Inputs
 from sms_handover.simulation.parameters import DIRECT
@@ -106,9 +106,9 @@ def test_progress_is_followed(graph: FakeGraph) -> None:
     phase = phase_message(TaskPhase(40_000_000, 1, "carry"))
     graph.until(lambda: progress.phase == "carry", "the phase", (TASK_PHASE, phase))
     assert progress.stamp_ns == 40_000_000
-    graph.state(RunState.FINISHED, 50_000_000, "the whole run is done")
+    graph.state(RunState.FINISHED, 50_000_000, "run complete")
     graph.until(lambda: graph.monitor.finished, "the end")
-    assert (progress.stamp_ns, progress.detail) == (50_000_000, "the whole run is done")
+    assert (progress.stamp_ns, progress.detail) == (50_000_000, "run complete")
 
 
 def test_a_failed_run_is_over_too(graph: FakeGraph) -> None:

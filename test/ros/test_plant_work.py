@@ -58,7 +58,7 @@ class Loop:
             self.plant._on_phase(self._phase.checked(phase), 0)
         command = self._command.pack(tick * TICK_NS, effort=np.zeros(14))
         self.plant._on_command(self._command.checked(command), 0)
-        assert self.plant.diagnostic_stamp_ns() == (tick + 1) * TICK_NS
+        assert self.plant._plant.stamp_ns == (tick + 1) * TICK_NS
 
 
 @pytest.fixture

@@ -91,7 +91,7 @@ def test_a_solution_that_has_not_converged_is_used_and_counted(bench: Bench) -> 
     graph.run()
     trajectory = graph.nodes["trajectory"]
     assert isinstance(trajectory, TrajectoryNode)
-    told = trajectory.diagnostic_values()
+    told = trajectory.report().values
     assert told["ik_not_converged"] == told["references"] == len(graph.heard[JOINT_REFERENCE])
     assert {status.status for status in Messages().of(graph, IK_STATUS)} == {2}
 
@@ -138,7 +138,7 @@ def test_a_request_without_an_answer_is_repeated(
     graph = Graph(bench, {"plant": {"resend_after": 0.05}, "common": {"transport": transport}})
     trajectory = graph.nodes["trajectory"]
     assert isinstance(trajectory, TrajectoryNode)
-    ask, asked = trajectory._solver.ask, count()
+    ask, asked = trajectory._solver.call, count()
 
     def ask_badly(request: Any) -> None:
         if next(asked) != 3:
@@ -147,7 +147,7 @@ def test_a_request_without_an_answer_is_repeated(
             ask(request)
             trajectory._ask_again(trajectory._stamp_ns)
 
-    monkeypatch.setattr(trajectory._solver, "ask", ask_badly)
+    monkeypatch.setattr(trajectory._solver, "call", ask_badly)
     graph.run()
     schedule = {"common": {"schedule": str(bench.folder / "schedule.yaml")}}
     expected = simulate(load_scenario(schedule))

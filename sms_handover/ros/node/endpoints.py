@@ -1,4 +1,4 @@
-"""The publishers and subscriptions of a node, made from the table of topics and counted."""
+"""Endpoints of a node: its publishers and subscriptions, made from the table of topics and counted."""
 
 from collections.abc import Callable, Collection
 from time import monotonic, sleep
@@ -14,17 +14,17 @@ from sms_handover.errors import GraphError
 from sms_handover.graph.topics import RECORDER, Rate, Topic
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.qos import profile_of, serves
-from sms_handover.ros.transport.inputs import Deliver, Inputs
+from sms_handover.ros.transport.inputs import Inputs, OnSerialized
 from sms_handover.ros.transport.publisher_identity import PublisherIdentity
 
 _RclError = rclpy_implementation.RCLError
 
 _RETRY_S = 0.001  # [s] between two tries to publish while a reader is behind
-_PATIENCE_S = 30.0  # [s] after which a reader that takes nothing is given up
+_TIMEOUT_S = 30.0  # [s] after which a reader that takes nothing is given up
 
 
 class Endpoints:
-    """Makes a node's publishers and subscriptions, tells when all have matched, counts what it publishes."""
+    """Makes a node's publishers and subscriptions, finds when all have matched, counts what it publishes."""
 
     def __init__(
         self, node: Node, topics: Collection[Topic], peers: Collection[str], external: Collection[str] = ()
@@ -40,7 +40,7 @@ class Endpoints:
         self._external = frozenset(external) - {node.get_name()}
         self._publishers: dict[str, CountedPublisher] = {}
         self._subscriptions: dict[str, Subscription] = {}
-        self._senders: dict[str, PublisherIdentity] = {}
+        self._identities: dict[str, PublisherIdentity] = {}
 
     def publisher(self, name: str) -> "CountedPublisher":
         """Return a publisher on a topic of the table."""
@@ -49,30 +49,30 @@ class Endpoints:
         self._publishers[name] = CountedPublisher(publisher)
         return self._publishers[name]
 
-    def receive(self, name: str, inputs: Inputs, deliver: Deliver) -> None:
-        """Hand every message of a topic of the table to ``deliver`` by the inputs of a node's loop."""
+    def subscribe_serialized(self, name: str, inputs: Inputs, on_data: OnSerialized) -> None:
+        """Hand every message of a topic of the table to ``on_data`` by the inputs of a node's loop."""
         topic = self._topics[name]
         self._subscriptions[name] = inputs.subscribe(
-            message_class(topic.type), topic.name, profile_of(topic), deliver
+            message_class(topic.type), topic.name, profile_of(topic), on_data
         )
 
-    def sender(self, name: str) -> PublisherIdentity:
-        """Return what knows the publishers of a topic.
+    def identity(self, name: str) -> PublisherIdentity:
+        """Return what knows the publishers of a topic that count.
 
         From now on the endpoints count as unmatched as long as somebody else publishes on the topic.
         """
         several = len(self._topics[name].publishers) > 1
         full_name = self._node.resolve_topic_name(name)
-        self._senders[name] = PublisherIdentity(self._node, full_name, self._peers, several=several)
-        return self._senders[name]
+        self._identities[name] = PublisherIdentity(self._node, full_name, self._peers, several=several)
+        return self._identities[name]
 
     @property
-    def intruders(self) -> list[str]:
+    def other_publishers(self) -> list[str]:
         """Return in words which other nodes publish where one alone is to."""
         return [
             f"the end of node {other!r}, which publishes {name} too"
-            for name, sender in self._senders.items()
-            for other in sender.others
+            for name, identity in self._identities.items()
+            for other in identity.others
         ]
 
     def subscribe(self, name: str, callback: Callable[[Any], None], *, raw: bool = False) -> Subscription:
@@ -105,9 +105,9 @@ class Endpoints:
             found = _found(subscription.get_publisher_count(), serving, writers)
             if found < len(writers):
                 missing.append(f"{found} of {len(writers)} publishers of {name}")
-        return missing + self._absent or self.intruders
+        return missing + self._absent or self.other_publishers
 
-    def silent(self, name: str) -> frozenset[str]:
+    def not_publishing(self, name: str) -> frozenset[str]:
         """Return the external nodes that do not publish on a topic."""
         there = self._node.get_publishers_info_by_topic(self._node.resolve_topic_name(name))
         return self._external - {writer.node_name for writer in there}
@@ -119,7 +119,7 @@ class Endpoints:
             f"the external node {name!r}, which publishes {topic.name}"
             for topic in self._topics.values()
             if topic.rate is Rate.TICK and topic.name not in self._subscriptions
-            for name in sorted(self.silent(topic.name).intersection(topic.publishers))
+            for name in sorted(self.not_publishing(topic.name).intersection(topic.publishers))
         ]
 
     def _wanted(
@@ -157,7 +157,7 @@ class Endpoints:
 def _found(matched: int, there: Collection[TopicEndpointInfo], wanted: Collection[str]) -> int:
     """Return how many of the wanted nodes' endpoints have surely matched.
 
-    Which ones have matched is not told, only how many; so others that are there too, such as those of
+    The middleware tells only how many have matched, not which; so others that are there too, such as those of
     a display, are taken to have matched before the wanted ones.
     """
     names = [endpoint.node_name for endpoint in there]
@@ -195,7 +195,7 @@ class CountedPublisher:
                 self._publisher.publish(message)
             except _RclError as error:
                 begin = begin or monotonic()
-                if monotonic() - begin > _PATIENCE_S:
+                if monotonic() - begin > _TIMEOUT_S:
                     raise GraphError(f"a reader of {self.topic_name} is stuck: {error}") from error
                 sleep(_RETRY_S)
             else:

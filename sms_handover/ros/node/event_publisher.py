@@ -1,4 +1,4 @@
-"""How a node tells what it has decided: on ``run/events``, hence in the bag, and in its log."""
+"""Event publisher: what a node has decided goes to ``run/events``, hence into the bag, and to its log."""
 
 from math import nan
 
@@ -12,7 +12,7 @@ from sms_handover.ros.node.endpoints import CountedPublisher
 class EventPublisher:
     """Publishes events of one node and logs each at its severity.
 
-    The topic is latched and reliable with a bounded history: whoever may decide often counts, and tells
+    The topic is latched and reliable with a bounded history: what may happen often is counted, and reported
     at most once per second.
     """
 
@@ -32,7 +32,7 @@ class EventPublisher:
         else:
             self._log.error(text)
 
-    def tell(
+    def report(
         self,
         kind: str,
         severity: Severity,

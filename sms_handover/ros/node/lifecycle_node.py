@@ -1,6 +1,6 @@
-"""A node of the ROS 2 lifecycle: hooks for what a transition does; an error in one ends the node."""
+"""Lifecycle node of ROS 2: hooks for what a transition does; an error in one ends the node."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from lifecycle_msgs.msg import State
@@ -18,7 +18,7 @@ class LifecycleNode(LifecycleNodeMixin, RunnableNode):
     ``ros2 lifecycle`` and the launcher ask by these services, a node that starts itself by
     :meth:`start`. A node overrides the hooks; what :meth:`configure` makes of publishers, services,
     timers and so on is destroyed when the node is cleaned up. An error in a transition goes by
-    ErrorProcessing to ``finalized``, and :meth:`goes_on` raises it, so that the process ends by it.
+    ErrorProcessing to ``finalized``, and :meth:`should_run` raises it, so that the process ends by it.
     """
 
     def __init__(self, name: str) -> None:
@@ -86,11 +86,11 @@ class LifecycleNode(LifecycleNodeMixin, RunnableNode):
         super().destroy_node()
         self.__dict__.pop("_state_machine", None)
 
-    def keep_company(self, others: tuple["LifecycleNode", ...]) -> None:
-        """Look after other nodes of the same process and thread too."""
-        self._companions = others
+    def accompany(self, others: Sequence[RunnableNode]) -> None:
+        """Run until the other nodes of the same process and thread have been shut down too."""
+        self._companions = tuple(other for other in others if isinstance(other, LifecycleNode))
 
-    def goes_on(self, stop: Stop) -> bool:
+    def should_run(self, stop: Stop) -> bool:
         """Whether the loop is to have another turn; raises the error of a transition that failed.
 
         It ends when it is asked to, or when every node of the process has been shut down.
@@ -137,7 +137,7 @@ class LifecycleNode(LifecycleNodeMixin, RunnableNode):
         return TransitionCallbackReturn.FAILURE
 
     def _on_change_state(self, request: Any, response: Any) -> Any:
-        """Answer a request for a transition; one that this state does not have is refused.
+        """Answer a request for a transition; one that this state does not have is rejected.
 
         rclpy 7.1 lets the error of such a request end the process.
         """
@@ -145,12 +145,12 @@ class LifecycleNode(LifecycleNodeMixin, RunnableNode):
             return self._change_state(request, response)
         except rclpy_implementation.RCLError:
             asked = request.transition.label or request.transition.id
-            self.get_logger().warning(f"refused: no transition {asked!r} leads out of {self.state_name!r}")
+            self.get_logger().warning(f"rejected: no transition {asked!r} leads out of {self.state_name!r}")
             response.success = False
             return response
 
     def _carry_out(self, act: Callable[[], None]) -> TransitionCallbackReturn:
-        """Do what a transition asks; what goes wrong is kept for :meth:`goes_on`, as rclpy drops it."""
+        """Do what a transition asks; what goes wrong is kept for :meth:`should_run`, as rclpy drops it."""
         try:
             act()
         except Exception as error:

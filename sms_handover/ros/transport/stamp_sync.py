@@ -56,7 +56,7 @@ class StampSync(Generic[V]):
         self._begun: set[str] | None = None
         self.dropped = 0
 
-    def begins_anew(self, stamp_ns: int) -> bool:
+    def restarts_run(self, stamp_ns: int) -> bool:
         """Whether a stamp is the start of a run behind inputs taken of a later time.
 
         The start behind the start alone is the same state once more, to which the same answer belongs.
