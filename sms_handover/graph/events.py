@@ -1,7 +1,7 @@
-"""What a node decides by itself and tells everybody: watchdogs, refused inputs, phases done again.
+"""Events of a run: what nodes have decided, such as watchdogs, rejected messages and retried phases.
 
-``docs/watchdogs.md`` has the kinds of events with what leads to each. A kind is a plain word, so that
-a bag with kinds of another version can be read.
+``docs/watchdogs.md`` has the kinds of events and their causes. A kind is a plain word, so that a bag with
+kinds of another version can be read.
 """
 
 from collections.abc import Iterable
@@ -21,7 +21,7 @@ MESSAGE_REFUSED = "refused"
 
 
 class Severity(Enum):
-    """How grave an event is; the value is what a user reads."""
+    """Severity of an event; the value is what a user reads."""
 
     INFO = "info"
     WARNING = "warning"
@@ -54,7 +54,6 @@ class RunEvent:
 
     @property
     def _figures(self) -> list[tuple[str, float]]:
-        """Return the names and values of the figures that there are."""
         figures = [("value", self.value), ("limit", self.limit)]
         return [(name, value) for name, value in figures if not isnan(value)]
 

@@ -1,4 +1,4 @@
-"""The inverse-kinematics service node."""
+"""IK node: the inverse kinematics as a service."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -35,20 +35,20 @@ class IkNode(GraphNode[IkParameters]):
         """Offer the service."""
         self.reset_run()
         self._names = list(self.robot.joint_names)
-        self._response = SolveIK.Response(valid=True)  # filled anew each time: most of it never changes
+        self._response = SolveIK.Response(valid=True)  # refilled each time: most of it never changes
         self._response.solution.name = self._names
         self._response.status.header.frame_id = WORLD
         self.inputs.loop.create_service(SolveIK, SOLVE_IK, self._on_request)
 
     def reset_run(self) -> None:
-        """Forget the run: only counts are kept of it, as a solution rests on its request alone."""
+        """Reset the counts; a solution depends on its request alone."""
         self._solved = dict.fromkeys(IkStatus, 0)
         self._rejected = 0
         self._stamp_ns = 0
 
     @property
     def awaited(self) -> str:
-        """Return the service: nothing else is waited for."""
+        """The service: the node waits for nothing else."""
         return SOLVE_IK
 
     def report(self) -> NodeReport:
@@ -73,7 +73,7 @@ class IkNode(GraphNode[IkParameters]):
         return response
 
     def _question(self, request: Any) -> IkRequest:
-        """Return what a request asks; raises SmsHandoverError or ValueError where it is malformed."""
+        """Return a request as its value; raises SmsHandoverError or ValueError if it is malformed."""
         seed = joints_in_order(self._names, request.seed.name, request.seed.position)
         check_finite(seed, "the seed")
         targets: dict[str, Pose] = {}

@@ -1,7 +1,8 @@
-"""The plant node."""
+"""Plant node: the simulated robot and deputy, and the clock of the loop."""
 
 import gc
 from collections.abc import Sequence
+from functools import partial
 from time import monotonic
 from typing import Any
 
@@ -11,7 +12,6 @@ from sms_handover_interfaces.msg import RunState
 from std_msgs.msg import String
 
 from sms_handover.errors import MessageError, Reason
-from sms_handover.graph.events import RESYNCHRONISED, Severity
 from sms_handover.graph.topics import (
     DEPUTY_MARKER,
     GRASP_EVENT,
@@ -28,7 +28,7 @@ from sms_handover.graph.topics import (
 from sms_handover.nodes.parts.marker import deputy_marker
 from sms_handover.nodes.parts.plant_outputs import PlantOutputs
 from sms_handover.nodes.parts.run_control import RunControl
-from sms_handover.nodes.parts.watchdogs import AnswerWatchdog, CommandWatchdog
+from sms_handover.nodes.parts.watchdogs import AnswerWatchdog, CommandWatchdog, lag_skipped
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.ros.codecs.convert import event_message, header
 from sms_handover.ros.codecs.loop_messages import JointStateCodec, Stamped, stamped
@@ -41,15 +41,15 @@ from sms_handover.ros.transport.stamp_sync import StampOrder, StampSync
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import load_task
 from sms_handover.simulation.wiring import make_plant
-from sms_handover.types import Array, JointCommand, TaskPhase
+from sms_handover.types import JointCommand, TaskPhase
 
 _COMMAND = (JOINT_COMMAND,)
 _PHASE_AND_COMMAND = (TASK_PHASE, JOINT_COMMAND)
 _MOST_UNRECORDED_NS = 45_000_000  # [ns] of simulation time that may be lost with the recorder
 _RUNNING = int(RunState.RUNNING)  # asking the message class for it takes a call each time
 _TIMING_PERIOD_S = 1.0  # [s] of wall time
-_LAST_TURNS = 3  # looks for inputs: the state is taken, the command is taken, and one for what came between
-_LOOK_PERIOD_S = 0.5  # [s] of wall time between two looks whether the loop goes on
+_LAST_POLLS = 3  # of the inputs: the state is taken, the command is taken, and one for what came between
+_WATCHDOG_PERIOD_S = 0.5  # [s] of wall time between two polls of the watchdog
 
 
 class PlantNode(GraphNode[PlantParameters]):
@@ -82,18 +82,18 @@ class PlantNode(GraphNode[PlantParameters]):
         self._command_watchdog = CommandWatchdog(self.parameters)
         self._answer_watchdog = AnswerWatchdog(self.parameters)
         self.run_state = int(RunState.WAITING)
-        self._configured_anew = self.runs > 0
+        self._reconfigured = self.runs > 0
         self._wait_for_others()
         self._make_endpoints()
         self.create_timer(_TIMING_PERIOD_S, self._publish_timing)
         if self.lockstep:
-            self.create_timer(self.parameters.resend_after, self._send_again)
-            self.create_timer(_LOOK_PERIOD_S, self._look_for_answer)
+            self.create_timer(self.parameters.resend_after, self._resend)
+            self.create_timer(_WATCHDOG_PERIOD_S, self._poll_answer_watchdog)
 
     def on_matched(self) -> None:
-        """Say what robot and deputy these are; the run begins when the other nodes are ready too."""
-        if self._configured_anew:
-            self._configured_anew, self.membership.finished = False, True
+        """Publish what robot and deputy these are; the run begins when the other nodes are ready too."""
+        if self._reconfigured:
+            self._reconfigured, self.membership.finished = False, True
             self.restart()  # the others may still know of a run before
         elif not self.runs:
             self._describe()
@@ -147,7 +147,7 @@ class PlantNode(GraphNode[PlantParameters]):
 
     @property
     def awaited(self) -> str:
-        """Return what comes last of what completes the tick."""
+        """The last of the inputs that complete the tick."""
         if self._ahead_of_recorder:
             return RUN_RECORDED
         return self._inputs.missing(self._plant.stamp_ns, self._needed) or JOINT_COMMAND
@@ -159,12 +159,11 @@ class PlantNode(GraphNode[PlantParameters]):
         return self._is_recorded and next_ns - self._recorded_ns > _MOST_UNRECORDED_NS
 
     def _make_endpoints(self) -> None:
-        """Make publishers, subscriptions and services."""
         names = [GRASP_EVENT, ROBOT_DESCRIPTION, DEPUTY_MARKER, RUN_STATE, LOOP_TIMING]
         self._publish = {name: self.endpoints.publisher(name) for name in names}
         self._outputs = PlantOutputs(self.robot, self.endpoints.publisher, lockstep=self.lockstep)
-        self.inputs.subscribe(TASK_PHASE, self._on_phase, self._phase_codec.checked)
-        self.inputs.subscribe(JOINT_COMMAND, self._on_command, self._command_codec.checked)
+        for topic, codec in ((TASK_PHASE, self._phase_codec), (JOINT_COMMAND, self._command_codec)):
+            self.inputs.subscribe(topic, partial(self._on_input, topic), codec.checked)
         self.inputs.subscribe(RUN_RECORDED, self._on_recorded, stamped)
         self.inputs.subscribe_news(RUN_READY, String, self._on_ready)
         self._control = RunControl(self, self)
@@ -172,7 +171,6 @@ class PlantNode(GraphNode[PlantParameters]):
     # The start of a run
 
     def _on_ready(self, message: String) -> None:
-        """Note that another node is ready."""
         self._waiting_for.discard(message.data)
         self._begin_if_ready()
 
@@ -191,17 +189,17 @@ class PlantNode(GraphNode[PlantParameters]):
             self.finish("stopped on request")
 
     def _describe(self) -> None:
-        """Say what robot and deputy these are."""
+        """Publish what robot and deputy these are."""
         self._publish[ROBOT_DESCRIPTION].publish(String(data=self.robot.urdf))
         self._publish[DEPUTY_MARKER].publish(deputy_marker(self._deputy_size))
 
     def _wait_for_others(self) -> None:
-        """Be at the start of a run, and wait until every other node is ready for it."""
+        """Wait at the start of a run until every other node is ready."""
         self._waiting_for = set(self.common.peers) - {PLANT}
         self._last_tick, self._failed_phase = self.common.last_tick(self._end_ns), ""
         self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
         self._command_watchdog.reset()
-        self._needed: tuple[str, ...] = _PHASE_AND_COMMAND  # what completes this tick; the last comes last
+        self._needed: tuple[str, ...] = _PHASE_AND_COMMAND  # what completes this tick, by arrival
         self._recorded_ns = 0
         self._silent_tick = -1
 
@@ -218,10 +216,10 @@ class PlantNode(GraphNode[PlantParameters]):
         self._loop_clock.published()
         self._outputs.publish_rest(self._plant, with_reference=with_reference)
 
-    def _send_again(self) -> None:
+    def _resend(self) -> None:
         """Publish the state of this tick once more if nothing has answered it for a while (lock step).
 
-        Whoever has answered it sends the same bytes again; whoever has missed it answers now.
+        A node that has answered it sends the same bytes again; one that has missed it answers now.
         """
         tick = self._plant.tick
         waiting = self.active and tick == self._silent_tick and not self._ahead_of_recorder
@@ -229,7 +227,7 @@ class PlantNode(GraphNode[PlantParameters]):
             self._outputs.publish_loop(self._plant, with_reference=self._needed is _PHASE_AND_COMMAND)
         self._silent_tick = tick
 
-    def _look_for_answer(self) -> None:
+    def _poll_answer_watchdog(self) -> None:
         """End the run as failed if nothing has answered this tick for too long (lock step)."""
         waits = self.active and not self._control.holds
         stamp = self._plant.stamp_ns if waits else None
@@ -238,39 +236,33 @@ class PlantNode(GraphNode[PlantParameters]):
             self.events.publish(event)
             self.finish(event.detail, RunState.FAILED)
 
-    def _on_command(self, command: Stamped[tuple[Array, ...]], sent_ns: int) -> None:
-        """Take a command; in lock step it may complete the tick."""
-        stamp, (effort,) = command
+    def _on_input(self, topic: str, message: Stamped[Any], sent_ns: int) -> None:
+        """Take a command or a phase; in lock step it may complete the tick."""
+        stamp, content = message
         if self.lockstep:
-            self._inputs.add(stamp, JOINT_COMMAND, effort)
-            if stamp == self._plant.stamp_ns:
-                self._loop_clock.answered()
-            self.advance()
-        elif self._inputs.admits(stamp, JOINT_COMMAND):
-            self._orders[JOINT_COMMAND].take(stamp, self._plant.stamp_ns)
-            self._command = JointCommand(stamp, effort)
-            if stamp == self._plant.stamp_ns:
-                self._loop_clock.answered()
-
-    def _on_phase(self, phase: Stamped[TaskPhase], sent_ns: int) -> None:
-        """Take the phase of the task; in lock step it may complete the tick."""
-        stamp, task = phase
+            self._inputs.add(stamp, topic, content)
+        elif self._inputs.admits(stamp, topic):
+            self._orders[topic].accept(stamp, self._plant.stamp_ns)
+            if topic == TASK_PHASE:
+                self._execute(content)
+            else:
+                self._command = JointCommand(stamp, *content)
+        else:
+            return
+        if topic == JOINT_COMMAND and stamp == self._plant.stamp_ns:
+            self._loop_clock.answered()
         if self.lockstep:
-            self._inputs.add(stamp, TASK_PHASE, task)
             self.advance()
-        elif self._inputs.admits(stamp, TASK_PHASE):
-            self._orders[TASK_PHASE].take(stamp, self._plant.stamp_ns)
-            self._execute(task)
 
     def _on_recorded(self, recorded: Stamped[bytes], sent_ns: int) -> None:
-        """Note up to where the recorder has come; in lock step the plant may have waited for it."""
+        """Note how far the recorder has come; in lock step the plant may have waited for it."""
         if self.run_state == RunState.WAITING:
             return  # it is of the run before
         stamp, _ = recorded
         if not self._recorded_ns <= stamp <= self._plant.stamp_ns:
             reason = Reason.OLD if stamp < self._recorded_ns else Reason.FUTURE
-            allowed = f"allowed is {self._recorded_ns} to {self._plant.stamp_ns} ns"
-            raise MessageError(reason, f"recorded is said to be up to {stamp} ns, {allowed}")
+            allowed = f"must be {self._recorded_ns} to {self._plant.stamp_ns} ns"
+            raise MessageError(reason, f"recorded up to {stamp} ns, {allowed}")
         self._recorded_ns = stamp
         self.advance()
 
@@ -287,7 +279,7 @@ class PlantNode(GraphNode[PlantParameters]):
         if self._plant.tick >= self._last_tick:
             self._end_task()
             return
-        self._plant.apply(inputs[JOINT_COMMAND])
+        self._plant.apply(*inputs[JOINT_COMMAND])
         self._loop_clock.ticked()
         if self._control.steps_left:
             self._control.stepped()
@@ -299,7 +291,7 @@ class PlantNode(GraphNode[PlantParameters]):
         It had no processor in time, as the plant had none, and takes a small part of a tick. One in
         another process gets no more time by this.
         """
-        for _ in range(_LAST_TURNS):
+        for _ in range(_LAST_POLLS):
             if self._command.stamp_ns == self._plant.stamp_ns or not self.inputs.loop.poll():
                 return
 
@@ -312,21 +304,12 @@ class PlantNode(GraphNode[PlantParameters]):
         if event is not None:
             self.events.publish(event)
         if skipped_s := self._loop_clock.take_skipped():
-            detail = "the plant was too far behind the wall clock; simulated time stays behind by as much"
-            self.events.report(
-                RESYNCHRONISED,
-                Severity.WARNING,
-                detail,
-                self._plant.stamp_ns,
-                value=skipped_s,
-                limit=self.parameters.catch_up,
-                unit="s of wall time",
-            )
+            self.events.publish(lag_skipped(self._plant.stamp_ns, skipped_s, self.parameters.catch_up))
         if self._plant.tick >= self._last_tick:
             self._end_task()
 
     def _execute(self, task: TaskPhase) -> None:
-        """Carry out the grasp commands of a phase, tell what came of them, and note when the task ends."""
+        """Carry out the grasp commands of a phase, publish the results, and note when the task ends."""
         self._failed_phase = task.name if task.failed else ""
         if task.end_ns:
             self._last_tick = self.common.last_tick(task.end_ns, failed=task.failed)
@@ -338,7 +321,7 @@ class PlantNode(GraphNode[PlantParameters]):
 
     @property
     def recorder_has_ended(self) -> bool:
-        """Whether there should be a recorder, but is none any more."""
+        """Whether the run has a recorder, but its process has ended."""
         return self._is_recorded and not self.count_publishers(RUN_RECORDED)
 
     def ticks_to(self, most: int) -> tuple[int, int]:
@@ -347,7 +330,7 @@ class PlantNode(GraphNode[PlantParameters]):
         return ticks, self._plant.stamp_ns + ticks * self._tick_ns
 
     def restart(self) -> None:
-        """Say that this run is over and the next is to begin, and go back to time zero."""
+        """End this run and wait for the next one at time zero."""
         self.enter(RunState.WAITING, "reset")
         if not self.finished:
             self.membership.end()
@@ -362,14 +345,13 @@ class PlantNode(GraphNode[PlantParameters]):
         self.membership.rejoin()
 
     def _end_task(self) -> None:
-        """End the run where the task has ended."""
         if self._failed_phase:
             self.finish(f"phase {self._failed_phase!r} has failed", RunState.FAILED)
         else:
             self.finish("run complete")
 
     def finish(self, detail: str, state: int = RunState.FINISHED) -> None:
-        """Say that the run is over, and what real time has cost; every node then tells its counts."""
+        """End the run and publish what real time has cost; every node then publishes its counts."""
         if not self.lockstep and self._loop_clock.misses:
             detail = f"{detail}; {self._loop_clock.misses}"
         self.membership.finished = True
@@ -377,7 +359,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self.membership.end()
 
     def enter(self, state: int, detail: str) -> None:
-        """Change the state of the run, with the clock of the loop, and tell everybody."""
+        """Change the state of the run, with the clock of the loop, and publish it."""
         self.run_state = state
         if state == RunState.RUNNING:
             self._loop_clock.start()

@@ -157,12 +157,12 @@ def test_a_run_in_real_time_may_go_on_as_the_wall_clock_does(monkeypatch: pytest
 
 def test_an_input_used_as_it_comes_is_used_in_order_and_once() -> None:
     order = StampOrder(ahead_ns=0)
-    order.take(0, 0)
-    order.take(5, 7)
+    order.accept(0, 0)
+    order.accept(5, 7)
     for stamp, now, reason in ((5, 7, Reason.DUPLICATE), (4, 7, Reason.OLD), (8, 7, Reason.FUTURE)):
         with pytest.raises(MessageError) as caught:
-            order.take(stamp, now)
+            order.accept(stamp, now)
         assert caught.value.reason is reason
-    order.take(7, 7)  # nothing that was refused has moved the newest
+    order.accept(7, 7)  # nothing that was refused has moved the newest
     order.reset()
-    order.take(0, 0)
+    order.accept(0, 0)

@@ -77,7 +77,7 @@ WRONG = {
     ),
     "recorder of no recording": (
         ["--nodes", "recorder", "--no-record"],
-        "allowed without a recorder are plant",
+        "cannot be started without a recorder, must be of plant",
     ),
     "hosts without a domain": (["--peers", "127.0.0.1"], "give each host the same --domain-id"),
     "nodes without a domain": (["--nodes", "plant"], "give each host the same --domain-id"),

@@ -1,4 +1,4 @@
-"""Asks other nodes for all their parameters, so that a recording can tell what it was made with."""
+"""Peer parameters: all parameters of other nodes, so that a recording has what it was made with."""
 
 from collections.abc import Collection, Iterable
 from time import monotonic
@@ -14,12 +14,11 @@ _ASK_AGAIN_S = 2.0  # [s] of wall time; many times what an answer takes
 class PeerParameters:
     """Collects the parameters of some nodes without blocking; call :meth:`poll` until it is done.
 
-    An answer may be lost: a service drops it where it has not found the reader of the one who asks, who
-    has already found it. So a node that is silent is asked again.
+    A response may be lost: a service drops it if it has not found the client's reader, though the client has
+    found the service. So a node that is silent is asked again.
     """
 
     def __init__(self, node: Node, peers: Collection[str], ask_again_s: float = _ASK_AGAIN_S) -> None:
-        """Prepare to ask ``peers``, again after so long in s."""
         self._clients = {peer: AsyncParameterClient(node, peer) for peer in peers}
         self._ask_again_s = ask_again_s
         self._asked_at: dict[str, float] = {}
@@ -31,7 +30,7 @@ class PeerParameters:
         self.values = {}
 
     def poll(self) -> bool:
-        """Ask every node that has appeared since or has not answered; tell whether all have answered."""
+        """Ask every node that has appeared since or has not answered; return whether all have answered."""
         now = monotonic()
         for peer in self._clients.keys() - self.values.keys():
             due = peer not in self._asked_at or now - self._asked_at[peer] > self._ask_again_s
@@ -41,7 +40,7 @@ class PeerParameters:
         return len(self.values) == len(self._clients)
 
     def _then_get(self, peer: str) -> Any:
-        """Return what to do with the list of a node's parameter names: get the values."""
+        """Return the callback for a node's parameter names: get the values."""
 
         def on_names(future: Any) -> None:
             names = sorted(future.result().result.names)
@@ -50,7 +49,7 @@ class PeerParameters:
         return on_names
 
     def _keep(self, peer: str, names: list[str]) -> Any:
-        """Return what to do with a node's parameter values: keep them."""
+        """Return the callback for a node's parameter values: keep them."""
 
         def on_values(future: Any) -> None:
             values = [_plain(parameter_value_to_python(value)) for value in future.result().values]

@@ -1,4 +1,4 @@
-"""What the plant publishes of its state: each tick what the loop waits for, each period what goes with it."""
+"""Plant outputs: each tick what the loop waits for, each period what goes with it."""
 
 from collections.abc import Callable
 from typing import Any

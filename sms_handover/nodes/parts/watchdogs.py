@@ -8,6 +8,7 @@ from sms_handover.graph.events import (
     NO_ANSWER,
     REFERENCE_BACK,
     REFERENCE_LOST,
+    RESYNCHRONISED,
     TORQUE_ZERO,
     RunEvent,
     Severity,
@@ -130,3 +131,11 @@ class CommandWatchdog(StreamWatchdog):
             share = left_ns / self._ramp_ns if level == 1 else 0.0
             command = replace(command, effort=share * command.effort)
         return command, self.update(level, ns_to_seconds(age_ns), stamp_ns)
+
+
+def lag_skipped(stamp_ns: int, skipped_s: float, catch_up_s: float) -> RunEvent:
+    """Return the event of a plant that has skipped a lag behind the wall clock."""
+    detail = "the plant was too far behind the wall clock; simulated time stays behind by as much"
+    return RunEvent(
+        stamp_ns, PLANT, RESYNCHRONISED, Severity.WARNING, detail, "", skipped_s, catch_up_s, "s of wall time"
+    )

@@ -1,4 +1,4 @@
-"""Messages from the values of the core and back; every number keeps its bits.
+"""Conversion of the values of the core to messages and back; every number keeps its bits.
 
 Phases and grasp events are read back by :mod:`sms_handover.messages.values`, which reads fields by name.
 """
@@ -21,15 +21,7 @@ from sms_handover.errors import MessageError, Reason
 from sms_handover.frames import WORLD
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.message_constants import CONSTANTS
-from sms_handover.types import (
-    Array,
-    GraspCommand,
-    GraspEvent,
-    IkResult,
-    Pose,
-    TaskPhase,
-    frozen,
-)
+from sms_handover.types import Array, GraspCommand, GraspEvent, IkResult, Pose, TaskPhase, frozen
 from sms_handover.units import NS_PER_S
 
 
@@ -121,7 +113,7 @@ def event_message(event: GraspEvent) -> GraspEventMessage:
 
 
 def run_event_message(event: RunEvent) -> RunEventMessage:
-    """Return what a node has decided as a message."""
+    """Return an event of a run as a message."""
     return RunEventMessage(
         header=header(event.stamp_ns),
         node=event.node,
@@ -149,7 +141,6 @@ def set_ik_status(message: IkStatusMessage, result: IkResult, stamp_ns: int) -> 
 
 
 def _command_message(command: GraspCommand) -> GraspCommandMessage:
-    """Return a grasp command as a message."""
     return GraspCommandMessage(
         action=CONSTANTS[command.action],
         arm=command.arm,

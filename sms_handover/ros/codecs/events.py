@@ -1,4 +1,4 @@
-"""Reads the messages that tell of events, of whatever sender."""
+"""Event messages of any publisher as values."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -16,17 +16,17 @@ V = TypeVar("V")
 
 
 def read_grasp_event(data: bytes) -> GraspEvent:
-    """Return what came of a grasp command; raises MessageError."""
+    """Return the event of a GraspEvent message; raises MessageError."""
     return _read(data, GraspEventMessage, grasp_event)
 
 
 def read_run_event(data: bytes) -> RunEvent:
-    """Return what a node has decided; raises MessageError."""
+    """Return the event of a RunEvent message; raises MessageError."""
     return _read(data, RunEventMessage, run_event)
 
 
 def _read(data: bytes, kind: Any, value: Callable[[Any], V]) -> V:
-    """Return the value of a message; raises MessageError if a number in it stands for nothing known."""
+    """Return the value of a message; raises MessageError on a number without a meaning."""
     try:
         return value(decoded(data, kind))
     except KeyError as error:

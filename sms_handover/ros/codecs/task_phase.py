@@ -1,4 +1,4 @@
-"""The phase of the task as CDR bytes; it changes a few times in a run, so its bytes are kept."""
+"""Task phase as CDR bytes; it changes a few times in a run, so its bytes are kept."""
 
 from collections.abc import Collection
 from dataclasses import replace
@@ -24,7 +24,7 @@ class PhaseCodec:
     """Packs and reads TaskPhase messages; all but the stamp is worked out once per phase."""
 
     def __init__(self, arms: Collection[str] = (), grasp_frames: Collection[str] = ()) -> None:
-        """Know the type of the message, and for :meth:`checked` of which robot and deputy it may speak."""
+        """Take the names of robot and deputy that :meth:`checked` accepts."""
         self._arms, self._grasp_frames = frozenset(arms), frozenset(grasp_frames)
         self._types = MessageTypes()
         self._packed: tuple[TaskPhase, bytes] | None = None
@@ -67,7 +67,7 @@ class PhaseCodec:
     def _serialize(self, phase: TaskPhase) -> bytes:
         """Return what follows the stamp in the bytes of a message.
 
-        rclpy may put up to 8 bytes behind the end, which strict readers of bags refuse.
+        rclpy may put up to 8 bytes behind the end, which strict readers of bags reject.
         """
         data: bytes = serialize_message(phase_message(phase))
         end = len(self._types.serialize(self._types.deserialize(data, _TYPE)))

@@ -1,4 +1,4 @@
-"""The arguments of ``ros2 launch sms_handover handover.launch.py`` that set parameters of the nodes.
+"""Launch arguments of ``ros2 launch sms_handover handover.launch.py``, which set parameters of the nodes.
 
 An argument that is not given leaves its parameter to the parameter file of the user, then to ``config/``.
 """
@@ -32,12 +32,12 @@ class LaunchArgument:
 
     @property
     def spec(self) -> ParameterSpec:
-        """What is known of the parameter."""
+        """Unit, range and description of the parameter."""
         return next(spec_of(item) for item in fields(self.group.cls) if item.name == self.parameter)
 
     @property
     def text(self) -> str:
-        """What ``--show-args`` tells."""
+        """The description in ``--show-args``."""
         unit = f" [{self.spec.unit}]" if self.spec.unit else ""
         return f"{self.spec.description}{unit}; not given: as in params_file, else config/{self.group.file}"
 
@@ -67,8 +67,7 @@ def launch_processes(given: Mapping[str, str], *, record: bool, compose: bool) -
     """Return the processes to start, each with the arguments that the launch arguments make.
 
     ``given`` may hold other launch arguments too; '' is one that was not given. Its ``nodes`` names the
-    nodes of this host, with commas between. Raises
-    ConfigurationError on a number that is none.
+    nodes of this host, with commas between. Raises ConfigurationError on a number that is none.
     """
     here, _ = placed(given.get("nodes", ""), record=record)
     values: dict[str, dict[str, object]] = {}

@@ -68,7 +68,7 @@ class Endpoints:
 
     @property
     def other_publishers(self) -> list[str]:
-        """Return in words which other nodes publish where one alone is to."""
+        """Which other nodes publish where one alone is to, in words."""
         return [
             f"the end of node {other!r}, which publishes {name} too"
             for name, identity in self._identities.items()
@@ -86,35 +86,44 @@ class Endpoints:
 
     @property
     def unmatched(self) -> list[str]:
-        """Return in words what has not been found yet of the endpoints of the peers."""
-        me, node = self._node.get_name(), self._node
-        missing = []
+        """What has not been found yet of the endpoints of the peers, in words."""
+        me, node = {self._node.get_name()}, self._node
+        missing: list[str] = []
         for name, publisher in self._publishers.items():
-            there = node.get_subscriptions_info_by_topic(publisher.topic_name)
-            profile = profile_of(self._topics[name])
-            served = [reader for reader in there if serves(profile, reader.qos_profile)]
-            readers = self._wanted(name, {*self._topics[name].subscribers} - {me} | {RECORDER}, served)
-            found = _found(publisher.subscription_count, served, readers)
-            if found < len(readers):
-                missing.append(f"{found} of {len(readers)} subscriptions of {name}")
+            topic, profile = self._topics[name], profile_of(self._topics[name])
+            readers = node.get_subscriptions_info_by_topic(publisher.topic_name)
+            served = [reader for reader in readers if serves(profile, reader.qos_profile)]
+            nodes = {*topic.subscribers} - me | {RECORDER}
+            missing += self._missing("subscriptions", topic, publisher.subscription_count, served, nodes)
         for name, subscription in self._subscriptions.items():
-            there = node.get_publishers_info_by_topic(subscription.topic_name)
-            profile = profile_of(self._topics[name])
-            serving = [writer for writer in there if serves(writer.qos_profile, profile)]
-            writers = self._wanted(name, {*self._topics[name].publishers} - {me}, serving)
-            found = _found(subscription.get_publisher_count(), serving, writers)
-            if found < len(writers):
-                missing.append(f"{found} of {len(writers)} publishers of {name}")
+            topic, profile = self._topics[name], profile_of(self._topics[name])
+            writers = node.get_publishers_info_by_topic(subscription.topic_name)
+            serving = [writer for writer in writers if serves(writer.qos_profile, profile)]
+            matched, nodes = subscription.get_publisher_count(), {*topic.publishers} - me
+            missing += self._missing("publishers", topic, matched, serving, nodes)
         return missing + self._absent or self.other_publishers
 
+    def _missing(
+        self,
+        kind: str,
+        topic: Topic,
+        matched: int,
+        there: Collection[TopicEndpointInfo],
+        nodes: Collection[str],
+    ) -> list[str]:
+        """Return how many of the endpoints of some nodes have matched, in words, unless all have."""
+        wanted = self._wanted(topic, nodes, there)
+        found = _found(matched, there, wanted)
+        return [f"{found} of {len(wanted)} {kind} of {topic.name}"] if found < len(wanted) else []
+
     def not_publishing(self, name: str) -> frozenset[str]:
-        """Return the external nodes that do not publish on a topic."""
+        """Return the external nodes that have no publisher on a topic."""
         there = self._node.get_publishers_info_by_topic(self._node.resolve_topic_name(name))
         return self._external - {writer.node_name for writer in there}
 
     @property
     def _absent(self) -> list[str]:
-        """Return in words which external nodes have not appeared, on topics that this node does not read."""
+        """Which external nodes have not appeared, on topics that this node does not read, in words."""
         return [
             f"the external node {name!r}, which publishes {topic.name}"
             for topic in self._topics.values()
@@ -123,7 +132,7 @@ class Endpoints:
         ]
 
     def _wanted(
-        self, name: str, nodes: Collection[str], there: Collection[TopicEndpointInfo]
+        self, topic: Topic, nodes: Collection[str], there: Collection[TopicEndpointInfo]
     ) -> frozenset[str]:
         """Return the nodes whose endpoint on a topic has to match.
 
@@ -134,13 +143,13 @@ class Endpoints:
         if not self._external:
             return wanted
         here = {endpoint.node_name for endpoint in there}
-        if self._topics[name].rate is Rate.TICK:
+        if topic.rate is Rate.TICK:
             here |= wanted
         return (wanted - self._external) | (self._external & here)
 
     @property
     def counts(self) -> dict[str, int]:
-        """Return how many messages have been published on each topic, by its full name."""
+        """How many messages have been published on each topic, by its full name."""
         return {publisher.topic_name: publisher.count for publisher in self._publishers.values()}
 
     def reset_run(self) -> None:
@@ -150,7 +159,7 @@ class Endpoints:
 
     @property
     def topics(self) -> tuple[Topic, ...]:
-        """Return every topic of the graph."""
+        """Every topic of the graph."""
         return tuple(self._topics.values())
 
 
@@ -186,8 +195,7 @@ class CountedPublisher:
     def publish(self, message: Any) -> None:
         """Publish a message or CDR bytes; raises GraphError if a reader takes nothing for a long time.
 
-        With KEEP_ALL history a full queue refuses the message; that is the back-pressure, so it is
-        tried again.
+        With KEEP_ALL history a full queue rejects the message; that is the back-pressure, so it is retried.
         """
         begin = 0.0
         while True:

@@ -48,21 +48,13 @@ class LifecycleNode(LifecycleNodeMixin, RunnableNode):
 
     @property
     def state_name(self) -> str:
-        """Return the state of the lifecycle: unconfigured, inactive, active, finalized or one between."""
+        """The state of the lifecycle: unconfigured, inactive, active, finalized or one between."""
         return str(self._state_machine.current_state[1])
 
     @property
     def active(self) -> bool:
         """Whether the node takes part in the run."""
         return bool(self._state_machine.current_state[0] == State.PRIMARY_STATE_ACTIVE)
-
-    @property
-    def configured(self) -> bool:
-        """Whether the node has its endpoints."""
-        return self._state_machine.current_state[0] in (
-            State.PRIMARY_STATE_INACTIVE,
-            State.PRIMARY_STATE_ACTIVE,
-        )
 
     @property
     def finalized(self) -> bool:
@@ -72,7 +64,7 @@ class LifecycleNode(LifecycleNodeMixin, RunnableNode):
     # For the process
 
     def start(self) -> None:
-        """Configure and activate, as a node does that nobody manages; raises what goes wrong."""
+        """Configure and activate, as an unmanaged node does; raises the error of a transition."""
         for trigger in (self.trigger_configure, self.trigger_activate):
             trigger()
             self._raise_error()
@@ -101,7 +93,6 @@ class LifecycleNode(LifecycleNodeMixin, RunnableNode):
         return not (stop.asked or all(node.finalized for node in nodes))
 
     def _raise_error(self) -> None:
-        """Raise what went wrong in a transition."""
         if self._error is not None:
             raise self._error
 
@@ -133,7 +124,7 @@ class LifecycleNode(LifecycleNodeMixin, RunnableNode):
         return self._carry_out(self._take_down)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Give the node up: there is no telling what of it is there."""
+        """Give the node up: its parts may be there or not."""
         return TransitionCallbackReturn.FAILURE
 
     def _on_change_state(self, request: Any, response: Any) -> Any:
@@ -150,7 +141,7 @@ class LifecycleNode(LifecycleNodeMixin, RunnableNode):
             return response
 
     def _carry_out(self, act: Callable[[], None]) -> TransitionCallbackReturn:
-        """Do what a transition asks; what goes wrong is kept for :meth:`should_run`, as rclpy drops it."""
+        """Carry out a transition; its error is kept for :meth:`should_run`, as rclpy drops it."""
         try:
             act()
         except Exception as error:

@@ -51,8 +51,8 @@ class DirectInputs(Inputs):
         """Return a client, and hand every response to ``on_response``."""
         client = self._node.create_client(kind, service)
         self._node._clients.remove(client)
-        responses = self._sources[service] = _Responses(self._node, client, on_response)
-        return responses
+        self._sources[service] = _Responses(self._node, client, on_response)
+        return Client(client.service_is_ready, client.handle.send_request)
 
     def create_service(self, kind: Any, service: str, on_request: OnRequest) -> None:
         """Offer a service."""
@@ -135,17 +135,18 @@ class DirectInputs(Inputs):
 class _Source(ABC):
     """One kind of input: it can be slept on and emptied."""
 
-    def __init__(self, node: Node, entity: Any, counts: tuple[int, int, int]) -> None:
-        """Take an entity that the node no longer knows; ``counts`` of subscriptions, clients, services."""
-        subscriptions, clients, services = counts
+    _counts = (1, 0, 0)  # of subscriptions, clients and services
+
+    def __init__(self, node: Node, entity: Any) -> None:
+        """Take an entity that the node no longer knows."""
+        subscriptions, clients, services = self._counts
         self._entity = entity
-        self._wait_set = rclpy_implementation.WaitSet(
+        self._wait_set = made = rclpy_implementation.WaitSet(
             subscriptions, 0, 0, clients, services, 0, node.context.handle
         )
-
-    @abstractmethod
-    def _add_to_wait_set(self) -> None:
-        """Put the entity into the wait set."""
+        self._add = (
+            made.add_subscription if subscriptions else made.add_client if clients else made.add_service
+        )
 
     @abstractmethod
     def take_one(self) -> bool:
@@ -165,7 +166,7 @@ class _Source(ABC):
     def wait(self, timeout_s: float) -> None:
         """Sleep until something comes."""
         self._wait_set.clear_entities()
-        self._add_to_wait_set()
+        self._add(self._entity.handle)
         self._wait_set.wait(int(timeout_s * NS_PER_S))
 
     def destroy(self) -> None:
@@ -177,14 +178,10 @@ class _Messages(_Source):
     """The messages of a topic."""
 
     def __init__(self, node: Node, subscription: Subscription, on_data: OnSerialized) -> None:
-        """Take over a raw subscription."""
-        super().__init__(node, subscription, (1, 0, 0))
+        super().__init__(node, subscription)
         self._taker = SerializedTaker(subscription)
         self._take = self._taker.take
         self._on_data = on_data
-
-    def _add_to_wait_set(self) -> None:
-        self._wait_set.add_subscription(self._entity.handle)
 
     def take_one(self) -> bool:
         """Hand over the next message."""
@@ -209,24 +206,15 @@ class _Messages(_Source):
         super().destroy()
 
 
-class _Responses(_Source, Client):
-    """Calls a service, and takes its responses."""
+class _Responses(_Source):
+    """The responses of a service."""
+
+    _counts = (0, 1, 0)
 
     def __init__(self, node: Node, client: Any, on_response: Callable[[Any], None]) -> None:
-        super().__init__(node, client, (0, 1, 0))
+        super().__init__(node, client)
         self._response = client.srv_type.Response
         self._on_response = on_response
-
-    def service_is_ready(self) -> bool:
-        """Whether the service is there."""
-        return bool(self._entity.service_is_ready())
-
-    def call(self, request: Any) -> None:
-        """Send a request and return at once."""
-        self._entity.handle.send_request(request)
-
-    def _add_to_wait_set(self) -> None:
-        self._wait_set.add_client(self._entity.handle)
 
     def take_one(self) -> bool:
         """Hand over the next response."""
@@ -238,15 +226,14 @@ class _Responses(_Source, Client):
 
 
 class _Requests(_Source):
-    """Takes the requests of a service, and answers them."""
+    """The requests of a service."""
+
+    _counts = (0, 0, 1)
 
     def __init__(self, node: Node, service: Any, on_request: OnRequest) -> None:
-        super().__init__(node, service, (0, 0, 1))
+        super().__init__(node, service)
         self._kind = service.srv_type
         self._on_request = on_request
-
-    def _add_to_wait_set(self) -> None:
-        self._wait_set.add_service(self._entity.handle)
 
     def take_one(self) -> bool:
         """Answer the next request."""

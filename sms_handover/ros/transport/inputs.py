@@ -8,6 +8,7 @@ the same bytes in the same order of each topic; `make bench` measures what each 
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from time import time_ns
 from typing import Any
 
@@ -22,16 +23,12 @@ OnSerialized = Callable[[bytes, int, bytes], None]
 OnRequest = Callable[[Any], Any]  # request to response
 
 
-class Client(ABC):
-    """Calls one service; the responses go to the callback that it was created with."""
+@dataclass(frozen=True)
+class Client:
+    """Calls one service without waiting; the responses go to the callback that it was created with."""
 
-    @abstractmethod
-    def service_is_ready(self) -> bool:
-        """Whether the service is there."""
-
-    @abstractmethod
-    def call(self, request: Any) -> None:
-        """Send a request and return at once."""
+    service_is_ready: Callable[[], bool]
+    call: Callable[[Any], object]
 
 
 class Inputs(ABC):
@@ -131,14 +128,18 @@ class ExecutorInputs(Inputs):
 
     def create_client(self, kind: Any, service: str, on_response: Callable[[Any], None]) -> Client:
         """Return a client, and hand every response to ``on_response``."""
+        client = self._node.create_client(kind, service)
 
-        def callback(response: Any) -> None:
+        def on_done(future: Any) -> None:
+            response = future.result()
             if self.closed:
                 self._waiting.append(lambda: on_response(response))
             else:
                 on_response(response)
 
-        return _ExecutorClient(self._node, kind, service, callback)
+        return Client(
+            client.service_is_ready, lambda request: client.call_async(request).add_done_callback(on_done)
+        )
 
     def create_service(self, kind: Any, service: str, on_request: OnRequest) -> None:
         """Offer a service."""
@@ -158,19 +159,3 @@ class ExecutorInputs(Inputs):
 
     def give_turn(self, executor: Executor) -> None:
         """Do nothing: whatever comes is handled by the executor."""
-
-
-class _ExecutorClient(Client):
-    """Calls a service by rclpy's futures."""
-
-    def __init__(self, node: Node, kind: Any, service: str, on_response: Callable[[Any], None]) -> None:
-        self._client = node.create_client(kind, service)
-        self._on_response = on_response
-
-    def service_is_ready(self) -> bool:
-        """Whether the service is there."""
-        return bool(self._client.service_is_ready())
-
-    def call(self, request: Any) -> None:
-        """Send a request and return at once."""
-        self._client.call_async(request).add_done_callback(lambda done: self._on_response(done.result()))

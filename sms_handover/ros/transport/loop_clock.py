@@ -1,4 +1,4 @@
-"""Keeps the plant's loop on the wall clock, and accounts for how well it keeps to it."""
+"""Loop clock: keeps the plant on the wall clock, with statistics of how well."""
 
 from array import array
 from dataclasses import dataclass, field
@@ -40,7 +40,6 @@ class LoopClock:
     """
 
     def __init__(self, tick_ns: int, *, paced: bool, catch_up_s: float) -> None:
-        """Prepare for ticks of this length."""
         self._tick_s = ns_to_seconds(tick_ns)
         self._paced = paced
         self._catch_up_s = max(catch_up_s, self._tick_s)
@@ -55,7 +54,7 @@ class LoopClock:
         self._ran = 0.0
 
     def start(self) -> None:
-        """Begin, or go on after a pause: the first tick is due one period from now."""
+        """Start, or resume after a pause: the first tick is due one period from now."""
         self._last = self._published = monotonic()
         self._deadline = self._last + self._tick_s if self._paced else None
         self._interval = _Interval(self._last)
@@ -78,11 +77,11 @@ class LoopClock:
 
     @property
     def ran(self) -> float:
-        """Return for how many s of wall time the loop has run, pauses left out."""
+        """The wall time in s that the loop has run, without pauses."""
         return self._ran if self._since is None else self._ran + monotonic() - self._since
 
     def wait_s(self) -> float:
-        """Return how long to wait for the next deadline, at least zero."""
+        """Return the time in s to the next deadline, at least zero."""
         if self._deadline is None:
             return _IDLE_S
         return min(max(self._deadline - monotonic(), 0.0), _IDLE_S)
@@ -92,7 +91,7 @@ class LoopClock:
         return self._deadline is not None and monotonic() >= self._deadline
 
     def ticked(self, *, held: bool = False) -> None:
-        """Account for the begin of a tick; it is late if more than one period behind its deadline."""
+        """Account for the start of a tick; it is late if more than one period behind its deadline."""
         now = monotonic()
         self._interval.periods.append(now - self._last)
         self._last = now
@@ -129,7 +128,7 @@ class LoopClock:
 
     @property
     def misses(self) -> str:
-        """Return in words what real time has cost so far, "" if every tick was in time."""
+        """What real time has cost so far, in words; "" if every tick was in time."""
         if not self._late and not self._held:
             return ""
         skipped = f", and {self.skipped_s:.3g} s of lag were skipped" if self.skipped_s else ""
@@ -140,7 +139,7 @@ class LoopClock:
 
     @property
     def diagnosis(self) -> tuple[int, str]:
-        """Return level and words for the last report, by the thresholds that ros2_control ships."""
+        """Level and text for the last report, by the thresholds that ros2_control ships."""
         return self._level
 
     def report(self) -> LoopTiming:
@@ -169,7 +168,7 @@ class LoopClock:
         )
 
     def _diagnose(self, mean: float, work: float) -> tuple[int, str]:
-        """Return level and words for a mean period and a mean time of work, both in s."""
+        """Return level and text for a mean period and a mean time of work, both in s."""
         if not self._paced:
             return 0, ""
         rate, wanted = 1.0 / mean, 1.0 / self._tick_s

@@ -1,8 +1,8 @@
-"""Takes serialized messages with the identity of their publisher, which rclpy does not hand on.
+"""Takes of rcl: serialized messages with the identity of their publisher, which rclpy does not hand on.
 
-What rclpy 7.1 tells of a message is when it was sent, but not by whom. The library below rclpy, rcl,
-knows both; so it is asked directly, by the public functions and structures of its C interface, which
-are the same from Humble on. It costs no more than rclpy's own way.
+rclpy 7.1 tells when a message was sent, but not by whom. rcl below it knows both, so it is called directly,
+by the public functions and structures of its C interface, which are the same from Humble on. That costs no
+more than rclpy's own way.
 """
 
 from collections.abc import Callable
@@ -71,7 +71,7 @@ class SerializedTaker:
     """Takes the messages of one subscription, which nothing else may take from; close it."""
 
     def __init__(self, subscription: Subscription) -> None:
-        """Take from a subscription; raises ConfigurationError where rcl cannot be asked."""
+        """Take from a subscription; raises ConfigurationError if rcl cannot be called."""
         self._library = _library()
         self._rcl_take: Callable[..., int] = self._library.take
         self._subscription = subscription  # which has to live as long as its address is used
@@ -134,5 +134,4 @@ def _library() -> _Library:
 
 
 def _nothing(*arguments: object) -> int:
-    """Take nothing."""
     return _NOTHING_THERE
