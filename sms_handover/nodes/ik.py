@@ -11,12 +11,12 @@ from sms_handover.frames import WORLD
 from sms_handover.graph.topics import IK, SOLVE_IK
 from sms_handover.ik.levenberg_marquardt import solve_ik
 from sms_handover.ik.parameters import IkParameters
+from sms_handover.messages.values import time_ns
 from sms_handover.ros.codecs.convert import (
     joints_in_order,
     pose_of_message,
     set_ik_status,
     set_joint_positions,
-    stamp_ns_of,
 )
 from sms_handover.ros.codecs.validation import check_finite
 from sms_handover.ros.node.diagnostics import NodeReport
@@ -65,7 +65,7 @@ class IkNode(GraphNode[IkParameters]):
             return SolveIK.Response(message=str(error))
         result = solve_ik(self.robot, question, self.parameters)
         self._solved[result.status] += 1
-        self._stamp_ns = stamp_ns = stamp_ns_of(request.seed.header.stamp)
+        self._stamp_ns = stamp_ns = time_ns(request.seed.header.stamp)
         response = self._response
         set_joint_positions(response.solution, result.joint_position, stamp_ns)
         set_ik_status(response.status, result, stamp_ns)

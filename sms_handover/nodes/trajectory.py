@@ -23,8 +23,9 @@ from sms_handover.graph.topics import (
     TRAJECTORY,
     target_pose,
 )
+from sms_handover.messages.values import time_ns
 from sms_handover.model.poses import pose_row
-from sms_handover.ros.codecs.convert import joints_in_order, set_joint_positions, set_pose, stamp_ns_of
+from sms_handover.ros.codecs.convert import joints_in_order, set_joint_positions, set_pose
 from sms_handover.ros.codecs.events import read_grasp_event
 from sms_handover.ros.codecs.loop_messages import (
     JointStateCodec,
@@ -186,7 +187,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
     def _on_response(self, response: Any) -> None:
         """Publish the reference that follows from a solution, converged or not."""
         awaited_ns = None if self._requested is None else self._requested[0].stamp_ns
-        if self._overdue and stamp_ns_of(response.solution.header.stamp) != awaited_ns:
+        if self._overdue and time_ns(response.solution.header.stamp) != awaited_ns:
             self._overdue -= 1  # it is of the run before, or to a request that was repeated
             return
         if self._requested is None:

@@ -27,6 +27,7 @@ from sms_handover.messages.values import (
     run_event,
     status_values,
     task_phase,
+    time_ns,
 )
 from sms_handover.ros.codecs.convert import (
     event_message,
@@ -38,7 +39,6 @@ from sms_handover.ros.codecs.convert import (
     set_ik_status,
     set_joint_positions,
     set_pose,
-    stamp_ns_of,
     time_message,
 )
 from sms_handover.types import (
@@ -72,7 +72,7 @@ def pose_with_awkward_numbers() -> Pose:
 def test_time_comes_back(stamp_ns: int) -> None:
     message = time_message(stamp_ns)
     assert 0 <= message.nanosec < NS_PER_S
-    assert stamp_ns_of(through_cdr(message)) == stamp_ns
+    assert time_ns(through_cdr(message)) == stamp_ns
     assert header_ns(GraspEventMessage(header=header(stamp_ns))) == stamp_ns
 
 

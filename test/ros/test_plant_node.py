@@ -25,8 +25,7 @@ from sms_handover.graph.topics import (
     TASK_PHASE,
     Rate,
 )
-from sms_handover.messages.values import header_ns
-from sms_handover.ros.codecs.convert import stamp_ns_of
+from sms_handover.messages.values import header_ns, time_ns
 from sms_handover.simulation.parameters import TRANSPORTS
 
 from .bench import Bench
@@ -225,7 +224,7 @@ def test_steps_are_counted_exactly(graph: Graph) -> None:
         answer = graph.call("step", StepTicks, ticks=ticks)
         assert answer.success
         at += ticks * TICK_NS
-        assert stamp_ns_of(answer.stamp) == at
+        assert time_ns(answer.stamp) == at
         wait_for_commands(graph, at // TICK_NS + 1)
         last = Messages().of(graph, RUN_STATE)[-1]
         assert (last.state, last.tick, header_ns(last)) == (RunState.PAUSED, at // TICK_NS, at)
@@ -257,7 +256,7 @@ def test_steps_end_with_the_run(graph: Graph) -> None:
     wait_for_tick(graph, 20)
     pause(graph, True)
     answer = graph.call("step", StepTicks, ticks=2**32 - 1)
-    assert answer.success and stamp_ns_of(answer.stamp) == END_NS
+    assert answer.success and time_ns(answer.stamp) == END_NS
     answer = graph.call("step", StepTicks, ticks=1)
     assert not answer.success and "the last tick has been reached" in answer.message
     graph.bench.until(lambda: graph.plant.report().stamp_ns == END_NS, "the last tick")

@@ -36,12 +36,12 @@ from sms_handover.graph.topics import (
     Rate,
 )
 from sms_handover.messages.message_types import MessageTypes
+from sms_handover.messages.values import time_ns
 from sms_handover.nodes.controller import ControllerNode
 from sms_handover.nodes.ik import IkNode
 from sms_handover.nodes.plant import PlantNode
 from sms_handover.nodes.recorder import RecorderNode
 from sms_handover.nodes.trajectory import TrajectoryNode
-from sms_handover.ros.codecs.convert import stamp_ns_of
 from sms_handover.ros.codecs.loop_messages import JointStateCodec
 from sms_handover.ros.node.endpoints import Endpoints
 from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED
@@ -277,7 +277,7 @@ class FakePlant:
         diagnostics = self._endpoints.publisher(DIAGNOSTICS)
         node.create_timer(0.05, lambda: diagnostics.publish(DiagnosticArray()))  # s, well below drain_timeout
         self.recorded: list[int] = []  # stamps in ns up to which the recorder says it has everything
-        self._endpoints.subscribe(RUN_RECORDED, lambda m: self.recorded.append(stamp_ns_of(m.stamp)))
+        self._endpoints.subscribe(RUN_RECORDED, lambda m: self.recorded.append(time_ns(m.stamp)))
         self._codec = JointStateCodec(("joint",), ("position",))
 
     def matched(self) -> bool:

@@ -73,7 +73,7 @@ WRONG = {
     "domain that is no number": (["--domain-id", "one"], "invalid int value"),
     "node of a host": (
         ["--nodes", "plant,recoder", "--domain-id", "5"],
-        "'recoder' cannot be started, allowed",
+        "'recoder' cannot be started, must be of plant",
     ),
     "recorder of no recording": (
         ["--nodes", "recorder", "--no-record"],

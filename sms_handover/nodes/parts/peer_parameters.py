@@ -1,6 +1,7 @@
 """Peer parameters: all parameters of other nodes, so that a recording has what it was made with."""
 
 from collections.abc import Collection, Iterable
+from functools import partial
 from time import monotonic
 from typing import Any
 
@@ -36,26 +37,16 @@ class PeerParameters:
             due = peer not in self._asked_at or now - self._asked_at[peer] > self._ask_again_s
             if due and self._clients[peer].services_are_ready():
                 self._asked_at[peer] = now
-                self._clients[peer].list_parameters(callback=self._then_get(peer))
+                self._clients[peer].list_parameters(callback=partial(self._on_names, peer))
         return len(self.values) == len(self._clients)
 
-    def _then_get(self, peer: str) -> Any:
-        """Return the callback for a node's parameter names: get the values."""
+    def _on_names(self, peer: str, future: Any) -> None:
+        names = sorted(future.result().result.names)
+        self._clients[peer].get_parameters(names, callback=partial(self._on_values, peer, names))
 
-        def on_names(future: Any) -> None:
-            names = sorted(future.result().result.names)
-            self._clients[peer].get_parameters(names, callback=self._keep(peer, names))
-
-        return on_names
-
-    def _keep(self, peer: str, names: list[str]) -> Any:
-        """Return the callback for a node's parameter values: keep them."""
-
-        def on_values(future: Any) -> None:
-            values = [_plain(parameter_value_to_python(value)) for value in future.result().values]
-            self.values[peer] = dict(zip(names, values, strict=True))
-
-        return on_values
+    def _on_values(self, peer: str, names: list[str], future: Any) -> None:
+        values = [_plain(parameter_value_to_python(value)) for value in future.result().values]
+        self.values[peer] = dict(zip(names, values, strict=True))
 
 
 def _plain(value: object) -> object:

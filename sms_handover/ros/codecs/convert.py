@@ -30,16 +30,6 @@ def time_message(stamp_ns: int) -> Time:
     return Time(sec=stamp_ns // NS_PER_S, nanosec=stamp_ns % NS_PER_S)
 
 
-def set_time(message: Time, stamp_ns: int) -> None:
-    """Fill a time message from integer nanoseconds."""
-    message.sec, message.nanosec = divmod(stamp_ns, NS_PER_S)
-
-
-def stamp_ns_of(message: Time) -> int:
-    """Return integer nanoseconds from a time message."""
-    return int(message.sec) * NS_PER_S + int(message.nanosec)
-
-
 def header(stamp_ns: int, frame: str = WORLD) -> Header:
     """Return a header with a stamp and a frame."""
     return Header(stamp=time_message(stamp_ns), frame_id=frame)
@@ -62,7 +52,7 @@ def pose_of_message(message: PoseMessage) -> Pose:
 
 def set_joint_positions(message: JointState, position: Array, stamp_ns: int) -> JointState:
     """Fill a message that has the names with joint angles, and return it."""
-    set_time(message.header.stamp, stamp_ns)
+    message.header.stamp = time_message(stamp_ns)
     message.position = array("d", position.tobytes())
     return message
 
@@ -129,7 +119,7 @@ def run_event_message(event: RunEvent) -> RunEventMessage:
 
 def set_ik_status(message: IkStatusMessage, result: IkResult, stamp_ns: int) -> IkStatusMessage:
     """Fill a message that has a frame with how a solve ended, and return it."""
-    set_time(message.header.stamp, stamp_ns)
+    message.header.stamp = time_message(stamp_ns)
     message.status = CONSTANTS[result.status]
     message.iterations = result.iterations
     message.position_error = result.position_error

@@ -17,6 +17,7 @@ from sms_handover.ros.qos import profile_of, serves
 from sms_handover.ros.transport.inputs import Inputs, OnSerialized
 from sms_handover.ros.transport.publisher_identity import PublisherIdentity
 
+_Found = Collection[TopicEndpointInfo]
 _RclError = rclpy_implementation.RCLError
 
 _RETRY_S = 0.001  # [s] between two tries to publish while a reader is behind
@@ -103,14 +104,7 @@ class Endpoints:
             missing += self._missing("publishers", topic, matched, serving, nodes)
         return missing + self._absent or self.other_publishers
 
-    def _missing(
-        self,
-        kind: str,
-        topic: Topic,
-        matched: int,
-        there: Collection[TopicEndpointInfo],
-        nodes: Collection[str],
-    ) -> list[str]:
+    def _missing(self, kind: str, topic: Topic, matched: int, there: _Found, nodes: set[str]) -> list[str]:
         """Return how many of the endpoints of some nodes have matched, in words, unless all have."""
         wanted = self._wanted(topic, nodes, there)
         found = _found(matched, there, wanted)
@@ -131,9 +125,7 @@ class Endpoints:
             for name in sorted(self.not_publishing(topic.name).intersection(topic.publishers))
         ]
 
-    def _wanted(
-        self, topic: Topic, nodes: Collection[str], there: Collection[TopicEndpointInfo]
-    ) -> frozenset[str]:
+    def _wanted(self, topic: Topic, nodes: set[str], there: _Found) -> frozenset[str]:
         """Return the nodes whose endpoint on a topic has to match.
 
         They are the peers among ``nodes``; of the external ones those that are ``there``, whatever the
@@ -163,7 +155,7 @@ class Endpoints:
         return tuple(self._topics.values())
 
 
-def _found(matched: int, there: Collection[TopicEndpointInfo], wanted: Collection[str]) -> int:
+def _found(matched: int, there: _Found, wanted: Collection[str]) -> int:
     """Return how many of the wanted nodes' endpoints have surely matched.
 
     The middleware tells only how many have matched, not which; so others that are there too, such as those of
@@ -178,7 +170,6 @@ class CountedPublisher:
     """A publisher that counts, and waits when a reader is too far behind."""
 
     def __init__(self, publisher: Publisher) -> None:
-        """Wrap a publisher of rclpy."""
         self._publisher = publisher
         self.count = 0
 

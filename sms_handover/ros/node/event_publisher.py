@@ -1,7 +1,5 @@
 """Event publisher: what a node has decided goes to ``run/events``, hence into the bag, and to its log."""
 
-from math import nan
-
 from rclpy.node import Node
 
 from sms_handover.graph.events import RunEvent, Severity
@@ -18,7 +16,7 @@ class EventPublisher:
 
     def __init__(self, node: Node, publisher: CountedPublisher) -> None:
         """Speak for a node on a publisher of ``run/events``."""
-        self._name, self._log = node.get_name(), node.get_logger()
+        self._log = node.get_logger()
         self._publisher = publisher
 
     def publish(self, event: RunEvent) -> None:
@@ -31,20 +29,3 @@ class EventPublisher:
             self._log.warning(text)
         else:
             self._log.error(text)
-
-    def report(
-        self,
-        kind: str,
-        severity: Severity,
-        detail: str,
-        stamp_ns: int,
-        *,
-        phase: str = "",
-        value: float = nan,
-        limit: float = nan,
-        unit: str = "",
-    ) -> None:
-        """Publish and log an event of this node."""
-        self.publish(
-            RunEvent(stamp_ns, self._name, kind, severity, detail, phase, value=value, limit=limit, unit=unit)
-        )

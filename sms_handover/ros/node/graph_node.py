@@ -8,7 +8,7 @@ from rclpy.executors import Executor
 
 from sms_handover.configuration.parameters import EVERY_NODE
 from sms_handover.errors import ConfigurationError, MessageError, Reason
-from sms_handover.graph.events import MESSAGE_REFUSED, Severity
+from sms_handover.graph.events import MESSAGE_REFUSED, RunEvent, Severity
 from sms_handover.graph.topics import DIAGNOSTICS, LOOP_NODES, RUN_EVENTS, graph_topics
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.ros.node.diagnostics import NodeReport, diagnostics_message
@@ -173,4 +173,5 @@ class GraphNode(LifecycleNode, Generic[P]):
     def _on_first_rejected(self, topic: str, error: MessageError) -> None:
         """Report the first message of a topic that is rejected for a reason as an event."""
         detail = f"{topic}: {error.reason.value}: {error}"
-        self.events.report(MESSAGE_REFUSED, Severity.WARNING, detail, self.report().stamp_ns)
+        now_ns = self.report().stamp_ns
+        self.events.publish(RunEvent(now_ns, self.get_name(), MESSAGE_REFUSED, Severity.WARNING, detail))
