@@ -217,7 +217,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self._outputs.publish_rest(self._plant, with_reference=with_reference)
 
     def _resend(self) -> None:
-        """Publish the state of this tick once more if nothing has answered it for a while (lock step).
+        """Publish the state of this tick again if nothing has answered it for a while (lock step).
 
         A node that has answered it sends the same bytes again; one that has missed it answers now.
         """

@@ -26,7 +26,7 @@ class PeerParameters:
         self.values: dict[str, dict[str, object]] = {}
 
     def ask_again(self) -> None:
-        """Forget the answers, for nodes that may have been configured anew."""
+        """Forget the answers, of nodes that may have been configured again."""
         self._asked_at.clear()
         self.values = {}
 

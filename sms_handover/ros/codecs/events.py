@@ -17,18 +17,18 @@ V = TypeVar("V")
 
 def read_grasp_event(data: bytes) -> GraspEvent:
     """Return the event of a GraspEvent message; raises MessageError."""
-    return _read(data, GraspEventMessage, grasp_event)
+    return read_value(data, GraspEventMessage, grasp_event)
 
 
 def read_run_event(data: bytes) -> RunEvent:
     """Return the event of a RunEvent message; raises MessageError."""
-    return _read(data, RunEventMessage, run_event)
+    return read_value(data, RunEventMessage, run_event)
 
 
-def _read(data: bytes, kind: Any, value: Callable[[Any], V]) -> V:
+def read_value(data: bytes, kind: Any, value: Callable[[Any], V]) -> V:
     """Return the value of a message; raises MessageError on a number without a meaning."""
     try:
         return value(decoded(data, kind))
     except KeyError as error:
-        text = f"a {kind.__name__} has an action, status or severity that is not known"
+        text = f"a {kind.__name__} has an unknown action, state, status or severity"
         raise MessageError(Reason.NAMES, text) from error

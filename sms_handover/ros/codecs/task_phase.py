@@ -12,7 +12,8 @@ from sms_handover.messages.stamps import stamp_ns
 from sms_handover.messages.template import head
 from sms_handover.messages.values import task_phase
 from sms_handover.ros.codecs.convert import phase_message
-from sms_handover.ros.codecs.loop_messages import Stamped, arrival_ns, decoded
+from sms_handover.ros.codecs.events import read_value
+from sms_handover.ros.codecs.loop_messages import Stamped, arrival_ns
 from sms_handover.types import GraspAction, TaskPhase
 
 _STAMP_AT = 4  # [byte] behind the encapsulation
@@ -40,12 +41,7 @@ class PhaseCodec:
         """Return the phase in the bytes of a message, of any sender; raises MessageError if it is none."""
         rest = data[:_STAMP_AT] + data[_BODY_AT:]
         if self._read is None or self._read[0] != rest:
-            message = decoded(data, TaskPhaseMessage)
-            try:
-                self._read = rest, task_phase(message)
-            except KeyError as error:
-                text = "a phase has a grasp command of no known action"
-                raise MessageError(Reason.NAMES, text) from error
+            self._read = rest, read_value(data, TaskPhaseMessage, task_phase)
         return replace(self._read[1], stamp_ns=stamp_ns(data))
 
     def checked(self, data: bytes) -> Stamped[TaskPhase]:

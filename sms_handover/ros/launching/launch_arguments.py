@@ -15,6 +15,7 @@ from sms_handover.ros.reference.interfaces import COMMON_GROUP, OWN_GROUPS, Para
 from sms_handover.simulation.parameters import LOCKSTEP
 
 _EVERY_NODE = ""
+_COMMON = ("schedule", "robot", "duration", "mode", "dynamics", "external", "autostart")
 _TRUE = "true"
 
 
@@ -52,14 +53,8 @@ class LaunchArgument:
 ARGUMENTS = {
     "controller": LaunchArgument(CONTROLLER, "law"),
     "time_law": LaunchArgument(TRAJECTORY, "time_law"),
-    "schedule": LaunchArgument(_EVERY_NODE, "schedule"),
-    "robot": LaunchArgument(_EVERY_NODE, "robot"),
-    "duration": LaunchArgument(_EVERY_NODE, "duration"),
-    "mode": LaunchArgument(_EVERY_NODE, "mode"),
-    "dynamics": LaunchArgument(_EVERY_NODE, "dynamics"),
     "bag": LaunchArgument(RECORDER, "folder"),
-    "external": LaunchArgument(_EVERY_NODE, "external"),
-    "autostart": LaunchArgument(_EVERY_NODE, "autostart"),
+    **{name: LaunchArgument(_EVERY_NODE, name) for name in _COMMON},
 }
 
 

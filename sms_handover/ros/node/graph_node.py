@@ -88,7 +88,7 @@ class GraphNode(LifecycleNode, Generic[P]):
         """Handle what has come, or wait a little for something to come."""
         self.inputs.loop.spin_once(executor, WAIT_S)
 
-    # Transitions; docs/lifecycle.md tells what each means for the run
+    # Transitions; docs/lifecycle.md has what each means for the run
 
     def start(self) -> None:
         """Configure and activate, unless somebody else is to: parameter ``autostart``."""
@@ -158,7 +158,7 @@ class GraphNode(LifecycleNode, Generic[P]):
         self.message_filter.report()
         matched = self.membership.has_matched
         if not self.inputs.loop.identifies and matched and (others := self.endpoints.other_publishers):
-            text = f"waiting in vain for {others[0]}; only transport {DIRECT!r} can tell its messages apart"
+            text = f"cannot wait for {others[0]}: only transport {DIRECT!r} can tell its messages apart"
             raise MessageError(Reason.SENDER, text)
         waiting = [] if matched else self.endpoints.unmatched
         message: DiagnosticArray = diagnostics_message(

@@ -18,7 +18,7 @@ class RunMembership:
 
     A run starts when every node is active, has found the endpoints it needs and has said so on
     ``run/ready``; when the plant, which leads the run, says that it has ended or is reset, every node of the
-    loop tells how much it has published.
+    loop publishes how many messages it has sent.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class RunMembership:
         self.finished = False
 
     def join(self, endpoints: Endpoints, inputs: NodeInputs) -> None:
-        """Make the endpoints that take part in the start and end of a run, and begin to look for peers."""
+        """Make the endpoints that take part in the start and end of a run, and start to look for peers."""
         self._endpoints, self._inputs = endpoints, inputs
         self.finished = False
         self._counts = endpoints.publisher(RUN_PUBLISHED)

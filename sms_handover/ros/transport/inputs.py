@@ -107,8 +107,15 @@ class ExecutorInputs(Inputs):
         """Hand over what has waited, and again what comes."""
         super().open()
         waiting, self._waiting = self._waiting, []
-        for hand_over in waiting:
-            hand_over()
+        for deliver in waiting:
+            deliver()
+
+    def _hand_over(self, deliver: Callable[[], object]) -> None:
+        """Deliver a message or response now, or when the inputs are open."""
+        if self.closed:
+            self._waiting.append(deliver)
+        else:
+            deliver()
 
     def destroy(self) -> None:
         """Forget what waits; the entities are destroyed with the node or when it is cleaned up."""
@@ -119,10 +126,8 @@ class ExecutorInputs(Inputs):
 
         def callback(data: bytes) -> None:
             now_ns = time_ns()  # EventsExecutor fails on callbacks that ask for the time of sending
-            if not self.closed:
-                on_data(data, now_ns, b"")
-            elif not self.drops:
-                self._waiting.append(lambda: on_data(data, now_ns, b""))
+            if not (self.closed and self.drops):
+                self._hand_over(lambda: on_data(data, now_ns, b""))
 
         return self._node.create_subscription(kind, topic, callback, profile, raw=True)
 
@@ -130,16 +135,11 @@ class ExecutorInputs(Inputs):
         """Return a client, and hand every response to ``on_response``."""
         client = self._node.create_client(kind, service)
 
-        def on_done(future: Any) -> None:
-            response = future.result()
-            if self.closed:
-                self._waiting.append(lambda: on_response(response))
-            else:
-                on_response(response)
+        def call(request: Any) -> None:
+            future = client.call_async(request)
+            future.add_done_callback(lambda done: self._hand_over(lambda: on_response(done.result())))
 
-        return Client(
-            client.service_is_ready, lambda request: client.call_async(request).add_done_callback(on_done)
-        )
+        return Client(client.service_is_ready, call)
 
     def create_service(self, kind: Any, service: str, on_request: OnRequest) -> None:
         """Offer a service."""

@@ -34,7 +34,7 @@ class _Interval:
 class LoopClock:
     """Absolute deadlines one tick apart, and statistics of the periods between ticks.
 
-    A lag of more than ``catch_up_s`` (and a tick) is skipped: the deadlines begin anew at the tick that is
+    A lag of more than ``catch_up_s`` (and a tick) is skipped: the deadlines start again at the tick that is
     due, so that simulated time stays behind by it. In lock step (``paced`` false) nothing is ever due or
     late: only the statistics are kept.
     """
