@@ -15,7 +15,7 @@ from sms_handover.model.robot_model import RobotModel
 from sms_handover.nodes.controller import Answering, AnsweringNode
 from sms_handover.ros.codecs.loop_messages import PoseCodec, Stamped
 from sms_handover.ros.node.graph_node import P
-from sms_handover.ros.node.message_filter import Read
+from sms_handover.ros.node.message_filter import Decode
 from sms_handover.ros.process.main import EXIT_OK, run_node
 from sms_handover.ros.reference.help import own_parameters_help
 from sms_handover.trajectory.schedule import Schedule
@@ -55,14 +55,14 @@ class OwnControllerNode(AnsweringNode[P]):
         """Return the name of the law."""
         return self._law
 
-    def guidance(self) -> dict[str, Read[Stamped[Any]]]:
+    def guidance(self) -> dict[str, Decode[Stamped[Any]]]:
         """Return also the targets of the tools."""
-        return {**super().guidance(), **dict.fromkeys(self._arms, self._pose_wire.checked)}
+        return {**super().guidance(), **dict.fromkeys(self._arms, self._pose_codec.checked)}
 
     def make_controller(self, schedule: Schedule) -> Answering:
         """Return the controller, guided as in one process."""
         robot = self.robot
-        self._pose_wire = PoseCodec(WORLD)
+        self._pose_codec = PoseCodec(WORLD)
         self._arms = {target_pose(arm): arm for arm in robot.arms}
         controller = CheckedController(self._make(robot, self.parameters), robot.joint_names)
         self._guided = GuidedController(controller, robot)

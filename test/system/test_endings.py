@@ -192,7 +192,7 @@ def test_a_missed_grasp_has_an_exit_code_of_its_own(tmp_path: Path) -> None:
     assert done.code == 4, done
     assert "grasp by arm_a: missed" in done.err
     assert "transfer by arm_b: rejected" in done.err
-    assert "the whole run is done at 0.68 s" in done.out
+    assert "run complete at 0.68 s" in done.out
     assert not (tmp_path / "run" / "bag").exists()
 
 
