@@ -87,7 +87,7 @@ class _Outcome:
 
 
 def _outcome(metrics: RunMetrics) -> _Outcome:
-    """Return how far a run got with the handover from the first arm to the second."""
+    """Return how far a run got with the handover from its first arm to its second."""
     arms, changes = metrics.run.arms, holds(metrics.run.grasp_events)
     if len(arms) <= 1 or not metrics.phases:
         return _Outcome((nan, nan, nan, nan), complete=False)
@@ -107,7 +107,7 @@ def _outcome(metrics: RunMetrics) -> _Outcome:
 
 
 def _time_of(changes: Iterable[Hold], wanted: Callable[[Hold], bool]) -> float:
-    """Return the time in s of the first matching change, NaN if there is none."""
+    """Return the time in s of the first change that is wanted, NaN if there is none."""
     return next((ns_to_seconds(change.since_ns) for change in changes if wanted(change)), nan)
 
 

@@ -11,7 +11,7 @@ from sms_handover.analysis.signals import energy_residual
 from sms_handover.run_data import RunData
 from sms_handover.types import IkStatus
 
-_NOT_REQUESTED = -1
+_NOT_ASKED = -1
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def ik_outcomes(run: RunData, phase: PhaseSpan | None = None) -> IkOutcomes:
     """Return the outcomes of the inverse-kinematics solves in a phase or in the whole run."""
     status = run.ik_status[phase.rows if phase else slice(None)]
     of_kind = {kind: int(np.count_nonzero(status == number)) for number, kind in enumerate(IkStatus)}
-    solves = int(np.count_nonzero(status != _NOT_REQUESTED))
+    solves = int(np.count_nonzero(status != _NOT_ASKED))
     return IkOutcomes(
         solves=solves,
         failures=solves - of_kind[IkStatus.CONVERGED],

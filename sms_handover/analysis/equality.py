@@ -74,7 +74,7 @@ def _differences(a: RunData, b: RunData) -> Iterator[Difference]:
 
 
 def _compared(run: RunData, name: str) -> Any:
-    """Return the part of a field that must be equal in both runs."""
+    """Return what of a field another run has to have too."""
     if name == "run_events":
         own = (event for event in run.run_events if event.node == TRAJECTORY)
         return tuple(event for event in own if event.kind != MESSAGE_REFUSED)

@@ -10,7 +10,7 @@ F = TypeVar("F", bound="JointFigures")
 
 
 def joints_of(joint_names: Sequence[str], arm: str) -> list[int]:
-    """Return the columns of an arm's joints, identified by their names."""
+    """Return the places of an arm's joints, known by their names."""
     prefix = joint_name(arm, 1).removesuffix("1")
     return [place for place, name in enumerate(joint_names) if name.startswith(prefix)]
 

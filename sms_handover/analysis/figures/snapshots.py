@@ -147,7 +147,7 @@ def _add_key(axes: Axes, arms: Sequence[str], title: str) -> None:
 
 
 def _colour(scene: Scene, link: str, described: Colour) -> Colour:
-    """Return the colour of a link: that of its arm, or the one in the description."""
+    """Return the colour of a link: that of its arm, or what the description says."""
     for place, arm in enumerate(scene.arms):
         if link.startswith(f"{arm}_"):
             return _pale(COLOURS[place])
