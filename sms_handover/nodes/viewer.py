@@ -139,11 +139,11 @@ class ViewerNode(RunnableNode):
 
     def _on_phase(self, phase: TaskPhase, sent_ns: int) -> None:
         if self._scene:
-            self._scene.enter(phase)
+            self._scene.set_phase(phase)
 
     def _on_event(self, event: GraspEvent, sent_ns: int) -> None:
         if self._scene:
-            self._scene.tell(event)
+            self._scene.add_event(event)
 
     def _add(self, name: str, message: Stamped[bytes], sent_ns: int) -> None:
         """Keep the content of a good message until all of its stamp are there, then show them."""
