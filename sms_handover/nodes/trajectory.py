@@ -1,8 +1,6 @@
 """The trajectory node."""
 
 from collections.abc import Sequence
-from dataclasses import replace
-from math import inf
 from typing import Any
 
 from geometry_msgs.msg import Pose as PoseMessage
@@ -44,9 +42,8 @@ from sms_handover.ros.node.graph_node import GraphNode
 from sms_handover.ros.node.message_filter import Receive
 from sms_handover.ros.process.main import run_node
 from sms_handover.ros.transport.stamp_sync import StampSync
-from sms_handover.simulation.feasibility import check_feasibility
 from sms_handover.simulation.parameters import LOCKSTEP
-from sms_handover.simulation.scenario import ParameterSet, Scenario, load_parameters, load_task
+from sms_handover.simulation.scenario import load_task
 from sms_handover.trajectory.generator import Targets, TrajectoryGenerator
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.types import Array, RobotState, TaskPhase
@@ -65,9 +62,8 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         super().__init__(TRAJECTORY, TrajectoryParameters)
 
     def prepare(self) -> None:
-        """Read the schedule and check that it can be carried out; raises ScheduleError."""
+        """Read the schedule; raises ScheduleError. That its targets are in reach, the IK node checks."""
         schedule = load_task(self.common, self.robot)
-        check_feasibility(Scenario(_for_any_plant(load_parameters()), self.robot, schedule))
         self._generator = TrajectoryGenerator(self.robot, schedule, self.parameters)
         self._reference_wire = JointStateCodec(self.robot.joint_names, ("position", "velocity"))
         self._pose_wire, self._phase_wire = PoseCodec(WORLD), PhaseCodec()
@@ -232,14 +228,6 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
 def _answers(answer: Any, stamp_ns: int) -> bool:
     """Whether an answer of the IK service is that to a request of this stamp."""
     return stamp_ns_of(answer.solution.header.stamp) == stamp_ns
-
-
-def _for_any_plant(parameters: ParameterSet) -> ParameterSet:
-    """Return the parameters with a plant that grasps from anywhere: what it tolerates is for it to say."""
-    plant = replace(
-        parameters.plant, grasp_position_tolerance=inf, grasp_angle_tolerance=inf, grasp_speed_tolerance=inf
-    )
-    return replace(parameters, plant=plant)
 
 
 def main(args: Sequence[str] | None = None) -> int:
