@@ -57,7 +57,7 @@ def digests_of(run: RunData) -> dict[str, str]:
     return found
 
 
-def rows_of(run: RunData) -> dict[str, np.ndarray]:
+def rows_of(run: RunData) -> dict[str, Any]:
     """Return a row a second of the arrays that a run is made of."""
     return {name: getattr(run, name)[::step] for name, step in ROWS.items()}
 

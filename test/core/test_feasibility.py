@@ -266,7 +266,16 @@ def test_reach_is_that_of_the_solver(make_scenario: MakeScenario) -> None:
         check_scenario(make_scenario(ik={"stall_step": 0.1}))
     far = _changed(_B_LEAVES, "xyz: [1.2, -0.42, 3.75]")
     loose = {"position_tolerance": 3.0, "orientation_tolerance": 3.0}
-    assert len(predicted(make_scenario(far, ik=loose, plant={"grasp_position_tolerance": 9.0}))) == 4
+    assert (
+        len(
+            predicted(
+                make_scenario(
+                    far, ik=loose, plant={"grasp_position_tolerance": 9.0, "grasp_angle_tolerance": 4.0}
+                )
+            )
+        )
+        == 4
+    )
 
 
 def test_an_error_of_the_first_grasp_is_carried_on(make_scenario: MakeScenario) -> None:
