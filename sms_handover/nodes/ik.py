@@ -22,6 +22,8 @@ from sms_handover.ros.codecs.validation import check_finite
 from sms_handover.ros.node.diagnostics import NodeReport
 from sms_handover.ros.node.graph_node import GraphNode
 from sms_handover.ros.process.main import run_node
+from sms_handover.simulation.feasibility import check_feasibility
+from sms_handover.simulation.scenario import load_task
 from sms_handover.types import IkRequest, IkStatus, Pose
 
 
@@ -32,7 +34,12 @@ class IkNode(GraphNode[IkParameters]):
         super().__init__(IK, IkParameters)
 
     def prepare(self) -> None:
-        """Offer the service."""
+        """Check that the solver reaches the targets of the schedule, and offer the service.
+
+        The check is made here because its outcome depends on the parameters of this node; what a grasp
+        tolerates is for the plant to say. Raises ScheduleError.
+        """
+        check_feasibility(self.robot, load_task(self.common, self.robot), self.parameters)
         self.reset_run()
         self._names = list(self.robot.joint_names)
         self._response = SolveIK.Response(valid=True)  # refilled each time: most of it never changes

@@ -1,9 +1,7 @@
 """Trajectory node: phases, joint references and tool targets from the schedule."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
-from math import inf
 from typing import Any
 
 from geometry_msgs.msg import Pose as PoseMessage
@@ -41,9 +39,8 @@ from sms_handover.ros.node.endpoints import CountedPublisher
 from sms_handover.ros.node.graph_node import GraphNode
 from sms_handover.ros.process.main import run_node
 from sms_handover.ros.transport.stamp_sync import StampSync
-from sms_handover.simulation.feasibility import check_feasibility
 from sms_handover.simulation.parameters import LOCKSTEP
-from sms_handover.simulation.scenario import ParameterSet, Scenario, load_parameters, load_task
+from sms_handover.simulation.scenario import load_task
 from sms_handover.trajectory.generator import Targets, TrajectoryGenerator
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.types import Array, RobotState, TaskPhase
@@ -62,9 +59,8 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         super().__init__(TRAJECTORY, TrajectoryParameters)
 
     def prepare(self) -> None:
-        """Read the schedule and check that it can be carried out; raises ScheduleError."""
+        """Read the schedule; raises ScheduleError. That its targets are in reach, the IK node checks."""
         schedule = load_task(self.common, self.robot)
-        check_feasibility(Scenario(_for_any_plant(load_parameters()), self.robot, schedule))
         self._generator = TrajectoryGenerator(self.robot, schedule, self.parameters)
         self._reference_codec = JointStateCodec(self.robot.joint_names, ("position", "velocity"))
         self._pose_codec, self._phase_codec = PoseCodec(WORLD), PhaseCodec()
@@ -219,14 +215,6 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         """Publish what belongs to a period, for the first time or because the plant has resent its state."""
         for publisher, data in self._outputs:
             publisher.publish(data)
-
-
-def _for_any_plant(parameters: ParameterSet) -> ParameterSet:
-    """Return the parameters with a plant that grasps from anywhere: it alone knows its tolerances."""
-    plant = replace(
-        parameters.plant, grasp_position_tolerance=inf, grasp_angle_tolerance=inf, grasp_speed_tolerance=inf
-    )
-    return replace(parameters, plant=plant)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -5,21 +5,25 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from geometry_msgs.msg import Pose as PoseMessage
 from sensor_msgs.msg import JointState
 from sms_handover_interfaces.msg import IkStatus as IkStatusMessage
 from sms_handover_interfaces.srv import SolveIK
 
+from sms_handover.errors import ScheduleError
 from sms_handover.graph.topics import SOLVE_IK
 from sms_handover.ik.levenberg_marquardt import solve_ik
 from sms_handover.messages.values import header_ns
 from sms_handover.nodes.ik import IkNode
+from sms_handover.nodes.trajectory import TrajectoryNode
 from sms_handover.ros.codecs.convert import joints_in_order, set_joint_positions, set_pose
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.wiring import initial_joints
 from sms_handover.types import Array, IkRequest, IkStatus, Pose
 
 from .bench import Bench
+from .short_handover import short_handover
 
 pytestmark = pytest.mark.ros
 
@@ -119,12 +123,38 @@ def test_out_of_reach_gets_the_best_effort_and_says_so(asker: Asker, away: float
 
 def test_a_stall_is_told(bench: Bench) -> None:
     """With steps of 10 mrad taken for none, the solver stands still long before the iteration limit."""
-    asker = Asker(bench, stall_step=1e-2)
+    asker = Asker(bench, stall_step=1e-2, position_tolerance=1e-2, orientation_tolerance=1e-2)
     answer = asker.ask(asker.request(arm_a=asker.near("arm_a", np.array([1.5, 0.0, 0.0]))))
     assert answer.valid
     assert answer.status.status == IkStatusMessage.STALLED
     assert answer.message == IkStatus.STALLED.value
     assert asker.node.report().values["stalled"] == 1
+
+
+LOOSE = {"position_tolerance": 9.0, "orientation_tolerance": 9.0}
+
+
+@pytest.mark.parametrize(
+    ("far", "parameters", "is_refused"),
+    [(False, {}, False), (False, {"stall_step": 0.1}, True), (True, {}, True), (True, LOOSE, False)],
+)
+def test_the_schedule_is_checked_with_the_parameters_of_this_node(
+    bench: Bench, far: bool, parameters: dict[str, object], is_refused: bool
+) -> None:
+    """Whether a target is in reach depends on them; no other node has an opinion of its own."""
+    schedule = yaml.safe_load(short_handover())
+    if far:
+        schedule["phases"][1]["arms"]["arm_a"] = "hold"
+        schedule["phases"][1]["arms"]["arm_b"]["tool_in_world"]["xyz"] = [4.0, 0.0, 0.0]
+    path = bench.folder / "schedule.yaml"
+    path.write_text(yaml.safe_dump(schedule), encoding="utf-8")
+    bench.start({"common": {"schedule": str(path)}, "ik": parameters})
+    bench.add(TrajectoryNode)
+    if is_refused:
+        with pytest.raises(ScheduleError, match=r"the target of arm_\w .* is out of reach"):
+            bench.add(IkNode)
+    else:
+        bench.add(IkNode)
 
 
 Spoil = Callable[[Any], None]

@@ -158,7 +158,7 @@ def test_a_transition_that_a_state_does_not_have_is_refused(bench: Bench, way: t
 @pytest.mark.parametrize(
     ("parameters", "text"),
     [
-        ({"common": {"schedule": "no.yaml"}}, "cannot read the schedule no.yaml"),
+        ({"common": {"schedule": "no.yaml"}}, "cannot read no.yaml"),
         ({"common": {"robot": "no.yaml"}}, "no.yaml"),
         ({"common": {"tick": -1.0}}, "parameter 'tick' is -1.0 s"),
         ({"controller": {"law": "pdi"}}, "did you mean 'pid'"),

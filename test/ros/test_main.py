@@ -137,10 +137,10 @@ def test_a_node_ends_when_its_launcher_is_gone(monkeypatch: pytest.MonkeyPatch) 
 
 BAD: dict[str, tuple[str, ...]] = {
     "controller": ("law:=fast", "unknown value 'fast'"),
-    "plant": ("grasp_position_tolerance:=-0.01", "-0.01 m, allowed is at least 0.0"),
+    "plant": ("grasp_position_tolerance:=-0.01", "-0.01 m, must be >= 0 m"),
     "trajectory": ("time_law:=cubic", "unknown value 'cubic'"),
-    "ik": ("max_iterations:=0", "is 0, allowed is at least 1"),
-    "recorder": ("drain_timeout:=nothing", "'nothing', expected a number s"),
+    "ik": ("max_iterations:=0", "is 0, must be >= 1"),
+    "recorder": ("drain_timeout:=nothing", "'nothing', must be a number in s"),
 }
 
 

@@ -165,15 +165,6 @@ def with_schedule(bench: Bench, text: str, parameters: dict[str, dict[str, objec
     bench.start({"common": {"schedule": str(path)}, **(parameters or {})})
 
 
-def test_a_schedule_that_is_out_of_reach_is_refused(bench: Bench) -> None:
-    schedule = yaml.safe_load(short_handover())
-    schedule["phases"][1]["arms"]["arm_a"] = "hold"
-    schedule["phases"][1]["arms"]["arm_b"]["tool_in_world"]["xyz"] = [4.0, 0.0, 0.0]
-    with_schedule(bench, yaml.safe_dump(schedule))
-    with pytest.raises(ScheduleError, match=r"phase 'carry': the target of arm_b .* is out of reach"):
-        bench.add(TrajectoryNode)
-
-
 def test_a_schedule_with_an_error_is_refused_with_its_line(bench: Bench) -> None:
     with_schedule(bench, short_handover().replace("grasp_frame: end_a", "grasp_frame: end_c", 1))
     with pytest.raises(ScheduleError, match=r"schedule.yaml:\d+: .*unknown grasp frame 'end_c'"):
