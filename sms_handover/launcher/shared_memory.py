@@ -1,12 +1,11 @@
 """Shared memory: the segments that Fast DDS leaves behind when a process is killed, and their removal.
 
-A participant creates a segment ``fastrtps_<16 hexadecimal digits>`` (0.5 MB) with a mutex, holds a lock (flock)
-on ``<name>_el`` while it lives, and removes all of it in the end. What a killed process leaves stays for ever.
+A participant creates a segment ``fastrtps_<16 hexadecimal digits>`` (0.5 MB) with a mutex, holds a lock
+(flock) on ``<name>_el`` while it lives, and removes all of it in the end. What a killed process leaves stays.
 
-So a run lists, in a file beside them, the segments that its processes hold locks on. At the end of the run it
-removes those that nobody locks any more; if the launcher was killed too, the next run of this user does.
-What is in no such list is never touched, and neither are ports: Fast DDS reuses their names, and cleans them up
-itself when it does.
+So a run lists, in a file beside them, the segments that its processes lock. At its end it removes
+those that nobody locks any more; if the launcher was killed too, the next run of this user does. What is in
+no such list is never touched, and neither are ports: Fast DDS reuses their names, and clears them then.
 """
 
 import fcntl

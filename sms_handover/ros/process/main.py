@@ -44,7 +44,7 @@ class Stop:
         """Install the handlers; a hang-up that is ignored, as under nohup(1), stays ignored."""
         self._signalled = False
         self._watch = None
-        if launcher := launcher_of_this_process():
+        if (launcher := launcher_of_this_process()) is not None:
             wake_when_parent_ends()
             self._watch = LauncherWatch(launcher)
         for number in _SIGNALS:
