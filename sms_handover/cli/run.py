@@ -98,8 +98,8 @@ def command(options: Namespace) -> int:
     """Carry out the command; return the exit code."""
     mode = REALTIME if options.real_time else LOCKSTEP
     here, elsewhere = placed(options.nodes, record=not options.no_record)
-    reach = network_scope_to(listed(options.peers))
-    if (elsewhere or reach.hosts) and options.domain_id is None:
+    scope = network_scope_to(listed(options.peers))
+    if (elsewhere or scope.hosts) and options.domain_id is None:
         raise ConfigurationError(
             "nodes of several hosts meet on a ROS domain: give each host the same --domain-id"
         )
@@ -122,10 +122,10 @@ def command(options: Namespace) -> int:
             inherited=(*held.descriptors, lock),
             nodes=here,
             elsewhere=elsewhere,
-            reach=reach,
+            scope=scope,
         )
         where = options.output or output
-        print(f"running on ROS domain {held.domain}, {reach}; output in {where}", flush=True)
+        print(f"running on ROS domain {held.domain}, {scope}; output in {where}", flush=True)
         if elsewhere:
             print(f"this host runs {', '.join(here)}; waiting for {', '.join(elsewhere)}", flush=True)
         if options.without_controller:

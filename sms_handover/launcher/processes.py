@@ -1,4 +1,4 @@
-"""The processes of a graph: started together, watched, and ended whatever happens."""
+"""The processes of a graph: started together, monitored, and ended whatever happens."""
 
 import os
 import signal
@@ -37,13 +37,13 @@ class Death:
 class NodeProcesses:
     """One process per node, each in a session of its own, its output in ``<folder>/<node>.log``.
 
-    Use it as a context manager: leaving it ends every process that is still there.
+    A context manager: leaving it ends every process.
     """
 
     def __init__(
         self, log_folder: Path, environment: Mapping[str, str], inherited: Sequence[int] = ()
     ) -> None:
-        """Prepare; nothing is started yet. Every process keeps the ``inherited`` file descriptors open."""
+        """Start nothing yet; every process will keep the ``inherited`` file descriptors open."""
         self._folder, self._inherited = log_folder, inherited
         self._environment = {**os.environ, **environment, **launcher_environment()}
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
@@ -56,7 +56,6 @@ class NodeProcesses:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End every process that is still there."""
         self.end()
         if self._guard is not None:
             self._guard.close()
@@ -66,8 +65,8 @@ class NodeProcesses:
     def start(self, node: str, arguments: Sequence[str], program: Sequence[str] = ()) -> None:
         """Start a node or the container, of this package unless it is another ``program``.
 
-        Another program need not know of us: a guard ends it, and what it has started, if this process is
-        killed. Raises GraphError if the log cannot be written.
+        Another program need not know of the launcher: a guard ends it, with all it has started, if this
+        process is killed. Raises GraphError if the log cannot be written.
         """
         if program and self._guard is None:
             self._guard = SessionGuard(self._inherited)
@@ -91,7 +90,7 @@ class NodeProcesses:
 
     @property
     def ids(self) -> dict[str, int]:
-        """Return the process id of every node that was started."""
+        """The process id of every node that was started."""
         return {name: process.pid for name, process in self._processes.items()}
 
     def suspended(self) -> dict[str, int]:
@@ -112,7 +111,7 @@ class NodeProcesses:
         ]
 
     def end(self) -> None:
-        """End every process, and what it has started, also if itself has ended already."""
+        """End every process and all that it has started, also where the process itself has ended before."""
         names = {process.pid: name for name, process in self._processes.items()}
         for session in end_sessions(names, GRACE_S):
             print(f"node {names[session]!r} did not end within {GRACE_S:g} s and was killed", file=sys.stderr)
@@ -121,7 +120,7 @@ class NodeProcesses:
 
 
 def _is_stopped(pid: int) -> bool:
-    """Whether a child is stopped now; what is told of it is left for others to ask."""
+    """Whether a child is stopped now; its status stays available to others who wait for it."""
     try:
         return os.waitid(os.P_PID, pid, os.WSTOPPED | os.WNOHANG | os.WNOWAIT) is not None
     except ChildProcessError:  # it has ended and was reaped

@@ -131,7 +131,7 @@ def test_the_end_of_a_launcher_is_noticed_with_and_without_a_handle_of_it(
     if not by_handle:
         monkeypatch.delattr(os, "pidfd_open")
         monkeypatch.setattr(launcher_watch, "_POLL_PERIOD_S", 0.01)
-    monkeypatch.setattr(launcher_watch.faulthandler, "dump_traceback_later", lambda *_, **__: None)
+    monkeypatch.setattr("faulthandler.dump_traceback_later", lambda *_, **__: None)
     with subprocess.Popen(["sleep", "600"]) as process:
         watch = launcher_watch.LauncherWatch(LauncherProcess.of(process.pid))
         assert not watch.launcher_has_ended

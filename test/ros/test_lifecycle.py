@@ -212,7 +212,7 @@ def drive(graph: Graph) -> None:
     driver = LifecycleDriver(graph.client, LOOP_NODES)
 
     def active() -> bool:
-        driver.look()
+        driver.poll()
         return driver.active
 
     graph.bench.until(active, "every node to be active")
@@ -241,7 +241,7 @@ def test_a_node_that_is_silent_is_asked_again(
     monkeypatch.setattr(client, "call_async", lose)
 
     def active() -> bool:
-        driver.look()
+        driver.poll()
         return driver.active
 
     bench.until(active, "the node to be active")
