@@ -102,7 +102,7 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     options.bag = bag_of(options.bag)
     if options.closed_loop:
         of_player = given(options, {name: name for name in vars(options)}).keys() - _OF_CLOSED_LOOP

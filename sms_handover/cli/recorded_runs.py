@@ -1,6 +1,6 @@
 """Recorded runs that a command is given."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from sms_handover.errors import ConfigurationError
@@ -15,18 +15,23 @@ def read_all(paths: Sequence[Path], progress: Progress | None = None) -> tuple[R
     An output folder with several runs gives them all. Raises ConfigurationError if two runs have the same
     name, or if one cannot be read or is not ours.
     """
-    names: dict[str, Path] = {}
-    for path in [bag for given in paths for bag in bags_of(given)]:
-        name = _name(path)
-        if name in names:
-            raise ConfigurationError(f"two runs are named {name!r}; rename one folder")
-        names[name] = path
+    names = named(bag for path in paths for bag in bags_of(path))
     runs: list[RecordedRun] = []
     for name, path in names.items():
         if progress:
             progress.show(f"reading {name}", f"{len(runs) + 1} of {len(names)}", len(runs) / len(names))
         runs.append(read_recorded(name, path))
     return tuple(runs)
+
+
+def named(bags: Iterable[Path]) -> dict[str, Path]:
+    """Return bags by the names of their runs; raises ConfigurationError if two have the same."""
+    names: dict[str, Path] = {}
+    for bag in bags:
+        if (name := _name(bag)) in names:
+            raise ConfigurationError(f"two runs are named {name!r}; rename one folder")
+        names[name] = bag
+    return names
 
 
 def _name(path: Path) -> str:

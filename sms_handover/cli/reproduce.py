@@ -25,7 +25,7 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     return max([_reproduce(bag) for bag in bags_of(options.run)])
 
 

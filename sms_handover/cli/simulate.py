@@ -29,7 +29,7 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     scenario = scenario_of(options)
     check_scenario(scenario)
     common = scenario.parameters.common

@@ -82,7 +82,6 @@ class CommandReplay:
         return self._endpoints.unmatched
 
     def _check_matched(self) -> None:
-        """Report that this node is ready once the plant has matched."""
         if not self._endpoints.unmatched:
             self._matching.cancel()
             self._ready.publish(String(data=CONTROLLER))
@@ -138,7 +137,6 @@ class CommandReplay:
         return command
 
     def _answer(self, publisher: CountedPublisher, message: Any) -> None:
-        """Publish an answer to this state, and keep it in case the plant repeats the state."""
         publisher.publish(message)
         self._answers.append((publisher, message))
 
@@ -149,7 +147,6 @@ def _raw(read: Read[Stamped[Any]]) -> Read[Stamped[bytes]]:
 
 
 def _run_state(data: bytes) -> RunState:
-    """Decode a state of the run; raises MessageError."""
     return decoded(data, RunState)
 
 

@@ -14,7 +14,6 @@ class Display(Progress):
     """Shows the progress of a run of known length."""
 
     def __init__(self, end_ns: int) -> None:
-        """Begin to count wall time."""
         super().__init__()
         self._end_s = ns_to_seconds(end_ns)
         self._begin, self._begin_s = monotonic(), 0.0

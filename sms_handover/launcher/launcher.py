@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from sms_handover.graph.topics import NODES, PLANT, RECORDER
 from sms_handover.launcher.display import Display
 from sms_handover.launcher.interrupts import Interrupts, let_go_of_closed_output
 from sms_handover.launcher.lifecycle_driver import LifecycleDriver
-from sms_handover.launcher.monitor import RunMonitor
+from sms_handover.launcher.monitor import Progress, RunMonitor
 from sms_handover.launcher.processes import Death, NodeProcesses
 from sms_handover.launcher.shared_memory import SharedMemory
 from sms_handover.launcher.timeouts import ActiveTime, SuspensionMonitor, WaitNotice
@@ -71,16 +71,17 @@ class LaunchPlan:
         """The nodes that are not ours."""
         return frozenset(self.scenario.parameters.common.external)
 
+    @property
+    def own_nodes(self) -> tuple[str, ...]:
+        """The nodes here that are ours, which the launcher takes through their lifecycle."""
+        return tuple(name for name in self.nodes if name not in self.external)
+
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a run ended: what the plant said, the events, whether the bag has every message."""
+    """How a run ended: its last progress, and what the recorder said about the bag."""
 
-    detail: str
-    failed: bool
-    stamp_ns: int
-    events: tuple[GraspEvent, ...]
-    run_events: tuple[RunEvent, ...]
+    progress: Progress
     recorder_code: int
     recorder_said: str
     interrupted: bool
@@ -116,7 +117,7 @@ def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outc
                 elif plan.controller:
                     named = ("--remap", f"__node:={name}")
                     processes.start(name, (*arguments.line, *named), plan.controller)
-            driver = LifecycleDriver(node, nodes_of(plan))
+            driver = LifecycleDriver(node, plan.own_nodes)
             common = plan.scenario.parameters.common
             end_ns = common.last_tick(plan.scenario.schedule.end_ns) * common.tick_ns
             with Display(end_ns) as display:
@@ -140,15 +141,10 @@ def graph_environment(plan: LaunchPlan) -> dict[str, str]:
     }
 
 
-def nodes_of(plan: LaunchPlan) -> tuple[str, ...]:
-    """Return the nodes here that are ours, which the launcher takes through their lifecycle."""
-    return tuple(name for name in plan.nodes if name not in plan.external)
-
-
 def arguments_of(plan: LaunchPlan) -> Mapping[str, ProcessArguments]:
     """Return what every process here is to be started with."""
     own = {name: dict(values) for name, values in plan.scenario.overrides.items()}
-    for name in nodes_of(plan):
+    for name in plan.own_nodes:
         own.setdefault(name, {})["autostart"] = False
     if plan.bag:
         own.setdefault(RECORDER, {})["folder"] = str(plan.bag)
@@ -159,26 +155,22 @@ def arguments_of(plan: LaunchPlan) -> Mapping[str, ProcessArguments]:
     return process_arguments(common, own, files, record=record, together=together, here=plan.nodes)
 
 
+@dataclass
 class _Run:
     """One run from start to end."""
 
-    def __init__(
-        self,
-        plan: LaunchPlan,
-        monitor: RunMonitor,
-        driver: LifecycleDriver,
-        executor: Executor,
-        processes: NodeProcesses,
-        display: Display,
-        interrupts: Interrupts,
-        memory: SharedMemory,
-    ) -> None:
-        self._plan, self._monitor, self._executor, self._processes = plan, monitor, executor, processes
-        self._driver, self._display, self._common = driver, display, plan.scenario.parameters.common
-        self._events_shown = self._run_events_shown = 0
-        self._interrupts, self._memory = interrupts, memory
-        self._time, self._suspended = ActiveTime(), SuspensionMonitor()
-        self._recorder_ended = inf  # [s] of active time
+    plan: LaunchPlan
+    monitor: RunMonitor
+    driver: LifecycleDriver
+    executor: Executor
+    processes: NodeProcesses
+    display: Display
+    interrupts: Interrupts
+    memory: SharedMemory
+    time: ActiveTime = field(default_factory=ActiveTime)
+    suspended: SuspensionMonitor = field(default_factory=SuspensionMonitor)
+    recorder_ended: float = inf  # [s] of active time
+    shown: list[GraspEvent | RunEvent] = field(default_factory=list)
 
     def to_the_end(self) -> Outcome:
         """Return how the run ended; raises GraphError if a node died or nothing went on.
@@ -190,74 +182,62 @@ class _Run:
         while code is None:  # the run may be reset at any moment, also at its end
             self._wait_for_end()
             self._wait_for_events()
-            code = self._wait_for_recorder() if self._plan.bag else EXIT_OK
+            code = self._wait_for_recorder() if self.plan.bag else EXIT_OK
         self._wait_for_other_hosts()
         self._shut_down()
-        progress = self._monitor.progress
         self._show(last=True)
-        return Outcome(
-            detail=progress.detail,
-            failed=progress.state == RunState.FAILED,
-            stamp_ns=progress.stamp_ns,
-            events=tuple(progress.events),
-            run_events=tuple(progress.run_events),
-            recorder_code=code,
-            recorder_said=self._processes.text_of(RECORDER) if self._plan.bag else "",
-            interrupted=self._interrupts.asked,
-        )
+        said = self.processes.text_of(RECORDER) if self.plan.bag else ""
+        return Outcome(self.monitor.progress, code, said, self.interrupts.asked)
 
     def _wait_for_start(self) -> None:
         """Wait until every endpoint has matched and the plant has begun."""
-        by_hand = bool(self._plan.external) and not self._plan.controller
-        timeout_s = _HOSTS_TIMEOUT_S if self._plan.elsewhere else _START_TIMEOUT_S
-        deadline = inf if by_hand else self._time.seconds + timeout_s
+        by_hand = bool(self.plan.external) and not self.plan.controller
+        timeout_s = _HOSTS_TIMEOUT_S if self.plan.elsewhere else _START_TIMEOUT_S
+        deadline = inf if by_hand else self.time.seconds + timeout_s
         interrupted = inf
         asked = False
         notice = WaitNotice()
-        while self._monitor.progress.state == RunState.WAITING:
-            self._driver.poll()
+        while self.monitor.progress.state == RunState.WAITING:
+            self.driver.poll()
             self._poll()
-            self._memory.note((os.getpid(), *self._processes.ids.values()))
-            if self._interrupts.asked:
-                if self._interrupts.at_once or not self._driver.active:
+            self.memory.note((os.getpid(), *self.processes.ids.values()))
+            if self.interrupts.asked:
+                if self.interrupts.at_once or not self.driver.active:
                     raise KeyboardInterrupt
-                interrupted = min(interrupted, self._time.seconds)
-                asked = asked or self._monitor.ask_to_finish()  # it may run, and only the message be late
-                if self._time.seconds - interrupted > _BEGUN_TIMEOUT_S:
+                interrupted = min(interrupted, self.time.seconds)
+                asked = asked or self.monitor.ask_to_finish()  # it may run, and only the message be late
+                if self.time.seconds - interrupted > _BEGUN_TIMEOUT_S:
                     raise KeyboardInterrupt
-            why = self._driver.waiting_for or self._monitor.waiting_for()
-            if self._time.seconds > deadline:
+            why = self.driver.waiting_for or self.monitor.waiting_for()
+            if self.time.seconds > deadline:
                 raise GraphError(f"the run has not begun after {timeout_s:g} s: {why}")
-            self._print(notice.poll(self._time.seconds, why))
-        self._display.start(self._monitor.progress.stamp_ns)
+            self._print(notice.poll(self.time.seconds, why))
+        self.display.start(self.monitor.progress.stamp_ns)
 
     def _wait_for_end(self) -> None:
-        """Wait until the plant says that the run is over."""
-        seen_ns, since = -1, self._time.seconds
+        seen_ns, since = -1, self.time.seconds
         asked = False
-        while not self._monitor.finished:
+        while not self.monitor.finished:
             self._poll()
             self._show()
-            if self._interrupts.at_once:
+            if self.interrupts.at_once:
                 raise KeyboardInterrupt
-            if self._interrupts.asked and not asked:
-                asked = self._monitor.ask_to_finish()
-            now_ns = self._monitor.progress.stamp_ns
-            if now_ns != seen_ns or self._monitor.progress.state == RunState.PAUSED:
-                seen_ns, since = now_ns, self._time.seconds
-            elif self._time.seconds - since > _STALL_TIMEOUT_S:
+            if self.interrupts.asked and not asked:
+                asked = self.monitor.ask_to_finish()
+            now_ns = self.monitor.progress.stamp_ns
+            if now_ns != seen_ns or self.monitor.progress.state == RunState.PAUSED:
+                seen_ns, since = now_ns, self.time.seconds
+            elif self.time.seconds - since > _STALL_TIMEOUT_S:
                 raise GraphError(
                     f"no progress for {_STALL_TIMEOUT_S:g} s at {ns_to_seconds(now_ns):g} s of simulated "
-                    f"time: {self._monitor.waiting_for()}"
+                    f"time: {self.monitor.waiting_for()}"
                 )
 
     def _wait_for_events(self) -> None:
         """Wait for the events, which may arrive after the message of the end."""
-        deadline = self._time.seconds + _NEWS_TIMEOUT_S
+        deadline = self.time.seconds + _NEWS_TIMEOUT_S
         while (
-            not self._monitor.has_every_event
-            and not self._interrupts.at_once
-            and self._time.seconds < deadline
+            not self.monitor.has_every_event and not self.interrupts.at_once and self.time.seconds < deadline
         ):
             self._poll()
 
@@ -266,17 +246,17 @@ class _Run:
 
         Returns None if a new run begins instead.
         """
-        deadline = self._time.seconds + _DRAIN_TIMEOUT_S
+        deadline = self.time.seconds + _DRAIN_TIMEOUT_S
         while True:
-            if not self._monitor.finished:
+            if not self.monitor.finished:
                 return None
-            code = self._processes.exit_code(RECORDER)
+            code = self.processes.exit_code(RECORDER)
             if code is not None:
                 return code
             self._poll()
-            if self._interrupts.at_once:
+            if self.interrupts.at_once:
                 raise KeyboardInterrupt
-            if self._time.seconds > deadline:
+            if self.time.seconds > deadline:
                 raise GraphError(f"the recorder has not closed the bag; {self._remedy}")
 
     def _wait_for_other_hosts(self) -> None:
@@ -284,39 +264,38 @@ class _Run:
 
         All nodes stay until the recorder has everything; the plant, which reports the end, ends last.
         """
-        if RECORDER in self._plan.elsewhere and not self._have_left((RECORDER,)):
+        if RECORDER in self.plan.elsewhere and not self._have_left((RECORDER,)):
             raise GraphError("the recorder, on another host, has not ended; look at its bag there")
-        if PLANT in self._plan.nodes:
-            self._have_left(self._plan.elsewhere)
+        if PLANT in self.plan.nodes:
+            self._have_left(self.plan.elsewhere)
 
     def _have_left(self, names: Collection[str]) -> bool:
-        """Wait until nodes have left the graph; return whether they have."""
-        deadline = self._time.seconds + _LEAVE_TIMEOUT_S
-        while self._monitor.present(names):
-            if not self._monitor.finished:  # the run has been reset
-                deadline = self._time.seconds + _LEAVE_TIMEOUT_S
-            if self._time.seconds > deadline or self._interrupts.at_once:
+        deadline = self.time.seconds + _LEAVE_TIMEOUT_S
+        while self.monitor.present(names):
+            if not self.monitor.finished:  # the run has been reset
+                deadline = self.time.seconds + _LEAVE_TIMEOUT_S
+            if self.time.seconds > deadline or self.interrupts.at_once:
                 return False
             self._poll()
         return True
 
     def _shut_down(self) -> None:
         """Shut every node down; what does not end then is ended as a process."""
-        self._driver.shut_down()
-        deadline = self._time.seconds + _SHUTDOWN_TIMEOUT_S
-        while len(self._processes.dead()) < len(self._processes.ids) and self._time.seconds < deadline:
-            self._executor.spin_once(timeout_sec=_SHUTDOWN_POLL_S)
-            self._time.update()
+        self.driver.shut_down()
+        deadline = self.time.seconds + _SHUTDOWN_TIMEOUT_S
+        while len(self.processes.dead()) < len(self.processes.ids) and self.time.seconds < deadline:
+            self.executor.spin_once(timeout_sec=_SHUTDOWN_POLL_S)
+            self.time.update()
 
     def _poll(self) -> None:
         """Handle what has arrived, and raise GraphError if a node has died."""
-        self._executor.spin_once(timeout_sec=_POLL_S)
-        self._monitor.poll()
-        self._time.update()
+        self.executor.spin_once(timeout_sec=_POLL_S)
+        self.monitor.poll()
+        self.time.update()
         let_go_of_closed_output()
-        self._print(self._interrupts.poll())
-        self._print(self._suspended.poll(self._processes.suspended(), self._time.seconds))
-        if dead := [death for death in self._processes.dead() if not self._recorder_is_done(death)]:
+        self._print(self.interrupts.poll())
+        self._print(self.suspended.poll(self.processes.suspended(), self.time.seconds))
+        if dead := [death for death in self.processes.dead() if not self._recorder_is_done(death)]:
             raise GraphError(self._death_report(dead))
 
     def _recorder_is_done(self, death: Death) -> bool:
@@ -326,30 +305,26 @@ class _Run:
         """
         if death.name != RECORDER or death.code not in (EXIT_OK, EXIT_LOSS):
             return False
-        self._recorder_ended = min(self._recorder_ended, self._time.seconds)
-        return self._monitor.finished or self._time.seconds - self._recorder_ended < _NEWS_TIMEOUT_S
+        self.recorder_ended = min(self.recorder_ended, self.time.seconds)
+        return self.monitor.finished or self.time.seconds - self.recorder_ended < _NEWS_TIMEOUT_S
 
     def _print(self, lines: Collection[str]) -> None:
-        """Print lines beside the progress."""
         for line in lines:
-            self._display.print(line)
+            self.display.print(line)
 
     def _show(self, *, last: bool = False) -> None:
-        """Show progress, and every event once."""
-        progress = self._monitor.progress
-        self._events_shown = min(self._events_shown, len(progress.events))
-        self._run_events_shown = min(self._run_events_shown, len(progress.run_events))
-        for event in progress.events[self._events_shown :]:
-            self._display.print_event(event)
-        for decision in progress.run_events[self._run_events_shown :]:
-            self._display.print_event(decision)
-        self._events_shown, self._run_events_shown = len(progress.events), len(progress.run_events)
+        progress, common = self.monitor.progress, self.plan.scenario.parameters.common
+        events: list[GraspEvent | RunEvent] = [*progress.events, *progress.run_events]
+        for event in events:
+            if event not in self.shown:
+                self.display.print_event(event)
+        self.shown = events
         if progress.task_end_ns:
-            last_tick = self._common.last_tick(progress.task_end_ns, failed=progress.task_failed)
-            self._display.lasts_until(last_tick * self._common.tick_ns)
+            last_tick = common.last_tick(progress.task_end_ns, failed=progress.task_failed)
+            self.display.lasts_until(last_tick * common.tick_ns)
         if last:
-            self._display.finish(progress.wall_time)
-        self._display.show_run(progress.stamp_ns, progress.phase, progress.tool_error, last=last)
+            self.display.finish(progress.wall_time)
+        self.display.show_run(progress.stamp_ns, progress.phase, progress.tool_error, last=last)
 
     def _death_report(self, dead: Sequence[Death]) -> str:
         """Return who died, how, what to do, and the end of the logs."""
@@ -360,5 +335,4 @@ class _Run:
 
     @property
     def _remedy(self) -> str:
-        """How to repair a bag that was not closed."""
-        return f"'sms-handover bag recover {self._plan.bag}' makes a whole bag of what was written"
+        return f"'sms-handover bag recover {self.plan.bag}' makes a whole bag of what was written"

@@ -61,7 +61,6 @@ class LifecycleDriver:
         self._ask(_SHUTDOWN)
 
     def _have_all(self, transition: int) -> bool:
-        """Whether every node has done a transition."""
         return self._done[transition] >= self._clients.keys()
 
     def _ask(self, transition: int) -> None:
@@ -82,7 +81,6 @@ class LifecycleDriver:
                 client.call_async(GetState.Request()).add_done_callback(self._state(name, transition))
 
     def _answer(self, name: str, transition: int) -> Callable[[Any], None]:
-        """Return the callback for the answer of a node that was asked for a transition."""
 
         def on_answer(future: Any) -> None:
             if future.result().success:
@@ -93,7 +91,6 @@ class LifecycleDriver:
         return on_answer
 
     def _state(self, name: str, transition: int) -> Callable[[Any], None]:
-        """Return the callback for the answer of a node that was asked for its state."""
 
         def on_state(future: Any) -> None:
             state = future.result().current_state.id

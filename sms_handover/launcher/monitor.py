@@ -63,6 +63,11 @@ class Progress:
     run_events: list[RunEvent] = field(default_factory=list)
     waiting: dict[str, str] = field(default_factory=dict)
 
+    @property
+    def failed(self) -> bool:
+        """Whether the task has failed."""
+        return bool(self.state == RunState.FAILED)
+
 
 class RunMonitor:
     """Subscribes to a graph without taking part in it.
@@ -174,7 +179,6 @@ class RunMonitor:
         self._published[message.node] = dict(zip(message.topics, message.counts, strict=False))
 
     def _published_count(self, name: str) -> int:
-        """Return how many messages of a topic the nodes report to have published."""
         return sum(
             count
             for counts in self._published.values()
@@ -207,5 +211,4 @@ class RunMonitor:
 
 
 def _reader(kind: Any) -> Read[Any]:
-    """Return the decoder of a message class."""
     return lambda data: decoded(data, kind)

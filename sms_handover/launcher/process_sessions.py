@@ -68,7 +68,6 @@ def _running(sessions: Collection[int]) -> list[ProcessStatus]:
 
 
 def _signal(processes: Collection[ProcessStatus], number: signal.Signals) -> None:
-    """Send a signal to the process groups of processes."""
     for group in {status.group for status in processes}:
         with suppress(ProcessLookupError, PermissionError):  # it has ended, or is another user's
             os.killpg(group, number)

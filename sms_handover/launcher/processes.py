@@ -7,7 +7,6 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 
 from sms_handover.launcher.node_log import NodeLog
 from sms_handover.launcher.process_sessions import GRACE_S, SessionGuard, end_sessions
@@ -53,9 +52,7 @@ class NodeProcesses:
     def __enter__(self) -> "NodeProcesses":
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.end()
         if self._guard is not None:
             self._guard.close()

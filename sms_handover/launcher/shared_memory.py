@@ -15,7 +15,6 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from secrets import token_hex
-from types import TracebackType
 from typing import TextIO
 
 FOLDER = Path("/dev/shm")  # of Linux; there is nothing to do elsewhere
@@ -43,9 +42,7 @@ class SharedMemory:
             fcntl.flock(self._list, fcntl.LOCK_EX)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Remove what is left of this run; the list stays while a process still holds a segment in it."""
         if self._list is not None:
             if not _remove_unlocked(self._folder, self._listed):
@@ -64,7 +61,6 @@ class SharedMemory:
 
 
 def _private(path: str, flags: int) -> int:
-    """Open a file that only this user may read."""
     return os.open(path, flags, 0o600)
 
 

@@ -225,7 +225,7 @@ def test_a_node_that_is_silent_is_asked_again(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, lost: str
 ) -> None:
     """The middleware loses the first answer of a service if its node has not found who asks soon enough."""
-    monkeypatch.setattr(lifecycle_driver, "_SILENCE_S", 0.05)
+    monkeypatch.setattr(lifecycle_driver, "_ANSWER_TIMEOUT_S", 0.05)
     bench.start(MANAGED)
     node = bench.add(IkNode)
     driver = LifecycleDriver(bench.plain("launcher"), [IK])

@@ -28,7 +28,7 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     results = []
     for path in bags_of(options.bag):
         with byte_progress("checking") as progress:

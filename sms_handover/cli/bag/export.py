@@ -36,7 +36,7 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     choice = TopicChoice(tuple(options.topics), options.regex, tuple(options.exclude_topics))
     selection = Selection(choice, options.start, options.end)
     with byte_progress("exporting") as progress:

@@ -33,7 +33,7 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     path = bag_of(options.bag)
     output = options.output or _beside(path)
     with byte_progress("recovering") as progress:
