@@ -30,6 +30,7 @@ KEYS = {
     "mpl_toolkits": "python3-matplotlib",
     "numpy": "python3-numpy",
     "pinocchio": "pinocchio",
+    "rich": "python3-rich",
     "rosbags": "python3-rosbags-pip",
     "yaml": "python3-yaml",
     "zstandard": "mcap-ros2-support",

@@ -28,10 +28,7 @@ def add_scenario_options(parser: ArgumentParser) -> None:
     group.add_argument("--schedule", type=Path, metavar="FILE", help="task schedule (default: handover.yaml)")
     group.add_argument("--robot", type=Path, metavar="FILE", help="robot description (default: robot.yaml)")
     group.add_argument(
-        "--duration",
-        type=float,
-        metavar="S",
-        help="simulated time in s (default: the schedule's)",
+        "--duration", type=float, metavar="S", help="simulated time in s (default: the schedule's)"
     )
     group.add_argument("--time-law", choices=tuple(TIME_LAWS), help="approach of targets (default: step)")
     group.add_argument(

@@ -1,1 +1,1 @@
-"""External nodes: what a user's node imports to take the place of one of ours."""
+"""External nodes: what a node of another package imports to replace one of ours."""

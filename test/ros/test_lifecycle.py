@@ -212,7 +212,7 @@ def drive(graph: Graph) -> None:
     driver = LifecycleDriver(graph.client, LOOP_NODES)
 
     def active() -> bool:
-        driver.look()
+        driver.poll()
         return driver.active
 
     graph.bench.until(active, "every node to be active")
@@ -225,7 +225,7 @@ def test_a_node_that_is_silent_is_asked_again(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, lost: str
 ) -> None:
     """The middleware loses the first answer of a service if its node has not found who asks soon enough."""
-    monkeypatch.setattr(lifecycle_driver, "_SILENCE_S", 0.05)
+    monkeypatch.setattr(lifecycle_driver, "_ANSWER_TIMEOUT_S", 0.05)
     bench.start(MANAGED)
     node = bench.add(IkNode)
     driver = LifecycleDriver(bench.plain("launcher"), [IK])
@@ -241,7 +241,7 @@ def test_a_node_that_is_silent_is_asked_again(
     monkeypatch.setattr(client, "call_async", lose)
 
     def active() -> bool:
-        driver.look()
+        driver.poll()
         return driver.active
 
     bench.until(active, "the node to be active")

@@ -1,4 +1,4 @@
-"""The launcher's ear: progress, grasp events, who waits for whom, and the request to finish."""
+"""The monitor of the launcher: progress, grasp events, who waits for whom, and the request to finish."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -77,7 +77,7 @@ class FakeGraph:
         def heard() -> object:
             for topic, message in said:
                 self.say(topic, message)
-            self.monitor.look()
+            self.monitor.poll()
             return condition()
 
         self.bench.until(heard, what)
@@ -155,7 +155,7 @@ def test_grasp_events_are_kept_in_order(graph: FakeGraph) -> None:
 def test_every_event_has_been_heard_when_the_plant_says_so(graph: FakeGraph) -> None:
     """Messages of different topics arrive in any order: the counts of the end may come before the events."""
     monitor = graph.monitor
-    assert not monitor.heard_every_event
+    assert not monitor.has_every_event
 
     def tell(node: str, count: int) -> None:
         counts = PublishedCounts(node=node, topics=["/joint_states", f"/{GRASP_EVENT}"], counts=[7, count])
@@ -164,10 +164,10 @@ def test_every_event_has_been_heard_when_the_plant_says_so(graph: FakeGraph) -> 
     tell("controller", 0)
     graph.say(GRASP_EVENT, GraspEventMessage())
     graph.until(lambda: monitor.progress.events, "the first event")
-    assert not monitor.heard_every_event
+    assert not monitor.has_every_event
     tell("plant", 2)
     graph.say(GRASP_EVENT, GraspEventMessage())
-    graph.until(lambda: monitor.heard_every_event, "the second event and the counts")
+    graph.until(lambda: monitor.has_every_event, "the second event and the counts")
     assert len(monitor.progress.events) == 2
 
 
@@ -182,9 +182,9 @@ def test_decisions_of_every_node_are_heard(graph: FakeGraph) -> None:
         graph.say(RUN_PUBLISHED, counts)
     graph.say(RUN_EVENTS, run_event_message(events[0]))
     graph.until(lambda: monitor.progress.run_events, "the first event")
-    assert not monitor.heard_every_event
+    assert not monitor.has_every_event
     graph.say(RUN_EVENTS, run_event_message(events[1]))
-    graph.until(lambda: monitor.heard_every_event, "the second event and the counts")
+    graph.until(lambda: monitor.has_every_event, "the second event and the counts")
     assert repr(monitor.progress.run_events) == repr(events)
 
 
@@ -207,14 +207,14 @@ def test_what_strangers_say_of_a_run_is_not_believed(bench: Bench) -> None:
     graph.say(GRASP_EVENT, GraspEventMessage(status=77))
     graph.say(GRASP_EVENT, GraspEventMessage())
     graph.say(RUN_PUBLISHED, PublishedCounts(node="plant", topics=["/task/grasp_event"], counts=[1]))
-    graph.until(lambda: graph.monitor.heard_every_event, "the truth")
+    graph.until(lambda: graph.monitor.has_every_event, "the truth")
     assert (len(progress.events), progress.state) == (1, RunState.RUNNING)
     graph.destroy()
 
 
 def test_a_run_without_events_has_none_to_wait_for(graph: FakeGraph) -> None:
     graph.say(RUN_PUBLISHED, PublishedCounts(node="plant", topics=["/joint_states"], counts=[7]))
-    graph.until(lambda: graph.monitor.heard_every_event, "the counts")
+    graph.until(lambda: graph.monitor.has_every_event, "the counts")
     assert graph.monitor.progress.events == []
 
 
@@ -235,7 +235,7 @@ def test_a_pose_without_a_target_is_no_error(graph: FakeGraph) -> None:
 
 def test_who_waits_for_what_is_told(graph: FakeGraph) -> None:
     waiting = graph.monitor.progress.waiting
-    assert graph.monitor.waiting_for() == "no node says why"
+    assert graph.monitor.waiting_for() == "no node reports why"
     warn = DiagnosticStatus(level=DiagnosticStatus.WARN, name="ik", message="waiting for x")
     graph.until(lambda: waiting, "the warning", (DIAGNOSTICS, DiagnosticArray(status=[warn])))
     assert graph.monitor.waiting_for() == "ik is waiting for x"

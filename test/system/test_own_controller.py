@@ -42,6 +42,8 @@ def own(schedule: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, t
     runs = {}
     for name, module in NODES.items():
         program = f"{sys.executable} -m {module}"
+        if name == "helped":  # behind a shell, as behind any wrapper, it still knows its launcher
+            program = f"bash -c '{program} \"$@\" & wait' bash"
         ended = sms_handover(
             "run", "--schedule", schedule, "--own-controller", program, "-o", name, cwd=folder
         )
