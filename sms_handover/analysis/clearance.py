@@ -10,8 +10,8 @@ import pinocchio as pin
 from sms_handover.analysis.grasps import holds
 from sms_handover.clearance.bodies import Body, BodyKind
 from sms_handover.clearance.distances import ClearanceModel
-from sms_handover.errors import RobotDescriptionError, UnknownNameError
 from sms_handover.frames import tool_frame
+from sms_handover.model.floating_model import floating_model, joint_columns
 from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.run_data import RunData
 from sms_handover.trajectory.schedule_text import deputy_size_in, grasping_arms_in
@@ -85,13 +85,10 @@ class _Course:
     """The configurations of a run, with the deputy, and who was to touch it when."""
 
     def __init__(self, run: RunData, urdf: str, schedule_text: str) -> None:
-        try:
-            self._pin = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
-        except (ValueError, RuntimeError) as error:
-            raise RobotDescriptionError(f"the robot description cannot be read: {error}") from error
+        self._pin = floating_model(urdf)
         self._run, self._data = run, self._pin.createData()
         self.model = ClearanceModel(self._pin, urdf, run.arms, deputy_size_in(schedule_text))
-        self._columns = [self._column(name) for name in run.joint_names]
+        self._columns = joint_columns(self._pin, run.joint_names)
         usable = np.isfinite(run.deputy_pose).all(axis=1)
         ticks = np.searchsorted(run.tick_ns, run.reference_ns)
         usable &= ticks < run.tick_ns.size
@@ -204,9 +201,3 @@ class _Course:
         pin.forwardKinematics(self._pin, self._data, q)
         frame = self._pin.getFrameId(tool_frame(arm))
         return pin.updateFramePlacement(self._pin, self._data, frame).copy()
-
-    def _column(self, joint: str) -> int:
-        """Return where a joint's angle lies in the configuration."""
-        if joint not in self._pin.names:
-            raise UnknownNameError("joint", joint, list(self._pin.names)[2:], "robot description")
-        return int(self._pin.joints[self._pin.getJointId(joint)].idx_q)

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from sms_handover.analysis.clearance import GroupClearance, RunClearance, run_clearance
+from sms_handover.analysis.joint_limits import limit_use
 from sms_handover.errors import ScheduleError, UnknownNameError
+from sms_handover.model.robot_model import RobotModel
 from sms_handover.run_data import RunData
 from sms_handover.simulation.scenario import Scenario
 from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus
@@ -129,3 +131,21 @@ def test_texts_that_do_not_fit_the_run(nmpc_run: RunData, scenario: Scenario) ->
         clearance(run, scenario, schedule="phases: []")
     with pytest.raises(UnknownNameError, match="arm_c_joint_1"):
         clearance(replace(run, joint_names=("arm_c_joint_1", *run.joint_names[1:])), scenario)
+
+
+@pytest.mark.parametrize(("law", "share", "kept"), [("nmpc", 0.48, True), ("pid", 1.64, False)])
+def test_limits_of_the_joints(law: str, share: float, kept: bool, request: pytest.FixtureRequest) -> None:
+    """As measured from outside: under PID a joint of the first edition's handover turns too fast by 64 %."""
+    robot = RobotModel.load()
+    use = limit_use(request.getfixturevalue(f"{law}_run"), robot.pin)
+    assert use.rate.value == pytest.approx(share, abs=0.01)
+    assert use.kept is kept and (use.rate.beyond > 0.0) is not kept
+
+
+def test_a_position_beyond_its_limit(nmpc_run: RunData, robot: RobotModel) -> None:
+    run = short(nmpc_run, 2)
+    position = run.joint_position.copy()
+    position[5:9, 3] = robot.upper[3] + 0.02
+    use = limit_use(replace(run, joint_position=position), robot.pin)
+    assert use.position.joint == run.joint_names[3] and use.position.stamp_ns == run.tick_ns[5]
+    assert use.position.value == pytest.approx(0.02) and use.position.beyond == pytest.approx(0.004)
