@@ -148,12 +148,12 @@ class ViewerNode(RunnableNode):
     def _on_phase(self, phase: TaskPhase, sent_ns: int) -> None:
         """Show the phase."""
         if self._scene:
-            self._scene.enter(phase)
+            self._scene.set_phase(phase)
 
     def _on_event(self, event: GraspEvent, sent_ns: int) -> None:
         """Show what came of a grasp."""
         if self._scene:
-            self._scene.tell(event)
+            self._scene.add_event(event)
 
     def _add(self, name: str, message: Stamped[bytes], sent_ns: int) -> None:
         """Keep what is in a good message until all of its stamp are there, then show them."""

@@ -49,7 +49,7 @@ def graph(bench: Bench) -> Graph:
 def shown(viewer: ViewerNode) -> Any:
     """Return all that the viewer shows; None as long as there is nothing."""
     scene = viewer.find_scene()
-    news = scene.news(Seen(), 0.0) if isinstance(scene, LiveScene) else None
+    news = scene.updates(Seen(), 0.0) if isinstance(scene, LiveScene) else None
     return news and news[0]
 
 
