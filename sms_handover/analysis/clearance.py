@@ -14,7 +14,7 @@ from sms_handover.frames import tool_frame
 from sms_handover.model.floating_model import floating_model, joint_columns
 from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.run_data import RunData
-from sms_handover.trajectory.schedule_text import deputy_size_in, grasping_arms_in
+from sms_handover.trajectory.schedule_text import deputy_size, grasping_arms
 from sms_handover.types import BASE_NQ, Array, Pose
 
 Rows = npt.NDArray[np.bool_]  # one per reference period
@@ -36,9 +36,14 @@ class GroupClearance:
     bodies: tuple[str, str]
 
     @property
+    def margin(self) -> float:
+        """How much farther apart than allowed the bodies stayed, m; negative in a collision."""
+        return self.least - self.allowed
+
+    @property
     def collides(self) -> bool:
         """Whether the bodies came nearer than is allowed."""
-        return self.least < self.allowed
+        return self.margin < 0.0
 
 
 @dataclass(frozen=True)
@@ -53,9 +58,15 @@ class RunClearance:
         return tuple(group for group in self.groups if group.collides)
 
 
-def run_clearance(
-    run: RunData, urdf: str, schedule_text: str, contact_depth: float = CONTACT_DEPTH
-) -> RunClearance:
+@dataclass(frozen=True)
+class TaskTexts:
+    """What a run was made with, as its bag carries it: the robot as URDF, the schedule as YAML."""
+
+    urdf: str
+    schedule: str
+
+
+def run_clearance(run: RunData, texts: TaskTexts, contact_depth: float = CONTACT_DEPTH) -> RunClearance:
     """Return how near the bodies of a run came to each other.
 
     Distances are taken at every reference period, and at every tick around the least one of each group. A
@@ -64,7 +75,7 @@ def run_clearance(
     grasp, until it has let go and has come off. Raises RobotDescriptionError or ScheduleError where the
     texts do not say what bodies and targets there are, and UnknownNameError where joints differ.
     """
-    course = _Course(run, urdf, schedule_text)
+    course = _Course(run, texts)
     sampled = course.sampled()
     groups: dict[tuple[str, bool], list[tuple[int, Rows]]] = {}
     for pair, (one, other) in enumerate(course.model.pairs):
@@ -78,16 +89,16 @@ def run_clearance(
         one, other = course.model.pairs[pair]
         allowed = -contact_depth if contact else 0.0
         found.append(GroupClearance(name, least, allowed, stamp_ns, (one.name, other.name)))
-    return RunClearance(tuple(sorted(found, key=lambda group: group.least - group.allowed)))
+    return RunClearance(tuple(sorted(found, key=lambda group: group.margin)))
 
 
 class _Course:
     """The configurations of a run, with the deputy, and who was to touch it when."""
 
-    def __init__(self, run: RunData, urdf: str, schedule_text: str) -> None:
-        self._pin = floating_model(urdf)
+    def __init__(self, run: RunData, texts: TaskTexts) -> None:
+        self._pin = floating_model(texts.urdf)
         self._run, self._data = run, self._pin.createData()
-        self.model = ClearanceModel(self._pin, urdf, run.arms, deputy_size_in(schedule_text))
+        self.model = ClearanceModel(self._pin, texts.urdf, run.arms, deputy_size(texts.schedule))
         self._columns = joint_columns(self._pin, run.joint_names)
         usable = np.isfinite(run.deputy_pose).all(axis=1)
         ticks = np.searchsorted(run.tick_ns, run.reference_ns)
@@ -98,7 +109,7 @@ class _Course:
         self._ticks = ticks[self._rows]
         self._stamps = run.reference_ns[self._rows]
         self._grasps = holds(run.grasp_events)
-        self._aims = self._aiming(grasping_arms_in(schedule_text))
+        self._aims = self._aiming(grasping_arms(texts.schedule))
 
     def sampled(self) -> Array:
         """Return the distances (M, pairs) m at the reference periods."""

@@ -10,7 +10,7 @@ from sms_handover.types import Array, read_only
 _WRONG = (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError)
 
 
-def deputy_size_in(text: str) -> Array:
+def deputy_size(text: str) -> Array:
     """Return the edges (3,) m of the deputy; raises ScheduleError if the text does not say."""
     try:
         return read_only(positive_vector(load(text)["deputy"]["size"], 3, "deputy: size", "m"))
@@ -18,7 +18,7 @@ def deputy_size_in(text: str) -> Array:
         raise ScheduleError(f"the schedule does not say how large the deputy is: {error}") from error
 
 
-def grasping_arms_in(text: str) -> tuple[frozenset[str], ...]:
+def grasping_arms(text: str) -> tuple[frozenset[str], ...]:
     """Return, phase by phase, the arms that go to a grasp frame; raises ScheduleError."""
     try:
         return tuple(

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sms_handover.analysis.clearance import GroupClearance, RunClearance, run_clearance
+from sms_handover.analysis.clearance import GroupClearance, RunClearance, TaskTexts, run_clearance
 from sms_handover.analysis.joint_limits import limit_use
 from sms_handover.errors import ScheduleError, UnknownNameError
 from sms_handover.model.robot_model import RobotModel
@@ -17,10 +17,8 @@ from sms_handover.units import MM_PER_M, ns_to_seconds
 BEFORE, AFTER = "before its grasp", "after it let go"
 
 
-def clearance(run: RunData, scenario: Scenario, **changes: str) -> RunClearance:
-    return run_clearance(
-        run, changes.get("urdf", scenario.robot.urdf), changes.get("schedule", scenario.schedule.text)
-    )
+def clearance(run: RunData, scenario: Scenario, schedule: str = "") -> RunClearance:
+    return run_clearance(run, TaskTexts(scenario.robot.urdf, schedule or scenario.schedule.text))
 
 
 def group(found: RunClearance, *words: str) -> GroupClearance:
