@@ -10,6 +10,7 @@ import pinocchio as pin
 from sms_handover.analysis.grasps import holds
 from sms_handover.clearance.bodies import Body, BodyKind
 from sms_handover.clearance.distances import ClearanceModel
+from sms_handover.errors import RobotDescriptionError, ScheduleError, UnknownNameError
 from sms_handover.frames import tool_frame
 from sms_handover.model.floating_model import floating_model, joint_columns
 from sms_handover.model.poses import pose_of, se3_of
@@ -64,6 +65,15 @@ class TaskTexts:
 
     urdf: str
     schedule: str
+
+    def fit(self, run: RunData) -> bool:
+        """Whether they describe a robot with the joints of a run, and a deputy."""
+        try:
+            joint_columns(floating_model(self.urdf), run.joint_names)
+            deputy_size(self.schedule), grasping_arms(self.schedule)
+        except (RobotDescriptionError, ScheduleError, UnknownNameError):
+            return False
+        return True
 
 
 def run_clearance(run: RunData, texts: TaskTexts, contact_depth: float = CONTACT_DEPTH) -> RunClearance:

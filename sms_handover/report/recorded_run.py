@@ -35,9 +35,12 @@ class RecordedRun:
 
     @property
     def texts(self) -> TaskTexts | None:
-        """What the run was made with, None if the bag does not carry it."""
+        """What the run was made with, None if the bag does not carry it or carries something else."""
         urdf, schedule = self.info.urdf_text, self.info.schedule_text
-        return None if urdf is None or schedule is None else TaskTexts(urdf, schedule)
+        if urdf is None or schedule is None:
+            return None
+        texts = TaskTexts(urdf, schedule)
+        return texts if texts.fit(self.data) else None
 
     @property
     def law(self) -> str:
