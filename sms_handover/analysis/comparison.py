@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 from sms_handover.analysis.base_motion import BaseMotion
 from sms_handover.analysis.claims import Claim, judge
+from sms_handover.analysis.clearance import TaskTexts
 from sms_handover.analysis.metrics import RunMetrics, common_settling, measure
 from sms_handover.bag.run.loop_record import LoopRecord
 from sms_handover.errors import UnknownNameError
@@ -40,18 +41,22 @@ def compare(
     runs: Mapping[str, RunData],
     laws: Mapping[str, str] | None = None,
     loops: Mapping[str, LoopRecord] | None = None,
+    texts: Mapping[str, TaskTexts] | None = None,
 ) -> Comparison:
     """Return the comparison of runs by name.
 
     ``laws`` has the control law of each run; without it a run whose name contains the word ``nmpc`` or
-    ``pid`` is taken to be under that law. ``loops`` has the wall-clock records of runs. Raises
-    UnknownNameError for a law or a record of an unknown run.
+    ``pid`` is taken to be under that law. ``loops`` has the wall-clock records of runs, and
+    ``texts`` what each was made with, by which clearance and joint limits are judged. Raises UnknownNameError
+    for a law, a record or texts of an unknown run.
     """
-    for given, what in ((laws, "control laws"), (loops, "loops")):
+    for given, what in ((laws, "control laws"), (loops, "loops"), (texts, "texts")):
         for name in given or {}:
             if name not in runs:
                 raise UnknownNameError("run", name, runs, what)
-    metrics = {name: measure(run, (loops or {}).get(name)) for name, run in runs.items()}
+    metrics = {
+        name: measure(run, (loops or {}).get(name), (texts or {}).get(name)) for name, run in runs.items()
+    }
     names = tuple(dict.fromkeys(item.phase.name for run in metrics.values() for item in run.phases))
     begins = {name: common_settling(metrics.values(), name) for name in names}
     drift = {

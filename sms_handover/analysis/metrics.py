@@ -6,7 +6,9 @@ from math import isnan, nan
 from types import MappingProxyType
 
 from sms_handover.analysis.base_motion import UNKNOWN_MOTION, BaseMotion, base_motion
+from sms_handover.analysis.clearance import RunClearance, TaskTexts, run_clearance
 from sms_handover.analysis.conservation import IkOutcomes, PhysicsResiduals, ik_outcomes, physics_residuals
+from sms_handover.analysis.joint_limits import LimitUse, limit_use
 from sms_handover.analysis.loop_timing import LoopTiming, loop_timing
 from sms_handover.analysis.numbers import largest
 from sms_handover.analysis.phases import PhaseSpan, phase_spans
@@ -14,6 +16,7 @@ from sms_handover.analysis.torque import JointTorque, joint_torque
 from sms_handover.analysis.tracking import ToolTracking, tool_tracking
 from sms_handover.analysis.work import JointWork, joint_work
 from sms_handover.bag.run.loop_record import LoopRecord
+from sms_handover.model.floating_model import floating_model
 from sms_handover.run_data import RunData
 
 
@@ -43,7 +46,8 @@ class PhaseMetrics:
 class RunMetrics:
     """One run: its phases in the order of time, and the figures of the whole run.
 
-    ``loop`` is the timing of the run, None where it is not known.
+    ``loop`` is the timing of the run, None where it is not known; so are ``clearance`` and ``limits``
+    where it is not known what the run was made with.
     """
 
     run: RunData
@@ -53,6 +57,8 @@ class RunMetrics:
     physics: PhysicsResiduals
     ik: IkOutcomes
     loop: LoopTiming | None = None
+    clearance: RunClearance | None = None
+    limits: LimitUse | None = None
 
     def phase(self, name: str) -> PhaseMetrics | None:
         """Return the phase with a name, None if the run has none."""
@@ -78,8 +84,8 @@ def common_settling(runs: Iterable[RunMetrics], name: str) -> float:
     return largest([phase.settling_time for phase in found])
 
 
-def measure(run: RunData, loop: LoopRecord | None = None) -> RunMetrics:
-    """Return all metrics of a run; ``loop`` is its wall-clock record, if there is one."""
+def measure(run: RunData, loop: LoopRecord | None = None, texts: TaskTexts | None = None) -> RunMetrics:
+    """Return all metrics of a run, given its wall-clock record and what it was made with, if known."""
     return RunMetrics(
         run=run,
         phases=tuple(_measure_phase(run, phase) for phase in phase_spans(run)),
@@ -88,6 +94,8 @@ def measure(run: RunData, loop: LoopRecord | None = None) -> RunMetrics:
         physics=physics_residuals(run),
         ik=ik_outcomes(run),
         loop=loop_timing(loop) if loop else None,
+        clearance=run_clearance(run, texts) if texts else None,
+        limits=limit_use(run, floating_model(texts.urdf)) if texts else None,
     )
 
 

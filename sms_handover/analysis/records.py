@@ -5,6 +5,7 @@ from operator import attrgetter
 from typing import Any, NamedTuple, TypeVar
 
 from sms_handover.analysis.comparison import Comparison
+from sms_handover.analysis.joint_limits import LimitUse
 from sms_handover.analysis.metrics import PhaseMetrics, RunMetrics
 from sms_handover.analysis.numbers import largest, lengths
 from sms_handover.analysis.orientation import OrientationTracking
@@ -56,6 +57,11 @@ def _of_run(comparison: Comparison, name: str, metrics: RunMetrics) -> Iterator[
     for arm in metrics.run.arms:
         yield from _of_joints("", arm, metrics)
     yield from _conserved("", metrics)
+    if metrics.clearance:
+        for group in metrics.clearance.groups:
+            yield "", "", f"clearance: {group.group}", "m", group.least
+    if metrics.limits:
+        yield from _rows("", "", _LIMITS, metrics.limits)
     if metrics.loop:
         yield from _rows("", "", _LOOP, metrics.loop)
 
@@ -130,6 +136,12 @@ _PHYSICS = (
     *_attributes("largest_{}", linear_momentum="kg m/s", angular_momentum="kg m^2/s"),
     *_attributes("{}_residual", energy="-"),
     *_attributes(peak_kinetic_energy="J"),
+)
+_LIMITS: tuple[_Column[LimitUse], ...] = (
+    ("largest_rate_share", "-", lambda limits: limits.rate.value),
+    ("time_above_rate_limit", "s", lambda limits: limits.rate.beyond),
+    ("farthest_beyond_position_limit", "rad", lambda limits: limits.position.value),
+    ("time_beyond_position_limit", "s", lambda limits: limits.position.beyond),
 )
 _IK = _attributes("ik_{}", solves="-", failures="-", stalled="-", iteration_limit="-")
 _LOOP = _attributes(

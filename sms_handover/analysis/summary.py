@@ -35,6 +35,8 @@ def _run(metrics: RunMetrics, drift: Mapping[str, BaseMotion]) -> Summary:
         "phases": [_phase(item, drift[item.phase.name]) for item in metrics.phases],
         **_common(metrics),
         "loop": _values(metrics.loop) if metrics.loop else None,
+        "clearance": _plain(metrics.clearance.groups) if metrics.clearance else None,
+        "joint_limits": _values(metrics.limits) if metrics.limits else None,
         "grasp_events": [_event(event) for event in metrics.run.grasp_events],
         "run_events": [_event(event) for event in metrics.run.run_events],
     }

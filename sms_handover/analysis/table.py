@@ -8,6 +8,8 @@ from textwrap import wrap
 
 from sms_handover.analysis.base_motion import BaseMotion
 from sms_handover.analysis.claims import Claim
+from sms_handover.analysis.clearance import TaskTexts
+from sms_handover.analysis.clearance_rows import clearance_sections
 from sms_handover.analysis.comparison import Comparison, compare
 from sms_handover.analysis.grasps import Tolerance
 from sms_handover.analysis.layout import MISSING, WIDTH, Row, Section, layout, number, row
@@ -32,13 +34,14 @@ def comparison_table(
     *,
     laws: Mapping[str, str] | None = None,
     tolerance: Tolerance | None = None,
+    texts: Mapping[str, TaskTexts] | None = None,
 ) -> str:
     """Return a table of the runs, by name, and the verdicts on the paper's claims if they are a pair.
 
     ``laws`` has the control law of each run, otherwise it is taken from the name; ``tolerance`` is
-    printed beside the values at a grasp.
+    printed beside the values at a grasp. ``texts`` has what each run was made with, for its clearance.
     """
-    return render(compare(runs, laws), tolerance)
+    return render(compare(runs, laws, texts=texts), tolerance)
 
 
 def render(comparison: Comparison, tolerance: Tolerance | None = None) -> str:
@@ -57,6 +60,7 @@ def figure_sections(comparison: Comparison, tolerance: Tolerance | None = None) 
         *_run_event_section(runs),
         *(_phase_section(comparison, name) for name in comparison.phase_names),
         Section("Torque over the whole run, peak / RMS [N m]", _torque_rows(runs)),
+        *clearance_sections(runs),
         Section("Physics and inverse kinematics", _conservation_rows(runs)),
         *([Section("Wall clock", _loop_rows(runs))] if any(item.loop for item in runs) else []),
     )

@@ -6,13 +6,12 @@ from argparse import ArgumentParser, Namespace
 from io import StringIO
 from pathlib import Path
 
-from sms_handover.analysis.comparison import compare
 from sms_handover.analysis.records import Record, records_of
 from sms_handover.analysis.summary import summary
 from sms_handover.analysis.table import render
 from sms_handover.cli.recorded_runs import read_all
 from sms_handover.cli.text_files import write_text
-from sms_handover.report.recorded_run import common_tolerance
+from sms_handover.report.recorded_run import common_tolerance, compare_recorded
 
 
 def add_parser(parser: ArgumentParser) -> None:
@@ -29,11 +28,7 @@ def add_parser(parser: ArgumentParser) -> None:
 def command(options: Namespace) -> int:
     """Run the command; return the exit code."""
     recorded = read_all(options.runs)
-    comparison = compare(
-        {run.name: run.data for run in recorded},
-        laws={run.name: run.law for run in recorded},
-        loops={run.name: run.loop for run in recorded},
-    )
+    comparison = compare_recorded(recorded)
     print(render(comparison, common_tolerance(recorded)))
     if options.csv:
         table = StringIO()

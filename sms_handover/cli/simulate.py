@@ -3,6 +3,7 @@
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from sms_handover.analysis.clearance import TaskTexts
 from sms_handover.analysis.table import comparison_table
 from sms_handover.cli.exit_codes import task_code
 from sms_handover.cli.options import add_scenario_options, scenario_of
@@ -42,9 +43,10 @@ def command(options: Namespace) -> int:
         run = simulate(scenario, progress=show)
         display.show_run(int(run.tick_ns[-1]), run.phases[-1].name, last=True)
     name, tolerance = scenario.parameters.controller.law, scenario.parameters.plant.grasp_tolerance
+    texts = TaskTexts(scenario.robot.urdf, scenario.schedule.text)
     for event in run.run_events:
         print(event)
-    print(comparison_table({name: run}, tolerance=tolerance))
+    print(comparison_table({name: run}, tolerance=tolerance, texts={name: texts}))
     if options.output:
         save_run(run, options.output)
         print(f"arrays written to {options.output}")

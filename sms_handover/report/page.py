@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 from sms_handover import __version__
-from sms_handover.analysis.comparison import compare
 from sms_handover.analysis.highlights import highlights
 from sms_handover.analysis.table import figure_sections
 from sms_handover.errors import ConfigurationError
@@ -13,7 +12,7 @@ from sms_handover.report.engine import plotly_script, render, web_file
 from sms_handover.report.page_data import page_data
 from sms_handover.report.plots import plot_groups
 from sms_handover.report.provenance import compared_parameters, compared_versions, schedule_difference
-from sms_handover.report.recorded_run import RecordedRun, common_tolerance
+from sms_handover.report.recorded_run import RecordedRun, common_tolerance, compare_recorded
 from sms_handover.report.security import content_security_policy, inline_scripts
 from sms_handover.report.styles import run_styles
 
@@ -30,11 +29,7 @@ def report_page(runs: Sequence[RecordedRun]) -> str:
         raise ConfigurationError("a report needs at least one run")
     if len(set(names)) < len(names):
         raise ConfigurationError(f"runs of a report must have different names, these are {names}")
-    comparison = compare(
-        {run.name: run.data for run in runs},
-        laws={run.name: run.law for run in runs},
-        loops={run.name: run.loop for run in runs},
-    )
+    comparison = compare_recorded(runs)
     styles = run_styles(names, [run.law for run in runs])
     infos, data = [run.info for run in runs], [run.data for run in runs]
     groups = plot_groups(data)

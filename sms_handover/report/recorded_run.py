@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from sms_handover.analysis.clearance import TaskTexts
+from sms_handover.analysis.comparison import Comparison, compare
 from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.run.loop_record import LoopRecord, read_loop
 from sms_handover.bag.run.reader import read_run
@@ -32,6 +34,15 @@ class RecordedRun:
         return read_loop(self.info.path)
 
     @property
+    def texts(self) -> TaskTexts | None:
+        """What the run was made with, None if the bag does not carry it or carries something else."""
+        urdf, schedule = self.info.urdf_text, self.info.schedule_text
+        if urdf is None or schedule is None:
+            return None
+        texts = TaskTexts(urdf, schedule)
+        return texts if texts.fit(self.data) else None
+
+    @property
     def law(self) -> str:
         """Return the control law in the bag, 'unknown' if there is none."""
         return str(self.info.parameters.get(CONTROLLER, {}).get("law", UNKNOWN_LAW))
@@ -53,6 +64,16 @@ def read_recorded(name: str, bag: Path) -> RecordedRun:
     except BagError as error:
         raise ConfigurationError(str(error)) from error
     return run
+
+
+def compare_recorded(runs: Sequence[RecordedRun]) -> Comparison:
+    """Return the comparison of recorded runs, with all that their bags carry."""
+    return compare(
+        {run.name: run.data for run in runs},
+        laws={run.name: run.law for run in runs},
+        loops={run.name: run.loop for run in runs},
+        texts={run.name: run.texts for run in runs if run.texts},
+    )
 
 
 def common_tolerance(runs: Sequence[RecordedRun]) -> GraspTolerance | None:

@@ -57,9 +57,9 @@ def test_recorded_runs_are_reported(tmp_path: Path) -> None:
 
 
 def different(now: Any, then: Any, place: str = "") -> list[str]:
-    """Return the places where two JSON values differ; numbers may differ in their last digits."""
+    """Return where JSON values differ from those of then: missing, or not equal up to rounding."""
     if isinstance(now, dict) and isinstance(then, dict):
-        missing = [f"{place}/{key}" for key in now.keys() ^ then.keys()]
+        missing = [f"{place}/{key}" for key in then.keys() - now.keys()]
         return missing + [
             d for key in now.keys() & then.keys() for d in different(now[key], then[key], f"{place}/{key}")
         ]
