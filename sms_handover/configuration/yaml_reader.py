@@ -92,19 +92,14 @@ def _mapping(loader: YamlLoader, node: yaml.MappingNode) -> Iterator[Mapping]:
         mapping.lines[key] = key_node.start_mark.line + 1
 
 
-def _int(loader: YamlLoader, node: yaml.ScalarNode) -> int:
-    """Return an integer; raises ValueError on the octal 010 and on 1:30."""
-    return int(node.value, 0)
-
-
-def _float(loader: YamlLoader, node: yaml.ScalarNode) -> float:
-    """Return a number; raises ValueError on 1:30.5."""
-    return float(node.value.lower().replace(".inf", "inf").replace(".nan", "nan"))
+def _float(text: str) -> float:
+    """Return a number as Python reads it, and as YAML writes infinity and NaN."""
+    return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
 
 
 YamlLoader.add_constructor(f"{_TAG}map", _mapping)
-YamlLoader.add_constructor(f"{_TAG}int", _int)
-YamlLoader.add_constructor(f"{_TAG}float", _float)
+YamlLoader.add_constructor(f"{_TAG}int", lambda loader, node: int(node.value, 0))
+YamlLoader.add_constructor(f"{_TAG}float", lambda loader, node: _float(node.value))
 YamlLoader.yaml_implicit_resolvers = {
     first: [(tag, pattern) for tag, pattern in resolvers if tag not in (f"{_TAG}int", f"{_TAG}float")]
     for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
