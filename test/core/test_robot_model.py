@@ -194,7 +194,7 @@ def test_base_follows_the_screw_of_its_twist(robot: RobotModel, draw: Draw) -> N
 
 
 def test_state_and_vectors_are_one(robot: RobotModel, draw: Draw) -> None:
-    """A state put together from its parts has them in q and v, and gives them back, bit for bit."""
+    """A state gives its parts back as they stand in q and v, bit for bit."""
     q, v = draw.q(), draw.v()
     state = state_of(robot, q, v)
     np.testing.assert_array_equal(state.q, q)
