@@ -54,7 +54,8 @@ def add_scenario_options(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NODE.NAME:=VALUE",
-        help="one parameter, e.g. plant.integrator:=midpoint; the node 'common' is for all of them",
+        help="one parameter, e.g. plant.integrator:=midpoint, where the node 'common' is for all of "
+        "them; or a value of robot, deputy or schedule by path, e.g. robot.arms.arm_a.gripper.mass:=0.9",
     )
 
 

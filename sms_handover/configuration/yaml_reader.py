@@ -34,6 +34,7 @@ class Mapping(dict[Any, Any]):
         super().__init__()
         self.line = line
         self.lines: dict[Any, int] = {}
+        self.origins: dict[Any, str] = {}  # of values that were set from elsewhere
 
 
 class YamlLoader(yaml.SafeLoader):
