@@ -5,12 +5,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import yaml
-
 from sms_handover.bag.parameters import RecorderParameters
 from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.parameters import build, read_parameter_files
-from sms_handover.configuration.yaml_reader import load, reason
+from sms_handover.configuration.yaml_reader import load_value
 from sms_handover.control.parameters import LAWS
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.topics import CONTROLLER, RECORDER, TRAJECTORY
@@ -107,10 +105,7 @@ def _parse(text: str) -> tuple[str, str, object]:
     node, dot, name = target.partition(".")
     if not (assigned and dot and node and name):
         raise ConfigurationError(f"parameter {text!r} is not of the form NODE.NAME:=VALUE")
-    try:
-        return node, name, load(value)
-    except (yaml.YAMLError, ValueError) as error:
-        raise ConfigurationError(f"the value of parameter {text!r} is not YAML: {reason(error)}") from error
+    return node, name, load_value(value, text)
 
 
 def _found(path: Path) -> Path:

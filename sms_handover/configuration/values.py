@@ -8,9 +8,7 @@ from copy import copy
 from reprlib import repr as shortened
 from typing import Any
 
-import yaml
-
-from sms_handover.configuration.yaml_reader import Mapping, load, reason
+from sms_handover.configuration.yaml_reader import Mapping, load_value
 from sms_handover.errors import ConfigurationError, UnknownNameError
 
 ROBOT, DEPUTY, SCHEDULE = "robot", "deputy", "schedule"
@@ -40,7 +38,7 @@ def with_values(content: Mapping, document: str, values: Sequence[str]) -> Mappi
         if first == DEPUTY:
             first, steps = SCHEDULE, [DEPUTY, *steps]
         if first == document:
-            content = _set(content, steps, _load(value, text), text)
+            content = _set(content, steps, load_value(value, text), text)
     return content
 
 
@@ -77,11 +75,3 @@ def _index(items: list[Any], step: str, text: str) -> int:
     if step.isdecimal() and int(step) < len(items):
         return int(step)
     raise UnknownNameError("name", step, names, text)
-
-
-def _load(value: str, text: str) -> object:
-    """Return the value in a text."""
-    try:
-        return load(value)
-    except (yaml.YAMLError, ValueError) as error:
-        raise ConfigurationError(f"the value of {text!r} is not YAML: {reason(error)}") from error

@@ -138,15 +138,23 @@ def load(text: str, largest: int = _LARGEST) -> Any:
         loader.dispose()
 
 
+def load_value(text: str, assignment: str) -> Any:
+    """Return the value in an assignment ``name:=value``; raises ConfigurationError."""
+    try:
+        return load(text)
+    except (yaml.YAMLError, ValueError) as error:
+        raise ConfigurationError(f"the value of {assignment!r} is not YAML: {_reason(error)}") from error
+
+
 def load_mapping(text: str, path: Path) -> Mapping:
     """Return the mapping in the text of a file; raises ConfigurationError with the line."""
     try:
         document = load(text)
     except yaml.MarkedYAMLError as error:
         line = f":{error.problem_mark.line + 1}" if error.problem_mark else ""
-        raise ConfigurationError(f"{path}{line}: not valid YAML: {reason(error)}") from error
+        raise ConfigurationError(f"{path}{line}: not valid YAML: {_reason(error)}") from error
     except yaml.YAMLError as error:
-        raise ConfigurationError(f"{path}: not valid YAML: {reason(error)}") from error
+        raise ConfigurationError(f"{path}: not valid YAML: {_reason(error)}") from error
     if not isinstance(document, Mapping):
         raise ConfigurationError(f"{path}: must be a mapping at the top level")
     return document
@@ -167,7 +175,7 @@ def read_yaml(path: Path) -> Mapping:
     return load_mapping(read_file(path), path)
 
 
-def reason(error: Exception) -> str:
+def _reason(error: Exception) -> str:
     """Return what is wrong as one line; the line of the file is that of ``problem_mark``."""
     if not isinstance(error, yaml.MarkedYAMLError):
         return " ".join(str(error).split())
