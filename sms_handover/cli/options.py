@@ -5,12 +5,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import yaml
-
 from sms_handover.bag.parameters import RecorderParameters
 from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.parameters import build, read_parameter_files
-from sms_handover.configuration.yaml_reader import load, reason
+from sms_handover.configuration.yaml_reader import load_value
 from sms_handover.control.parameters import LAWS
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.topics import CONTROLLER, RECORDER, TRAJECTORY
@@ -51,7 +49,8 @@ def add_scenario_options(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NODE.NAME:=VALUE",
-        help="one parameter, e.g. plant.integrator:=midpoint; the node 'common' is for all of them",
+        help="one parameter, e.g. plant.integrator:=midpoint, where the node 'common' is for all of "
+        "them; or a value of robot, deputy or schedule by path, e.g. robot.arms.arm_a.gripper.mass:=0.9",
     )
 
 
@@ -103,10 +102,7 @@ def _parse(text: str) -> tuple[str, str, object]:
     node, dot, name = target.partition(".")
     if not (assigned and dot and node and name):
         raise ConfigurationError(f"parameter {text!r} is not of the form NODE.NAME:=VALUE")
-    try:
-        return node, name, load(value)
-    except (yaml.YAMLError, ValueError) as error:
-        raise ConfigurationError(f"the value of parameter {text!r} is not YAML: {reason(error)}") from error
+    return node, name, load_value(value, text)
 
 
 def _found(path: Path) -> Path:

@@ -32,7 +32,7 @@ class ParameterValues(dict[str, object]):
 
 @dataclass(frozen=True)
 class ParameterSpec:
-    """What is known of a parameter besides its type: meaning, unit and the values allowed."""
+    """Meaning, unit and allowed values of a parameter."""
 
     description: str
     unit: str = ""
@@ -50,9 +50,9 @@ def parameter(
     choices: Sequence[str] = (),
     default: Any = MISSING,
 ) -> Any:
-    """Return a dataclass field that carries a :class:`ParameterSpec`; bounds are inclusive.
+    """Return a dataclass field with a :class:`ParameterSpec`; bounds are inclusive.
 
-    The parameters of this package have their defaults in ``config/``; others may give a ``default`` here.
+    Parameters of this package have their defaults in ``config/``, others may give a ``default``.
     """
     spec = ParameterSpec(description, unit, minimum, maximum, tuple(choices))
     return field(default=default, metadata={_SPEC: spec})

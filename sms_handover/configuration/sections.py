@@ -8,7 +8,7 @@ from reprlib import repr as shortened
 from typing import Any
 
 from sms_handover.configuration.checks import check_number, check_vector
-from sms_handover.configuration.yaml_reader import Mapping, load_mapping, read_file
+from sms_handover.configuration.yaml_reader import Mapping, read_yaml
 from sms_handover.errors import ConfigurationError, UnknownNameError
 
 
@@ -24,14 +24,9 @@ class Section:
                 raise self.error(f"key {key!r} must be text", key)
 
     @classmethod
-    def parse(cls, text: str, file: Path, kind: type[ConfigurationError] = ConfigurationError) -> "Section":
-        """Return the top-level mapping in the text of a file; raises ConfigurationError."""
-        return cls(load_mapping(text, file), file, kind)
-
-    @classmethod
     def read(cls, file: Path, kind: type[ConfigurationError] = ConfigurationError) -> "Section":
         """Return the top-level mapping of a file; raises ConfigurationError."""
-        return cls.parse(read_file(file), file, kind)
+        return cls(read_yaml(file), file, kind)
 
     def __contains__(self, key: str) -> bool:
         return key in self._values
@@ -42,8 +37,10 @@ class Section:
         return tuple(self._values)
 
     def where(self, key: object = None) -> str:
-        """Return file and line of a key, by default of the section itself."""
-        return f"{self._file}:{self._values.lines.get(key, self._values.line)}"
+        """Return file and line of a key, or where else it was set; by default of the section itself."""
+        return (
+            self._values.origins.get(key) or f"{self._file}:{self._values.lines.get(key, self._values.line)}"
+        )
 
     def path(self, key: str) -> str:
         """Return the dotted path of a key."""

@@ -34,6 +34,7 @@ class Mapping(dict[Any, Any]):
         super().__init__()
         self.line = line
         self.lines: dict[Any, int] = {}
+        self.origins: dict[Any, str] = {}  # of values that were set from elsewhere
 
 
 class YamlLoader(yaml.SafeLoader):
@@ -92,19 +93,14 @@ def _mapping(loader: YamlLoader, node: yaml.MappingNode) -> Iterator[Mapping]:
         mapping.lines[key] = key_node.start_mark.line + 1
 
 
-def _int(loader: YamlLoader, node: yaml.ScalarNode) -> int:
-    """Return an integer; raises ValueError on the octal 010 and on 1:30."""
-    return int(node.value, 0)
-
-
-def _float(loader: YamlLoader, node: yaml.ScalarNode) -> float:
-    """Return a number; raises ValueError on 1:30.5."""
-    return float(node.value.lower().replace(".inf", "inf").replace(".nan", "nan"))
+def _float(text: str) -> float:
+    """Return a number as Python reads it, and as YAML writes infinity and NaN."""
+    return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
 
 
 YamlLoader.add_constructor(f"{_TAG}map", _mapping)
-YamlLoader.add_constructor(f"{_TAG}int", _int)
-YamlLoader.add_constructor(f"{_TAG}float", _float)
+YamlLoader.add_constructor(f"{_TAG}int", lambda loader, node: int(node.value, 0))
+YamlLoader.add_constructor(f"{_TAG}float", lambda loader, node: _float(node.value))
 YamlLoader.yaml_implicit_resolvers = {
     first: [(tag, pattern) for tag, pattern in resolvers if tag not in (f"{_TAG}int", f"{_TAG}float")]
     for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
@@ -142,15 +138,23 @@ def load(text: str, largest: int = _LARGEST) -> Any:
         loader.dispose()
 
 
+def load_value(text: str, assignment: str) -> Any:
+    """Return the value in an assignment ``name:=value``; raises ConfigurationError."""
+    try:
+        return load(text)
+    except (yaml.YAMLError, ValueError) as error:
+        raise ConfigurationError(f"the value of {assignment!r} is not YAML: {_reason(error)}") from error
+
+
 def load_mapping(text: str, path: Path) -> Mapping:
     """Return the mapping in the text of a file; raises ConfigurationError with the line."""
     try:
         document = load(text)
     except yaml.MarkedYAMLError as error:
         line = f":{error.problem_mark.line + 1}" if error.problem_mark else ""
-        raise ConfigurationError(f"{path}{line}: not valid YAML: {reason(error)}") from error
+        raise ConfigurationError(f"{path}{line}: not valid YAML: {_reason(error)}") from error
     except yaml.YAMLError as error:
-        raise ConfigurationError(f"{path}: not valid YAML: {reason(error)}") from error
+        raise ConfigurationError(f"{path}: not valid YAML: {_reason(error)}") from error
     if not isinstance(document, Mapping):
         raise ConfigurationError(f"{path}: must be a mapping at the top level")
     return document
@@ -171,7 +175,7 @@ def read_yaml(path: Path) -> Mapping:
     return load_mapping(read_file(path), path)
 
 
-def reason(error: Exception) -> str:
+def _reason(error: Exception) -> str:
     """Return what is wrong as one line; the line of the file is that of ``problem_mark``."""
     if not isinstance(error, yaml.MarkedYAMLError):
         return " ".join(str(error).split())

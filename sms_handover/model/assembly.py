@@ -4,7 +4,7 @@ from collections import Counter
 from dataclasses import dataclass
 from re import fullmatch
 
-from sms_handover.errors import RobotDescriptionError, UnknownNameError
+from sms_handover.errors import RobotDescriptionError
 from sms_handover.frames import joint_name
 from sms_handover.model.parts import Floats, Gripper, Inertia, JointDescription, LinkDescription, Origin
 from sms_handover.model.validation import vector
@@ -35,7 +35,6 @@ class ArmDescription:
     gripper: Gripper
 
     def __post_init__(self) -> None:
-        """Check that the name can be part of a topic and that the parts pair up and carry it."""
         if not fullmatch(r"[a-z][a-z0-9_]*", self.name):
             raise RobotDescriptionError(
                 f"arm name is {self.name!r}, must be lower-case letters, digits and _, a letter first"
@@ -45,13 +44,10 @@ class ArmDescription:
         if len(self.joints) != len(self.links):
             counts = f"{len(self.joints)} joints and {len(self.links)} links"
             raise RobotDescriptionError(f"{self.name}: has {counts}, must be equal numbers")
-        names = [joint.name for joint in self.joints] + [link.name for link in self.links]
-        names.append(self.gripper.name)
-        numbers = range(1, len(self.joints) + 1)
-        allowed = [joint_name(self.name, number) for number in numbers]
-        allowed += [link_name(self.name, number) for number in numbers]
-        allowed.append(gripper_name(self.name))
-        for name, expected in zip(names, allowed, strict=True):
+        parts = [(self.gripper.name, gripper_name(self.name))]
+        for number, (joint, link) in enumerate(zip(self.joints, self.links, strict=True), start=1):
+            parts += (joint.name, joint_name(self.name, number)), (link.name, link_name(self.name, number))
+        for name, expected in parts:
             if name != expected:
                 raise RobotDescriptionError(f"{self.name}: a part is named {name!r}, must be {expected!r}")
 
@@ -59,11 +55,6 @@ class ArmDescription:
     def mass(self) -> float:
         """Mass in kg of links and gripper."""
         return sum(link.inertia.mass for link in self.links) + self.gripper.mass
-
-    @property
-    def rotor_inertia(self) -> Floats:
-        """Reflected rotor inertia of every joint, kg m^2."""
-        return tuple(joint.rotor_inertia for joint in self.joints)
 
 
 @dataclass(frozen=True)
@@ -99,7 +90,6 @@ class RobotDescription:
     arms: tuple[ArmDescription, ...]
 
     def __post_init__(self) -> None:
-        """Check that there is an arm and that arm names differ."""
         if not self.arms:
             raise RobotDescriptionError("the robot has 0 arms, must be >= 1")
         name, count = Counter(arm.name for arm in self.arms).most_common(1)[0]
@@ -110,10 +100,3 @@ class RobotDescription:
     def mass(self) -> float:
         """Total mass in kg."""
         return self.base.inertia.mass + sum(arm.mass for arm in self.arms)
-
-    def arm(self, name: str) -> ArmDescription:
-        """Return the arm of a name; raises UnknownNameError."""
-        for arm in self.arms:
-            if arm.name == name:
-                return arm
-        raise UnknownNameError("arm", name, [arm.name for arm in self.arms])

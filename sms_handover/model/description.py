@@ -1,10 +1,13 @@
 """Description of a robot, read from its YAML files."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.sections import Section
+from sms_handover.configuration.values import ROBOT, with_values
+from sms_handover.configuration.yaml_reader import read_yaml
 from sms_handover.errors import RobotDescriptionError
 from sms_handover.frames import BASE
 from sms_handover.model.arm_file import override_limits, read_arm_file, read_origin
@@ -14,15 +17,15 @@ from sms_handover.model.parts import Floats, Gripper, Inertia, box_moments
 _UNIFORM_BOX = "uniform_box"
 
 
-def load_robot(path: Path | None = None) -> RobotDescription:
+def load_robot(path: Path | None = None, values: Sequence[str] = ()) -> RobotDescription:
     """Return the checked robot that a file describes, by default the shipped ``config/robot.yaml``.
 
-    The path of an arm's own description file is relative to the robot file. Raises
-    RobotDescriptionError on a key or value that no robot can have and ConfigurationError on a file
-    that cannot be read; each message names file and line.
+    ``values`` of it are set by dotted path, e.g. ``robot.base.mass:=300``. The path of an arm's own
+    description file is relative to the robot file. Raises RobotDescriptionError on a key or value that
+    no robot can have and ConfigurationError on a file that cannot be read; each names file and line.
     """
     path = config_file("robot.yaml") if path is None else path
-    root = Section.read(path, RobotDescriptionError)
+    root = Section(with_values(read_yaml(path), ROBOT, values), path, RobotDescriptionError)
     root.only(("name", "base", "arms"))
     name, base = root.text("name"), _base(root.section("base"))
     arms = tuple(_arm(item, path.parent) for item in root.sections("arms"))

@@ -31,7 +31,7 @@ def cylinder_moments(mass: float, radius: float, length: float) -> Floats:
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a frame lies in its parent: ``xyz`` (3,) m and ``rpy`` (3,) rad about fixed x, y, z."""
+    """The pose of a frame in its parent: ``xyz`` (3,) m and ``rpy`` (3,) rad about fixed x, y, z."""
 
     xyz: Floats
     rpy: Floats
@@ -55,7 +55,6 @@ class Inertia:
     moments: Floats
 
     def __post_init__(self) -> None:
-        """Check that the inertia is physical."""
         number(self.mass, f"{self.body}: mass", "kg", above=0.0)
         vector(self.com, 3, f"{self.body}: com", "m")
         vector(self.moments, 6, f"{self.body}: inertia", "kg m^2")
@@ -130,5 +129,5 @@ class Gripper:
 
     @property
     def tool(self) -> Origin:
-        """Where the tool frame lies in the frame of the flange."""
+        """The tool frame in the frame of the flange."""
         return Origin((0.0, 0.0, self.length), (0.0, 0.0, 0.0))

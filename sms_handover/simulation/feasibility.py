@@ -17,7 +17,7 @@ from sms_handover.plant.grasping import answer
 from sms_handover.simulation.wiring import initial_joints
 from sms_handover.trajectory.generator import goal_in_world
 from sms_handover.trajectory.schedule import GraspFrameTarget, JointTarget, Phase, Schedule, ToolTarget
-from sms_handover.types import Array, GraspStatus, IkRequest, Pose, Twist, read_only
+from sms_handover.types import Array, GraspStatus, IkRequest, Pose, Twist, freeze
 from sms_handover.units import DEG_PER_RAD, MM_PER_M
 
 _PATH_STEPS = 64  # [-] midpoint steps along a joint path; their error is far below a grasp tolerance
@@ -33,7 +33,7 @@ _AT_REST = Twist(np.zeros(3), np.zeros(3))
 
 @dataclass(frozen=True, eq=False)
 class PhasePrediction:
-    """Where a phase will end: joint angles (n,) rad, base pose, and how far the base has turned.
+    """The end of a phase: joint angles (n,) rad, base pose, and rotation of the base.
 
     ``base_rotation_angle`` in rad is counted from the start of the run. ``restarts`` is how many random
     configurations were tried before one led to the targets; a run has only the first try, so anything
@@ -47,8 +47,7 @@ class PhasePrediction:
     restarts: int
 
     def __post_init__(self) -> None:
-        """Copy the array and make it read-only."""
-        object.__setattr__(self, "joint_position", read_only(self.joint_position))
+        freeze(self, "joint_position")
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +92,7 @@ def base_after(robot: RobotModel, base_in_world: Pose, start: Array, end: Array)
 
 
 class _Walk:
-    """A walk through the phases from rest to rest."""
+    """Goes through the phases from rest to rest."""
 
     def __init__(
         self, robot: RobotModel, schedule: Schedule, ik: IkParameters, tolerance: GraspTolerance

@@ -1,4 +1,4 @@
-"""Saving the arrays of a run as a NumPy archive."""
+"""Save the arrays of a run as a NumPy archive."""
 
 from pathlib import Path
 from typing import Any

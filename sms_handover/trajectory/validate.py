@@ -39,7 +39,7 @@ def check_phases(phases: Sequence[Phase], sections: Sequence[Section], period_ns
 
 
 def _holder_after(command: GraspCommand, holder: str, where: str) -> str:
-    """Return who holds the deputy after a command that succeeds."""
+    """Return the holder of the deputy after a command that succeeds."""
     if command.action is GraspAction.RELEASE:
         if holder != command.arm:
             other = holder or "no arm"

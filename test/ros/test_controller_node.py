@@ -30,7 +30,7 @@ from sms_handover.ros.codecs.loop_messages import JointStateCodec, StateCodec
 from sms_handover.ros.node.endpoints import CountedPublisher, Endpoints
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.wiring import initial_joints, make_controller
-from sms_handover.types import Array, JointReference, Pose, RobotState, TaskPhase, Twist
+from sms_handover.types import Array, JointReference, RobotState, TaskPhase
 
 from .bench import Bench
 from .graph import TOPICS
@@ -109,9 +109,8 @@ def inputs(rest: Rest, stamp: int, seed: int) -> tuple[RobotState, JointReferenc
     random = np.random.default_rng(seed)
     start = initial_joints(rest.scenario.robot, rest.scenario.schedule)
     noise = random.normal(scale=0.01, size=(5, 14))
-    base = Pose(0.1 * noise[0, :3], np.array([0.0, 0.0, 0.0, 1.0]))
-    twist = Twist(noise[1, :3], noise[1, 3:6])
-    state = RobotState.of(stamp, base, twist, start + noise[2], noise[3], np.zeros(14))
+    q = np.concatenate([0.1 * noise[0, :3], [0.0, 0.0, 0.0, 1.0], start + noise[2]])
+    state = RobotState(stamp, q, np.concatenate([noise[1, :6], noise[3]]), np.zeros(14))
     reference = JointReference(stamp, start + noise[4], 0.1 * noise[0])
     index = min(stamp // (8 * REFERENCE_NS), 2)
     return state, reference, TaskPhase(stamp, index, rest.scenario.schedule.phases[index].name)

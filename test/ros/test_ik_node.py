@@ -131,6 +131,12 @@ def test_a_stall_is_told(bench: Bench) -> None:
     assert asker.node.report().values["stalled"] == 1
 
 
+def test_values_of_robot_and_deputy_come_with_the_parameters(bench: Bench) -> None:
+    bench.start({"common": {"values": ("robot.base.mass:=300", "robot.arms.arm_a.gripper.mass:=0.9")}})
+    node = bench.add(IkNode)
+    assert node.robot.mass == pytest.approx(load_scenario().robot.mass + 60.0 + 0.9 - 0.6451)
+
+
 LOOSE = {"position_tolerance": 9.0, "orientation_tolerance": 9.0}
 
 
