@@ -66,8 +66,8 @@ def topics_page() -> str:
         WRITTEN_BY,
         f"""\
 Names without a leading `/` are relative: a namespace precedes them. `{ANY_ARM}` stands for the name of each
-arm of the robot, as shipped `arm_a` and `arm_b`. The recorder subscribes to every topic. Frames, signs and stamps
-are in [conventions.md](conventions.md), our own types in [messages.md](messages.md).
+arm of the robot, as shipped `arm_a` and `arm_b`. The recorder subscribes to every topic. Frames, signs and
+stamps are in [conventions.md](conventions.md), our own types in [messages.md](messages.md).
 
 Your subscription may request less than is offered, such as best effort; a reliable one that keeps up loses
 nothing. A reliable subscriber that is too slow blocks the loop: for the state at 50 Hz, use
