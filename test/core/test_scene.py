@@ -152,7 +152,7 @@ def test_the_scene_of_a_bag_is_that_of_the_run(
     [
         ({}, "carries no robot description"),
         ({"urdf": True}, "carries no schedule"),
-        ({"urdf": True, "schedule": "deputy: {size: [0.1, -0.3, 0.1]}"}, r"deputy: size.*m"),
+        ({"urdf": True, "schedule": "deputy: {size: [0.1, -0.3, 0.1]}"}, r"deputy\.size.*m"),
     ],
 )
 def test_a_bag_that_lacks_something_says_what(
