@@ -35,7 +35,7 @@ def add_parser(parser: ArgumentParser) -> None:
     parser.add_argument("runs", nargs="*", type=Path, metavar="RUN", help="output folder of a run, or a bag")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the page there")
     parser.add_argument(
-        "--no-browser", action="store_true", help="open no browser, only tell where the page is"
+        "--no-browser", action="store_true", help="open no browser, only print where the page is"
     )
     parser.add_argument(
         "--frame-rate",

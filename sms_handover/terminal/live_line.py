@@ -47,8 +47,7 @@ class LiveLine:
 
     def print(self, text: str) -> None:
         """Print a text above the line."""
-        with suppress(OSError):
-            self._console.print(Text(text), soft_wrap=True)
+        self._console.print(Text(text), soft_wrap=True)
 
     def stay(self) -> None:
         """Leave the line as it is; the next one is another."""
