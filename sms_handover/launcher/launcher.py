@@ -1,7 +1,8 @@
 """The launcher: starts the graph, monitors the run to its end, and ends every process whatever happens."""
 
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
@@ -95,35 +96,42 @@ def launch(plan: LaunchPlan) -> Outcome:
 
 
 def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outcome:
-    """Join the graph, and release the middleware at the end."""
+    common = plan.scenario.parameters.common
+    end_ns = common.last_tick(plan.scenario.schedule.end_ns) * common.tick_ns
+    with joined_graph(plan, "launcher") as (node, executor), ExitStack() as stack:
+        inputs = INPUTS[common.transport](node)
+        stack.callback(inputs.destroy)
+        monitor = RunMonitor(node, plan.scenario.robot.arms, inputs)
+        processes = stack.enter_context(
+            NodeProcesses(plan.log_folder, graph_environment(plan), plan.inherited)
+        )
+        for name, arguments in arguments_of(plan).items():
+            if name not in plan.external:
+                processes.start(name, arguments.line)
+            elif plan.controller:
+                named = ("--remap", f"__node:={name}")
+                processes.start(name, (*arguments.line, *named), plan.controller)
+        driver = LifecycleDriver(node, plan.own_nodes)
+        display = stack.enter_context(Display(end_ns))
+        return _Run(plan, monitor, driver, executor, processes, display, interrupts, memory).to_the_end()
+
+
+@contextmanager
+def joined_graph(plan: LaunchPlan, name: str) -> Iterator[tuple[Node, Executor]]:
+    """Yield a node of this process in the graph, and its executor; raises GraphError if ROS cannot start."""
     os.environ.setdefault(_LOG_FOLDER, str(plan.log_folder / "ros"))  # its default needs a HOME
-    os.environ.update(plan.scope.environment)  # for the launcher's own node too
+    os.environ.update(plan.scope.environment)
     try:
         rclpy.init(domain_id=plan.domain, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # such as no thread or no memory left
         raise GraphError(f"ROS cannot be started: {error}") from error
-    node = Node("launcher", start_parameter_services=False, enable_rosout=False)
-    inputs = INPUTS[plan.scenario.parameters.common.transport](node)
+    node = Node(name, start_parameter_services=False, enable_rosout=False)
     executor = EventsExecutor()
     try:
-        monitor = RunMonitor(node, plan.scenario.robot.arms, inputs)
         executor.add_node(node)
-        with NodeProcesses(plan.log_folder, graph_environment(plan), plan.inherited) as processes:
-            for name, arguments in arguments_of(plan).items():
-                if name not in plan.external:
-                    processes.start(name, arguments.line)
-                elif plan.controller:
-                    named = ("--remap", f"__node:={name}")
-                    processes.start(name, (*arguments.line, *named), plan.controller)
-            driver = LifecycleDriver(node, plan.own_nodes)
-            common = plan.scenario.parameters.common
-            end_ns = common.last_tick(plan.scenario.schedule.end_ns) * common.tick_ns
-            with Display(end_ns) as display:
-                run = _Run(plan, monitor, driver, executor, processes, display, interrupts, memory)
-                return run.to_the_end()
+        yield node, executor
     finally:
         executor.shutdown()  # it would keep the middleware alive after the node
-        inputs.destroy()
         node.destroy_node()
         rclpy.try_shutdown()
 
