@@ -18,7 +18,7 @@ _COMMANDS = {
     "figures": "draw the paper's figures from recorded runs",
     "report": "write an HTML page on recorded runs: figures, plots, claims, provenance, 3D",
     "view": "show recorded runs, or a running graph, in 3D in a browser",
-    "bag": "look into a bag, check it, recover it, take tables out of it",
+    "bag": "inspect, check, recover or export a bag",
     "reproduce": "run a bag's scenario again in one process and compare bit by bit",
     "play": "publish the messages of any MCAP bag again, with keys to control it",
     "record": "record any topics of any graph to an MCAP bag",
@@ -35,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = ArgumentParser(
         prog="sms-handover",
         description="A free-floating spacecraft with two arms hands a CubeSat from one arm to the other.",
-        epilog=f"commands:\n{listed}\n\n'sms-handover COMMAND --help' tells more of each.",
+        epilog=f"commands:\n{listed}\n\nSee 'sms-handover COMMAND --help'.",
         formatter_class=RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"sms-handover {__version__}")
@@ -47,10 +47,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SmsHandoverError as error:
         print(f"sms-handover {chosen.command}: error: {error}", file=sys.stderr)
         return EXIT_USAGE if isinstance(error, ConfigurationError) else EXIT_FAILED
-    except BrokenPipeError:  # whoever reads the output has seen enough, as head(1) does
+    except BrokenPipeError:  # the reader of the output has ended, as head(1) does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_FAILED
-    except (OSError, MemoryError) as error:  # what the system refuses: files, processes, memory
+    except (OSError, MemoryError) as error:  # of the system: files, processes, memory
         print(f"sms-handover {chosen.command}: error: {error or 'no memory left'}", file=sys.stderr)
         return EXIT_FAILED
     except KeyboardInterrupt:
@@ -61,8 +61,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run_command(name: str, arguments: Sequence[str]) -> int:
     if name in _WITH_ROS:
         require_shared_memory()
-        if told := avoid_full_shared_memory():
-            print(f"sms-handover {name}: {told}", file=sys.stderr)
+        if warning := avoid_full_shared_memory():
+            print(f"sms-handover {name}: {warning}", file=sys.stderr)
     module = import_module(f"sms_handover.cli.{name}")
     parser = ArgumentParser(prog=f"sms-handover {name}")
     module.add_parser(parser)

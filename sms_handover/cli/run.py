@@ -24,8 +24,8 @@ from sms_handover.simulation.parameters import LOCKSTEP, REALTIME
 from sms_handover.simulation.scenario import Scenario
 from sms_handover.units import ns_to_seconds
 
-OWN = "own"  # in the name of the output folder, for a law of which we know no name
-_AT_ONCE = 100  # runs at most that begin within one second without an output folder of their own
+OWN = "own"  # in the name of the output folder, for a law whose name is not known
+_AT_ONCE = 100  # most runs that start within one second without a given output folder
 
 
 def add_parser(parser: ArgumentParser) -> None:
@@ -68,7 +68,7 @@ def add_parser(parser: ArgumentParser) -> None:
     controller.add_argument(
         "--without-controller",
         action="store_true",
-        help="start no controller: the run begins when a node 'controller' of yours has come",
+        help="start no controller: the run begins when your own node 'controller' has joined",
     )
     group.add_argument(
         "--domain-id", type=int, metavar="N", help="ROS domain (default: a free one of this machine's)"
@@ -131,8 +131,8 @@ def command(options: Namespace) -> int:
         outcome = launch(plan)
     progress = outcome.progress
     print(outcome.recorder_said, end="")
-    if told := graver_in_words(progress.run_events):
-        print(f"the nodes reported {told}, see above")
+    if summary := graver_in_words(progress.run_events):
+        print(f"the nodes reported {summary}, see above")
     print(f"{progress.detail} at {ns_to_seconds(progress.stamp_ns):g} s of simulated time")
     if outcome.interrupted:
         return EXIT_INTERRUPTED

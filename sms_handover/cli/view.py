@@ -4,7 +4,6 @@ import os
 import tempfile
 import webbrowser
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
-from importlib import import_module
 from pathlib import Path
 
 from sms_handover.cli.recorded_runs import named
@@ -35,7 +34,7 @@ def add_parser(parser: ArgumentParser) -> None:
     parser.add_argument("runs", nargs="*", type=Path, metavar="RUN", help="output folder of a run, or a bag")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the page there")
     parser.add_argument(
-        "--no-browser", action="store_true", help="open no browser, only tell where the page is"
+        "--no-browser", action="store_true", help="open no browser, only print where the page is"
     )
     parser.add_argument(
         "--frame-rate",
@@ -56,7 +55,7 @@ def command(options: Namespace) -> int:
     if options.live:
         if options.runs or options.output:
             raise ConfigurationError("--live shows a running graph: give no RUN and no --output with it")
-        return int(import_module("sms_handover.cli.view_live").follow(options))  # bags need no ROS
+        return _follow(options)
     if options.port is not None or options.domain_id is not None:
         raise ConfigurationError("--port and --domain-id are for a running graph: give --live with them")
     if not options.runs:
@@ -70,6 +69,17 @@ def command(options: Namespace) -> int:
     if not options.no_browser and not webbrowser.open(file.resolve().as_uri()):
         print("no browser could be opened; open the file in one")
     return 0
+
+
+def _follow(options: Namespace) -> int:
+    """Run the viewer node in this process until it is interrupted; return the exit code."""
+    from sms_handover.cli.node_options import given, run_in_process  # noqa: PLC0415  (bags need no ROS)
+    from sms_handover.nodes.viewer import main  # noqa: PLC0415
+
+    values = given(options, {"port": "port", "frame_rate": "frame_rate"})
+    if options.no_browser:
+        values["browser"] = False
+    return run_in_process(main, options, values)
 
 
 def _scenes(options: Namespace) -> dict[str, Scene]:

@@ -1,16 +1,11 @@
 """Closed loop on a recording: its commands into a live plant, whose states are compared with its own."""
 
-import os
 import signal
 import tempfile
 from pathlib import Path
 from time import monotonic
 
-import rclpy
 from rclpy.executors import Executor
-from rclpy.experimental import EventsExecutor
-from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 
 from sms_handover.analysis.deviation import LargestDeviation, StateDeviation
 from sms_handover.bag.info import read_info
@@ -20,7 +15,7 @@ from sms_handover.graph.topics import CONTROLLER, PLANT
 from sms_handover.launcher.command_replay import PEERS, CommandReplay
 from sms_handover.launcher.display import Display
 from sms_handover.launcher.domain import reserved_domain
-from sms_handover.launcher.launcher import LaunchPlan, graph_environment
+from sms_handover.launcher.launcher import LaunchPlan, graph_environment, joined_graph
 from sms_handover.launcher.processes import NodeProcesses
 from sms_handover.launcher.recorded_scenario import scenario_in
 from sms_handover.model.robot_model import RobotModel
@@ -48,23 +43,15 @@ def closed_loop(bag: Path, domain_id: int | None) -> int:
             raise ConfigurationError(str(error)) from error  # exit code 2: what was given cannot be used
         with reserved_domain(domain_id) as domain:
             plan = LaunchPlan(scenario, (), domain, folder, bag=None, scope=network_scope_to(()))
-            os.environ.update(plan.scope.environment)
             begin = monotonic()
-            rclpy.init(domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
             for number in (signal.SIGTERM, signal.SIGHUP):
                 signal.signal(number, signal.default_int_handler)
-            try:
-                node = Node(CONTROLLER, start_parameter_services=False, enable_rosout=False)
-                executor = EventsExecutor()
-                executor.add_node(node)
+            with joined_graph(plan, CONTROLLER) as (node, executor):
                 replay = CommandReplay(node, ticks, scenario.robot, scenario.parameters.common.reference_ns)
                 with NodeProcesses(folder, graph_environment(plan)) as processes:
                     processes.start(PLANT, ["--ros-args", *_plant_arguments(scenario)])
                     with Display(info.end_ns) as display:
                         _run(replay, executor, processes, display)
-                node.destroy_node()
-            finally:
-                rclpy.try_shutdown()
     print(f"{replay.deviation.compared} states, wall time {monotonic() - begin:.1f} s")
     if replay.held:
         print(f"{replay.held} ticks without a recorded command: the last one was held")

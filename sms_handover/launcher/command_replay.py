@@ -37,7 +37,7 @@ PEERS = (PLANT, CONTROLLER)
 
 _MATCHING_PERIOD_S = 0.02  # [s] of wall time between two checks of who has matched
 _STAMP = struct.Struct("<iI")  # seconds, nanoseconds
-_STAMP_AT = 4  # [byte] behind the encapsulation header
+_STAMP_AT = 4  # [byte] after the encapsulation header
 _STATE = (JOINT_STATES, BASE_ODOMETRY)
 
 

@@ -36,7 +36,7 @@ def reservation(asked: int | None, *, shared: bool = False) -> Iterator[Reservat
     launchers that each start a part of one graph, is not held.
     """
     if asked is not None and not 0 <= asked <= LAST_DOMAIN:
-        raise ConfigurationError(f"domain id is {asked}, allowed is 0 to {LAST_DOMAIN}")
+        raise ConfigurationError(f"domain id is {asked}, must be 0 to {LAST_DOMAIN}")
     if asked is not None and shared:
         yield Reservation(asked, ())
         return

@@ -1,7 +1,8 @@
 """The launcher: starts the graph, monitors the run to its end, and ends every process whatever happens."""
 
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
@@ -14,7 +15,6 @@ from rclpy.signals import SignalHandlerOptions
 from sms_handover_interfaces.msg import RunState
 
 from sms_handover.errors import GraphError
-from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import NODES, PLANT, RECORDER
 from sms_handover.launcher.display import Display
 from sms_handover.launcher.interrupts import Interrupts, let_go_of_closed_output
@@ -28,7 +28,6 @@ from sms_handover.ros.node.node_inputs import INPUTS
 from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK
 from sms_handover.ros.process.network_scope import THIS_MACHINE, NetworkScope
 from sms_handover.simulation.scenario import COMMON, Scenario
-from sms_handover.types import GraspEvent
 from sms_handover.units import ns_to_seconds
 
 _LOG_FOLDER = "ROS_LOG_DIR"  # environment variable that ROS reads
@@ -97,35 +96,42 @@ def launch(plan: LaunchPlan) -> Outcome:
 
 
 def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outcome:
-    """Join the graph, and release the middleware at the end."""
+    common = plan.scenario.parameters.common
+    end_ns = common.last_tick(plan.scenario.schedule.end_ns) * common.tick_ns
+    with joined_graph(plan, "launcher") as (node, executor), ExitStack() as stack:
+        inputs = INPUTS[common.transport](node)
+        stack.callback(inputs.destroy)
+        monitor = RunMonitor(node, plan.scenario.robot.arms, inputs)
+        processes = stack.enter_context(
+            NodeProcesses(plan.log_folder, graph_environment(plan), plan.inherited)
+        )
+        for name, arguments in arguments_of(plan).items():
+            if name not in plan.external:
+                processes.start(name, arguments.line)
+            elif plan.controller:
+                named = ("--remap", f"__node:={name}")
+                processes.start(name, (*arguments.line, *named), plan.controller)
+        driver = LifecycleDriver(node, plan.own_nodes)
+        display = stack.enter_context(Display(end_ns))
+        return _Run(plan, monitor, driver, executor, processes, display, interrupts, memory).to_the_end()
+
+
+@contextmanager
+def joined_graph(plan: LaunchPlan, name: str) -> Iterator[tuple[Node, Executor]]:
+    """Yield a node of this process in the graph, and its executor; raises GraphError if ROS cannot start."""
     os.environ.setdefault(_LOG_FOLDER, str(plan.log_folder / "ros"))  # its default needs a HOME
-    os.environ.update(plan.scope.environment)  # the launcher hears from no further than the nodes
+    os.environ.update(plan.scope.environment)
     try:
         rclpy.init(domain_id=plan.domain, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # such as no thread or no memory left
         raise GraphError(f"ROS cannot be started: {error}") from error
-    node = Node("launcher", start_parameter_services=False, enable_rosout=False)
-    inputs = INPUTS[plan.scenario.parameters.common.transport](node)
+    node = Node(name, start_parameter_services=False, enable_rosout=False)
     executor = EventsExecutor()
     try:
-        monitor = RunMonitor(node, plan.scenario.robot.arms, inputs)
         executor.add_node(node)
-        with NodeProcesses(plan.log_folder, graph_environment(plan), plan.inherited) as processes:
-            for name, arguments in arguments_of(plan).items():
-                if name not in plan.external:
-                    processes.start(name, arguments.line)
-                elif plan.controller:
-                    named = ("--remap", f"__node:={name}")
-                    processes.start(name, (*arguments.line, *named), plan.controller)
-            driver = LifecycleDriver(node, plan.own_nodes)
-            common = plan.scenario.parameters.common
-            end_ns = common.last_tick(plan.scenario.schedule.end_ns) * common.tick_ns
-            with Display(end_ns) as display:
-                run = _Run(plan, monitor, driver, executor, processes, display, interrupts, memory)
-                return run.to_the_end()
+        yield node, executor
     finally:
-        executor.shutdown()  # it would keep the middleware up behind the node
-        inputs.destroy()
+        executor.shutdown()  # it would keep the middleware alive after the node
         node.destroy_node()
         rclpy.try_shutdown()
 
@@ -170,7 +176,6 @@ class _Run:
     time: ActiveTime = field(default_factory=ActiveTime)
     suspended: SuspensionMonitor = field(default_factory=SuspensionMonitor)
     recorder_ended: float = inf  # [s] of active time
-    shown: list[GraspEvent | RunEvent] = field(default_factory=list)
 
     def to_the_end(self) -> Outcome:
         """Return how the run ended; raises GraphError if a node died or nothing went on.
@@ -211,7 +216,7 @@ class _Run:
             why = self.driver.waiting_for or self.monitor.waiting_for()
             if self.time.seconds > deadline:
                 raise GraphError(f"the run has not begun after {timeout_s:g} s: {why}")
-            self._print(notice.poll(self.time.seconds, why))
+            self.display.print(*notice.poll(self.time.seconds, why))
         self.display.start(self.monitor.progress.stamp_ns)
 
     def _wait_for_end(self) -> None:
@@ -293,8 +298,8 @@ class _Run:
         self.monitor.poll()
         self.time.update()
         let_go_of_closed_output()
-        self._print(self.interrupts.poll())
-        self._print(self.suspended.poll(self.processes.suspended(), self.time.seconds))
+        self.display.print(*self.interrupts.poll())
+        self.display.print(*self.suspended.poll(self.processes.suspended(), self.time.seconds))
         if dead := [death for death in self.processes.dead() if not self._recorder_is_done(death)]:
             raise GraphError(self._death_report(dead))
 
@@ -308,17 +313,10 @@ class _Run:
         self.recorder_ended = min(self.recorder_ended, self.time.seconds)
         return self.monitor.finished or self.time.seconds - self.recorder_ended < _NEWS_TIMEOUT_S
 
-    def _print(self, lines: Collection[str]) -> None:
-        for line in lines:
-            self.display.print(line)
-
     def _show(self, *, last: bool = False) -> None:
         progress, common = self.monitor.progress, self.plan.scenario.parameters.common
-        events: list[GraspEvent | RunEvent] = [*progress.events, *progress.run_events]
-        for event in events:
-            if event not in self.shown:
-                self.display.print_event(event)
-        self.shown = events
+        while progress.unseen:
+            self.display.print_event(progress.unseen.pop(0))
         if progress.task_end_ns:
             last_tick = common.last_tick(progress.task_end_ns, failed=progress.task_failed)
             self.display.lasts_until(last_tick * common.tick_ns)

@@ -1,6 +1,7 @@
 """Lifecycle driver: takes all nodes of a graph through their lifecycle, one state after the other."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
+from functools import partial
 from time import monotonic
 from typing import Any
 
@@ -69,7 +70,7 @@ class LifecycleDriver:
             if (transition, name) not in self._asked_at and client.service_is_ready():
                 self._asked_at[transition, name] = monotonic()
                 request = ChangeState.Request(transition=Transition(id=transition))
-                client.call_async(request).add_done_callback(self._answer(name, transition))
+                client.call_async(request).add_done_callback(partial(self._on_answer, name, transition))
 
     def _ask_again(self, transition: int) -> None:
         """Ask nodes that have not answered for a while for their state."""
@@ -78,25 +79,19 @@ class LifecycleDriver:
             client, asked_at = self._states[name], self._asked_at.get((transition, name), now)
             if now - asked_at > _ANSWER_TIMEOUT_S and client.service_is_ready():
                 self._asked_at[transition, name] = now
-                client.call_async(GetState.Request()).add_done_callback(self._state(name, transition))
+                client.call_async(GetState.Request()).add_done_callback(
+                    partial(self._on_state, name, transition)
+                )
 
-    def _answer(self, name: str, transition: int) -> Callable[[Any], None]:
+    def _on_answer(self, name: str, transition: int, future: Any) -> None:
+        if future.result().success:
+            self._done[transition].add(name)
+        elif name not in self._done[transition]:
+            self._failed[name] = f"{name} could not be {_DOES[transition]}"
 
-        def on_answer(future: Any) -> None:
-            if future.result().success:
-                self._done[transition].add(name)
-            elif name not in self._done[transition]:
-                self._failed[name] = f"{name} could not be {_DOES[transition]}"
-
-        return on_answer
-
-    def _state(self, name: str, transition: int) -> Callable[[Any], None]:
-
-        def on_state(future: Any) -> None:
-            state = future.result().current_state.id
-            if state == _AFTER[transition]:
-                self._done[transition].add(name)
-            elif state == _BEFORE[transition] and name not in self._done[transition]:
-                self._asked_at.pop((transition, name), None)  # the request was lost
-
-        return on_state
+    def _on_state(self, name: str, transition: int, future: Any) -> None:
+        state = future.result().current_state.id
+        if state == _AFTER[transition]:
+            self._done[transition].add(name)
+        elif state == _BEFORE[transition] and name not in self._done[transition]:
+            self._asked_at.pop((transition, name), None)  # the request was lost

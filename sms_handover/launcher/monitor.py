@@ -41,6 +41,7 @@ from sms_handover.types import GraspEvent
 _EVERY_NODE = 16  # [messages] of depth, so that the latest of one node does not push out those of others
 
 T = TypeVar("T")
+E = TypeVar("E", GraspEvent, RunEvent)
 
 
 @dataclass
@@ -61,6 +62,7 @@ class Progress:
     tool_error: dict[str, float] = field(default_factory=dict)
     events: list[GraspEvent] = field(default_factory=list)
     run_events: list[RunEvent] = field(default_factory=list)
+    unseen: list[GraspEvent | RunEvent] = field(default_factory=list)  # a display takes them
     waiting: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -86,8 +88,8 @@ class RunMonitor:
         self._finish = node.create_client(Trigger, f"{PLANT}/finish")
         self._topics = {topic.name: topic for topic in graph_topics(arms)}
         self._subscribe(RUN_STATE, _reader(RunState), self._on_state)
-        self._subscribe(GRASP_EVENT, read_grasp_event, self.progress.events.append)
-        self._subscribe(RUN_EVENTS, read_run_event, self.progress.run_events.append)
+        self._subscribe(GRASP_EVENT, read_grasp_event, partial(self._on_event, self.progress.events))
+        self._subscribe(RUN_EVENTS, read_run_event, partial(self._on_event, self.progress.run_events))
         self._subscribe(RUN_PUBLISHED, _reader(PublishedCounts), self._on_counts)
         self._subscribe_latest(TaskPhase, TASK_PHASE, self._on_phase)
         self._subscribe_latest(DiagnosticArray, DIAGNOSTICS, self._on_diagnostics, depth=_EVERY_NODE)
@@ -174,6 +176,10 @@ class RunMonitor:
         self.progress.detail = message.detail
         self.progress.wall_time = message.wall_time
         self.progress.stamp_ns = header_ns(message)
+
+    def _on_event(self, events: list[E], event: E) -> None:
+        events.append(event)
+        self.progress.unseen.append(event)
 
     def _on_counts(self, message: Any) -> None:
         self._published[message.node] = dict(zip(message.topics, message.counts, strict=False))

@@ -14,13 +14,10 @@ _BAR = (10, 40)  # [columns] at least and at most; where there is less room ther
 
 
 class _Console(Console):
-    """Standard error, whose end does not end the program, and whose cursor a kill cannot leave hidden."""
+    """Standard error with a cursor that is never hidden, as a program that is killed could not restore it."""
 
     def show_cursor(self, show: bool = True) -> bool:
         return False
-
-    def on_broken_pipe(self) -> None:
-        self.quiet = True
 
 
 class LiveLine:
@@ -47,8 +44,7 @@ class LiveLine:
 
     def print(self, text: str) -> None:
         """Print a text above the line."""
-        with suppress(OSError):
-            self._console.print(Text(text), soft_wrap=True)
+        self._console.print(Text(text), soft_wrap=True)
 
     def stay(self) -> None:
         """Leave the line as it is; the next one is another."""

@@ -8,20 +8,20 @@ from typing import TypeVar
 
 _TERMINAL_PERIOD_S = 0.2  # [s] of wall time between two updates
 _LOG_PERIOD_S = 5.0  # [s] of wall time between two lines where there is no terminal
-_SHORT_S = 1.0  # [s] of wall time; what takes no longer needs no line
+_SHORT_S = 1.0  # [s] of wall time; shorter work needs no line
 _BYTES_PER_MB = 1e6
 
 T = TypeVar("T", bound="Progress")
 
 
 class Progress:
-    """Tells how far something is; nothing that is shown ever ends the work, whoever closes the terminal."""
+    """Shows how far something is; a terminal or pipe that was closed never ends the work."""
 
     def __init__(self, after_s: float = 0.0) -> None:
         """Show nothing until ``after_s`` [s] of wall time have passed."""
         self._live = None
         if sys.stderr.isatty():
-            # here, because rich takes time to import, which nothing without a terminal needs
+            # rich takes time to import, and only a terminal needs it
             from sms_handover.terminal.live_line import LiveLine  # noqa: PLC0415
 
             line = LiveLine()
@@ -48,13 +48,14 @@ class Progress:
         else:
             self.print(f"{text}  {details}".rstrip())
 
-    def print(self, text: str) -> None:
-        """Print a line that stays."""
-        if self._live:
-            self._live.print(text)
-        else:
+    def print(self, *lines: str) -> None:
+        """Print lines that stay."""
+        for line in lines:
             with suppress(OSError):
-                print(text, file=sys.stderr, flush=True)
+                if self._live:
+                    self._live.print(line)
+                else:
+                    print(line, file=sys.stderr, flush=True)
 
     def stay(self) -> None:
         """Leave what is shown as it is, and go to the next line."""
@@ -64,7 +65,7 @@ class Progress:
 
 @contextmanager
 def byte_progress(what: str) -> Iterator[Callable[[int, int], None]]:
-    """Yield what shows that so many of so many bytes are done, if it takes more than a second."""
+    """Yield a callback that shows the bytes done and their total, if the work takes more than a second."""
     with Progress(after_s=_SHORT_S) as progress:
 
         def show(done: int, size: int) -> None:

@@ -139,7 +139,7 @@ def _tear_down(nodes: Sequence[RunnableNode], executor: Executor | None) -> None
     """
     faulthandler.dump_traceback_later(_TEARDOWN_S, exit=True, file=_STANDARD_ERROR)
     if executor is not None:
-        executor.shutdown()  # it would keep the middleware up behind the last node
+        executor.shutdown()  # it would keep the middleware alive after the last node
     for node in nodes:
         node.destroy_node()
     rclpy.try_shutdown()
@@ -175,5 +175,5 @@ def _init(args: list[str]) -> None:
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
-        reason = str(error).split(", at /", 1)[0]  # the rest tells where in the sources of rcl
+        reason = str(error).split(", at /", 1)[0]  # the rest is a place in the sources of rcl
         raise ConfigurationError(" ".join(reason.split())) from error

@@ -1,4 +1,4 @@
-"""Real-time settings of a node's process: processor, priority, memory, timers."""
+"""Realtime settings of a node's process: processor, priority, memory, timers."""
 
 import ctypes
 import os
