@@ -70,6 +70,7 @@ setup(
         "ros-jazzy-common-interfaces>=5.3.6,<5.4",
         "ros-jazzy-rmw-fastrtps-cpp>=8.4.3,<8.5",
         "sms_handover_interfaces",
+        "coal>=3.0.3,<4",
         "eigenpy>=3.13,<4",
         "lz4>=4.3,<5",
         "mcap>=1.5,<2",

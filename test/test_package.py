@@ -20,6 +20,7 @@ from .workspace import ROOT, entry_points
 # rosdep/python.yaml and jazzy/distribution.yaml of ros/rosdistro. A module without a key of its own names one
 # that brings it.
 KEYS = {
+    "coal": "coal",
     "eigenpy": "pinocchio",
     "jinja2": "python3-jinja2",
     "launch": "launch",

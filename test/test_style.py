@@ -69,6 +69,7 @@ IN_JAZZY = set(
     [
         "ament_cmake",
         "builtin_interfaces",
+        "coal",
         "diagnostic_msgs",
         "eigenpy",
         "geometry_msgs",
