@@ -124,7 +124,7 @@ def test_if_nothing_can_be_played_the_exit_code_says_so(tmp_path: Path) -> None:
         (["robot", "--rate", "0"], "allowed is more than 0"),
         (["robot", "-m", "imu"], "'imu' is not of the form OLD:=NEW"),
         (["robot", "-e", "("], "regular expression '(' is not readable"),
-        (["robot", "--domain-id", "500"], "domain id is 500, allowed is 0 to 101"),
+        (["robot", "--domain-id", "500"], "domain id is 500, must be 0 to 101"),
         (["robot", "--closed-loop", "--rate", "2"], "--closed-loop takes no other option, given is rate"),
         (["robot", "--closed-loop"], "does not say what it was made with"),
     ],

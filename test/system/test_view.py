@@ -29,7 +29,7 @@ def test_runs_become_one_page(recorded: Recorded, tmp_path: Path) -> None:
         (["nowhere", "--live"], "give no RUN and no --output with it"),
         (["nowhere", "--port", "8080"], "--port and --domain-id are for a running graph: give --live"),
         (["--live", "--port", "70000"], "'port' is 70000"),
-        (["--live", "--domain-id", "500"], "domain id is 500, allowed is 0 to"),
+        (["--live", "--domain-id", "500"], "domain id is 500, must be 0 to"),
     ],
 )
 def test_what_cannot_be_shown_is_named(

@@ -69,8 +69,8 @@ WRONG = {
     "reference period": (["-p", "common.tick:=0.003"], "a multiple of the tick"),
     "duration": (["--duration", "-3"], "-3.0 s, must be >= 0 s"),
     "endless duration": (["--duration", "inf"], "is inf s, must be finite"),
-    "domain": (["--domain-id", "400"], "allowed is 0 to 101"),
-    "negative domain": (["--domain-id", "-1"], "allowed is 0 to 101"),
+    "domain": (["--domain-id", "400"], "must be 0 to 101"),
+    "negative domain": (["--domain-id", "-1"], "must be 0 to 101"),
     "domain that is no number": (["--domain-id", "one"], "invalid int value"),
     "node of a host": (
         ["--nodes", "plant,recoder", "--domain-id", "5"],
