@@ -159,7 +159,7 @@ def test_a_wrong_import_is_caught(module: str, source: str) -> None:
         ("sms_handover.simulation.loop", "from sms_handover.plant import deputy"),
         ("sms_handover.nodes.plant", "import rclpy\nfrom sms_handover_interfaces.msg import RunState"),
         ("sms_handover.bag.run.reader", "import rosbags.rosbag2"),
-        ("sms_handover.analysis.figures.base", "from matplotlib.figure import Figure"),
+        ("sms_handover.analysis.figures.time_series", "from matplotlib.figure import Figure"),
     ],
 )
 def test_a_right_import_passes(module: str, source: str) -> None:

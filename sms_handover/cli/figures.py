@@ -56,7 +56,7 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     formats = chosen_formats([name.strip() for name in options.format.split(",")])
     with_scenes = _SNAPSHOTS in {kind.name for kind in chosen_figures(options.only)}
     if not _DPI[0] <= options.dpi <= _DPI[1]:

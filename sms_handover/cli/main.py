@@ -1,4 +1,4 @@
-"""The command line ``sms-handover``."""
+"""The main program of the command line ``sms-handover``."""
 
 import os
 import sys
@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from sms_handover import __version__
+from sms_handover.cli.exit_codes import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_USAGE
 from sms_handover.errors import ConfigurationError, SmsHandoverError
 from sms_handover.ros.process.shared_memory_check import avoid_full_shared_memory, require_shared_memory
 
@@ -23,11 +24,10 @@ _COMMANDS = {
     "record": "record any topics of any graph to an MCAP bag",
 }
 _WITH_ROS = ("run", "play", "record")
-_EXIT_FAILED, _EXIT_USAGE, _EXIT_INTERRUPTED = 1, 2, 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Carry out one command; return the exit code. Errors of ours are one line on standard error.
+    """Run one command; return the exit code. Errors of ours are one line on standard error.
 
     Only the module of that command is imported, so that those without ROS need no ROS.
     """
@@ -43,26 +43,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("arguments", nargs=REMAINDER, metavar="...", help="options of the command")
     chosen = parser.parse_args(arguments)
     try:
-        return _carry_out(chosen.command, chosen.arguments)
-    except ConfigurationError as error:
-        print(f"sms-handover {chosen.command}: error: {error}", file=sys.stderr)
-        return _EXIT_USAGE
+        return _run_command(chosen.command, chosen.arguments)
     except SmsHandoverError as error:
         print(f"sms-handover {chosen.command}: error: {error}", file=sys.stderr)
-        return _EXIT_FAILED
+        return EXIT_USAGE if isinstance(error, ConfigurationError) else EXIT_FAILED
     except BrokenPipeError:  # whoever reads the output has seen enough, as head(1) does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return _EXIT_FAILED
+        return EXIT_FAILED
     except (OSError, MemoryError) as error:  # what the system refuses: files, processes, memory
         print(f"sms-handover {chosen.command}: error: {error or 'no memory left'}", file=sys.stderr)
-        return _EXIT_FAILED
+        return EXIT_FAILED
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
-        return _EXIT_INTERRUPTED
+        return EXIT_INTERRUPTED
 
 
-def _carry_out(name: str, arguments: Sequence[str]) -> int:
-    """Import the module of one command and carry it out; return the exit code."""
+def _run_command(name: str, arguments: Sequence[str]) -> int:
     if name in _WITH_ROS:
         require_shared_memory()
         if told := avoid_full_shared_memory():

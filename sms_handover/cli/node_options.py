@@ -52,5 +52,4 @@ def run_in_process(
 
 
 def _unset(value: object) -> bool:
-    """Whether an option was not given."""
     return value is None or value is False or value == []

@@ -29,18 +29,18 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     scenario = scenario_of(options)
     check_scenario(scenario)
     common = scenario.parameters.common
-    display = Display(common.last_tick(scenario.schedule.end_ns) * common.tick_ns)
+    with Display(common.last_tick(scenario.schedule.end_ns) * common.tick_ns) as display:
 
-    def show(stamp_ns: int, phase: TaskPhase) -> None:
-        display.lasts_until(common.last_tick(phase.end_ns, failed=phase.failed) * common.tick_ns)
-        display.show(stamp_ns, phase.name, {})
+        def show(stamp_ns: int, phase: TaskPhase) -> None:
+            display.lasts_until(common.last_tick(phase.end_ns, failed=phase.failed) * common.tick_ns)
+            display.show_run(stamp_ns, phase.name)
 
-    run = simulate(scenario, progress=show)
-    display.show(int(run.tick_ns[-1]), run.phases[-1].name, {}, last=True)
+        run = simulate(scenario, progress=show)
+        display.show_run(int(run.tick_ns[-1]), run.phases[-1].name, last=True)
     name, tolerance = scenario.parameters.controller.law, scenario.parameters.plant.grasp_tolerance
     for event in run.run_events:
         print(event)

@@ -7,6 +7,8 @@ from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from importlib import import_module
 from pathlib import Path
 
+from sms_handover.cli.recorded_runs import named
+from sms_handover.cli.text_files import write_text
 from sms_handover.errors import BagError, ConfigurationError
 from sms_handover.launcher.run_folder import bag_of
 from sms_handover.scene.page import animation_html
@@ -50,7 +52,7 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     if options.live:
         if options.runs or options.output:
             raise ConfigurationError("--live shows a running graph: give no RUN and no --output with it")
@@ -62,7 +64,8 @@ def command(options: Namespace) -> int:
     page = animation_html(
         _scenes(options), title=f"Handover: {', '.join(p.resolve().name for p in options.runs)}"
     )
-    file = _write(page, options.output)
+    file = options.output or _temporary_file()
+    write_text(file, page)
     print(f"{file}: {len(page.encode()) / 1e6:.1f} MB")
     if not options.no_browser and not webbrowser.open(file.resolve().as_uri()):
         print("no browser could be opened; open the file in one")
@@ -70,28 +73,14 @@ def command(options: Namespace) -> int:
 
 
 def _scenes(options: Namespace) -> dict[str, Scene]:
-    """Return the scenes of the runs, by the names of their folders."""
     frame_rate = FRAME_RATE if options.frame_rate is None else options.frame_rate
-    scenes: dict[str, Scene] = {}
-    for path in options.runs:
-        name = path.resolve().name
-        if name in scenes:
-            raise ConfigurationError(f"two runs are named {name!r}; rename one folder")
-        try:
-            scenes[name] = read_scene(bag_of(path), frame_rate)
-        except BagError as error:
-            raise ConfigurationError(str(error)) from error  # exit code 2: what was given cannot be used
-    return scenes
-
-
-def _write(page: str, path: Path | None) -> Path:
-    """Write the page to ``path``, or to a file of its own among the temporary ones."""
-    if path is None:
-        handle, name = tempfile.mkstemp(prefix="handover_", suffix=".html")
-        os.close(handle)
-        path = Path(name)
     try:
-        path.write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise ConfigurationError(f"{path} cannot be written: {error.strerror}") from error
-    return path
+        return {name: read_scene(path, frame_rate) for name, path in named(map(bag_of, options.runs)).items()}
+    except BagError as error:
+        raise ConfigurationError(str(error)) from error  # exit code 2: what was given cannot be used
+
+
+def _temporary_file() -> Path:
+    handle, name = tempfile.mkstemp(prefix="handover_", suffix=".html")
+    os.close(handle)
+    return Path(name)

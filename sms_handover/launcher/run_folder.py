@@ -1,4 +1,4 @@
-"""What the output folder of a run holds, and who writes to it."""
+"""The output folder of a run: what it holds, and who writes to it."""
 
 import fcntl
 import os

@@ -1,4 +1,4 @@
-"""How parts make an arm, and arms and a spacecraft make the robot; all of it checked when it is made."""
+"""Assembly of parts to arms, and of arms and a spacecraft to the robot, checked when it is made."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from re import fullmatch
 from sms_handover.errors import RobotDescriptionError, UnknownNameError
 from sms_handover.frames import joint_name
 from sms_handover.model.parts import Floats, Gripper, Inertia, JointDescription, LinkDescription, Origin
-from sms_handover.model.validation import positive_vector, vector
+from sms_handover.model.validation import vector
 
 
 def link_name(arm: str, number: int) -> str:
@@ -38,13 +38,13 @@ class ArmDescription:
         """Check that the name can be part of a topic and that the parts pair up and carry it."""
         if not fullmatch(r"[a-z][a-z0-9_]*", self.name):
             raise RobotDescriptionError(
-                f"arm name is {self.name!r}, allowed are lower-case letters, digits and _, a letter first"
+                f"arm name is {self.name!r}, must be lower-case letters, digits and _, a letter first"
             )
         if not self.joints:
-            raise RobotDescriptionError(f"{self.name}: has 0 joints, allowed is at least 1")
+            raise RobotDescriptionError(f"{self.name}: has 0 joints, must be >= 1")
         if len(self.joints) != len(self.links):
             counts = f"{len(self.joints)} joints and {len(self.links)} links"
-            raise RobotDescriptionError(f"{self.name}: has {counts}, allowed are equal numbers")
+            raise RobotDescriptionError(f"{self.name}: has {counts}, must be equal numbers")
         names = [joint.name for joint in self.joints] + [link.name for link in self.links]
         names.append(self.gripper.name)
         numbers = range(1, len(self.joints) + 1)
@@ -53,7 +53,7 @@ class ArmDescription:
         allowed.append(gripper_name(self.name))
         for name, expected in zip(names, allowed, strict=True):
             if name != expected:
-                raise RobotDescriptionError(f"{self.name}: a part is named {name!r}, allowed is {expected!r}")
+                raise RobotDescriptionError(f"{self.name}: a part is named {name!r}, must be {expected!r}")
 
     @property
     def mass(self) -> float:
@@ -75,7 +75,7 @@ class Panel:
 
     def __post_init__(self) -> None:
         vector(self.xyz, 3, "panel xyz", "m")
-        positive_vector(self.size, 3, "panel size", "m")
+        vector(self.size, 3, "panel size", "m", above=0.0)
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Base:
     panels: tuple[Panel, ...] = ()
 
     def __post_init__(self) -> None:
-        positive_vector(self.size, 3, f"{self.inertia.body}: size", "m")
+        vector(self.size, 3, f"{self.inertia.body}: size", "m", above=0.0)
 
 
 @dataclass(frozen=True)
@@ -101,10 +101,10 @@ class RobotDescription:
     def __post_init__(self) -> None:
         """Check that there is an arm and that arm names differ."""
         if not self.arms:
-            raise RobotDescriptionError("the robot has 0 arms, allowed is at least 1")
+            raise RobotDescriptionError("the robot has 0 arms, must be >= 1")
         name, count = Counter(arm.name for arm in self.arms).most_common(1)[0]
         if count > 1:
-            raise RobotDescriptionError(f"arm name {name!r} is given {count} times, allowed is once")
+            raise RobotDescriptionError(f"arm name {name!r} is given {count} times")
 
     @property
     def mass(self) -> float:

@@ -10,7 +10,8 @@ import pinocchio as pin
 
 from sms_handover.errors import RobotDescriptionError, UnknownNameError
 from sms_handover.frames import tool_frame
-from sms_handover.model.description import RobotDescription, load_robot
+from sms_handover.model.assembly import RobotDescription
+from sms_handover.model.description import load_robot
 from sms_handover.model.poses import pose_of, se3_of, twist_of
 from sms_handover.model.urdf import to_urdf
 from sms_handover.types import BASE_NQ, BASE_NV, Array, Pose, Twist, read_only

@@ -1,4 +1,4 @@
-"""Put a report of recorded runs together as one HTML page."""
+"""Page of a report: recorded runs as one HTML document."""
 
 from collections.abc import Sequence
 
@@ -21,7 +21,7 @@ _SCRIPTS = ("data.js", "theme.js", "plot.js", "link.js", "main.js")
 
 
 def report_page(runs: Sequence[RecordedRun]) -> str:
-    """Return the report of recorded runs as one HTML document that loads nothing from anywhere.
+    """Return the report of recorded runs as one self-contained HTML document.
 
     Raises ConfigurationError if there is no run, or two have the same name.
     """
@@ -29,7 +29,7 @@ def report_page(runs: Sequence[RecordedRun]) -> str:
     if not runs:
         raise ConfigurationError("a report needs at least one run")
     if len(set(names)) < len(names):
-        raise ConfigurationError(f"every run of a report needs a name of its own, these are {names}")
+        raise ConfigurationError(f"runs of a report must have different names, these are {names}")
     comparison = compare(
         {run.name: run.data for run in runs},
         laws={run.name: run.law for run in runs},
@@ -62,6 +62,5 @@ def report_page(runs: Sequence[RecordedRun]) -> str:
 
 
 def _title(names: Sequence[str]) -> str:
-    """Return the heading of the page."""
     *others, last = names
     return f"{', '.join(others)} and {last}, side by side" if others else last

@@ -1,4 +1,4 @@
-"""A recorded run with everything that a report tells of it."""
+"""Recorded run: its arrays and what its bag says about it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ _TOLERANCES = ("grasp_position_tolerance", "grasp_angle_tolerance", "grasp_speed
 
 @dataclass(frozen=True, eq=False)
 class RecordedRun:
-    """The arrays of a run under a name, and what its bag says of itself."""
+    """The arrays of a run under a name, and the description of its bag."""
 
     name: str
     data: RunData
@@ -28,17 +28,17 @@ class RecordedRun:
 
     @cached_property
     def loop(self) -> LoopRecord:
-        """Return the course of the run in wall time, read from the bag when it is first asked for."""
+        """Return the wall-clock record of the run, read from the bag on first use."""
         return read_loop(self.info.path)
 
     @property
     def law(self) -> str:
-        """Return the control law that the bag tells of, 'unknown' if it tells of none."""
+        """Return the control law in the bag, 'unknown' if there is none."""
         return str(self.info.parameters.get(CONTROLLER, {}).get("law", UNKNOWN_LAW))
 
     @property
     def tolerance(self) -> GraspTolerance | None:
-        """Return how near a grasp had to be, None if the bag does not tell."""
+        """Return the grasp tolerance, None if the bag lacks it."""
         plant = self.info.parameters.get(PLANT, {})
         values = [plant.get(name) for name in _TOLERANCES]
         numbers = [float(value) for value in values if isinstance(value, int | float)]
@@ -46,16 +46,16 @@ class RecordedRun:
 
 
 def read_recorded(name: str, bag: Path) -> RecordedRun:
-    """Return the run in a bag; raises ConfigurationError if the bag cannot be used or is not ours."""
+    """Return the run in a bag; raises ConfigurationError if the bag is damaged or holds no run."""
     try:
         run = RecordedRun(name, read_run(bag), read_info(bag))
-        _ = run.info.parameters, run.info.ledger  # parsed when asked for: what is broken is told now
+        _ = run.info.parameters, run.info.ledger  # parsed on first use: raise their errors here
     except BagError as error:
         raise ConfigurationError(str(error)) from error
     return run
 
 
 def common_tolerance(runs: Sequence[RecordedRun]) -> GraspTolerance | None:
-    """Return how near a grasp had to be if that was the same in all runs, else None."""
+    """Return the grasp tolerance if it was the same in all runs, else None."""
     found = {run.tolerance for run in runs}
     return found.pop() if len(found) == 1 else None

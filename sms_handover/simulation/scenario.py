@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TypeVar
 
 from sms_handover.configuration.package_files import config_file
-from sms_handover.configuration.parameters import EVERY_NODE, build, read_parameter_files, read_yaml
-from sms_handover.configuration.yaml_reader import line_in
+from sms_handover.configuration.parameters import EVERY_NODE, build, read_parameter_files
+from sms_handover.configuration.sections import Section
 from sms_handover.control.parameters import ControllerParameters
 from sms_handover.errors import UnknownNameError
 from sms_handover.graph.topics import CONTROLLER, IK, NODES, PLANT, PLAYER, TOPIC_RECORDER, TRAJECTORY, VIEWER
@@ -88,10 +88,10 @@ def _reject_misspelt(path: Path) -> None:
 
     A file may have sections for nodes of others, so only what looks like a slip is refused.
     """
-    document = read_yaml(path)
-    for section in map(str, document):
+    document = Section.read(path)
+    for section in document.keys:
         if section not in _SECTIONS and get_close_matches(section, _SECTIONS, n=1, cutoff=_SLIP):
-            raise UnknownNameError("node", section, _SECTIONS, f"{path}{line_in(document, section)}")
+            raise UnknownNameError("node", section, _SECTIONS, document.where(section))
 
 
 def load_scenario(overrides: Overrides | None = None, files: Sequence[Path] = ()) -> Scenario:

@@ -10,7 +10,7 @@ import pytest
 from sms_handover.bag.info import read_info
 from sms_handover.bag.run.reader import read_run
 from sms_handover.cli.main import main
-from sms_handover.cli.reproduce import scenario_in
+from sms_handover.launcher.recorded_scenario import scenario_in
 from sms_handover.simulation.simulate import simulate
 
 from ..first_edition import FOLDER, LAWS, digests_of, machine, rows_of, run_of, stored

@@ -143,7 +143,7 @@ def test_momentum_and_energy_are_sums_over_the_bodies(robot: RobotModel, draw: D
     """Each body gives m v, (r - c) x m v + I w and (m v^2 + w I w) / 2, its velocity taken by differences."""
     for _ in range(5):
         q, v = draw.q(), draw.v()
-        receipt = conserved_quantities(robot, q, v)
+        conserved = conserved_quantities(robot, q, v)
         now, _ = _walk(robot, q)
         before, _ = _walk(robot, _along(robot, q, v, -FD_STEP))
         after, _ = _walk(robot, _along(robot, q, v, FD_STEP))
@@ -160,10 +160,10 @@ def test_momentum_and_energy_are_sums_over_the_bodies(robot: RobotModel, draw: D
             energy += 0.5 * body.mass * velocity @ velocity + 0.5 * spin @ moments @ spin
         # Velocities below 5 err by FD_BOUND; they enter with the mass, a lever below 2 m, and twice.
         bound = 10.0 * mass * FD_BOUND
-        np.testing.assert_allclose(receipt.centre_of_mass, centre, atol=_ROUNDING)
-        np.testing.assert_allclose(receipt.linear_momentum, linear, atol=bound)
-        np.testing.assert_allclose(receipt.angular_momentum, angular, atol=bound)
-        assert receipt.kinetic_energy == pytest.approx(energy, abs=bound)
+        np.testing.assert_allclose(conserved.centre_of_mass, centre, atol=_ROUNDING)
+        np.testing.assert_allclose(conserved.linear_momentum, linear, atol=bound)
+        np.testing.assert_allclose(conserved.angular_momentum, angular, atol=bound)
+        assert conserved.kinetic_energy == pytest.approx(energy, abs=bound)
 
 
 def test_tool_twist_is_the_rate_of_its_pose(robot: RobotModel, draw: Draw) -> None:

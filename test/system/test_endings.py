@@ -14,6 +14,7 @@ from sms_handover.bag.run.reader import read_run
 from sms_handover.graph.topics import NODES
 from sms_handover.run_data import RunData
 
+from ..core.terminal import Terminal
 from ..ros.short_handover import short_handover
 from .conftest import Command
 from .runs import DEADLINE_S, Ended, Running, command_of, has_ended, nodes_of, running, sms_handover
@@ -132,6 +133,15 @@ def test_a_closed_terminal_ends_the_run_in_order(tmp_path: Path) -> None:
     every_state_is_there(bag)
 
 
+def test_the_progress_of_a_run_takes_one_line_of_a_narrow_terminal(schedule: Path, tmp_path: Path) -> None:
+    command = ["run", "--schedule", str(schedule), "--duration", "0.1", "-o", str(tmp_path / "run")]
+    program = f"from sms_handover.cli.main import main\nraise SystemExit(main({command}))"
+    with Terminal(program, columns=40, TERM="xterm") as terminal:
+        assert terminal.end() == 0, terminal.text
+    (line,) = [line for line in terminal.screen if " of 0.1 s" in line]
+    assert line.startswith("  0.10 of 0.1 s") and len(line) <= 40
+
+
 def read_until_recorded(terminal: int, pid: int, bag: Path) -> dict[str, int]:
     """Read what a command prints on a terminal until its run is under way; return its nodes."""
     file = bag / "bag_0.mcap"
@@ -192,7 +202,7 @@ def test_a_missed_grasp_has_an_exit_code_of_its_own(tmp_path: Path) -> None:
     assert done.code == 4, done
     assert "grasp by arm_a: missed" in done.err
     assert "transfer by arm_b: rejected" in done.err
-    assert "the whole run is done at 0.68 s" in done.out
+    assert "run complete at 0.68 s" in done.out
     assert not (tmp_path / "run" / "bag").exists()
 
 

@@ -42,6 +42,8 @@ def own(schedule: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, t
     runs = {}
     for name, module in NODES.items():
         program = f"{sys.executable} -m {module}"
+        if name == "helped":  # behind a shell, as behind any wrapper, it still knows its launcher
+            program = f"bash -c '{program} \"$@\" & wait' bash"
         ended = sms_handover(
             "run", "--schedule", schedule, "--own-controller", program, "-o", name, cwd=folder
         )
@@ -146,4 +148,4 @@ def test_one_that_dies_ends_the_run(schedule: Path, tmp_path: Path) -> None:
     ended = sms_handover(*arguments, "-p", "controller.stiffness:=-3.0", cwd=tmp_path)
     assert ended.code == 1
     assert "node 'controller' ended with exit code 2" in ended.err
-    assert "controller: error: parameter 'stiffness' is -3.0 N/m, allowed is at least 0" in ended.err
+    assert "controller: error: parameter 'stiffness' is -3.0 N/m, must be >= 0" in ended.err

@@ -46,7 +46,7 @@ def test_a_rate_of_zero_is_not_taken_for_the_default(
 ) -> None:
     ended = called("view", recorded[LAWS[0]][0], "--frame-rate", 0, "--no-browser", cwd=tmp_path)
     assert ended.code == 2
-    assert "frame rate is 0 1/s, it must be positive" in ended.err
+    assert "frame rate is 0 1/s, it must be > 0" in ended.err
 
 
 def test_a_page_that_cannot_be_written_is_named(recorded: Recorded, tmp_path: Path, called: Command) -> None:

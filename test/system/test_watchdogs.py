@@ -27,7 +27,7 @@ def test_a_run_with_retries_is_the_one_in_one_process(tmp_path: Path, called: Co
     ended = sms_handover("run", "--schedule", path, *hold, "-o", "out", cwd=tmp_path)
     assert ended.code == 4, ended
     assert "phase_retried" in ended.err and "grasp_failed" in ended.err
-    assert "the nodes told of 1 error, 2 warnings, see above" in ended.out
+    assert "the nodes reported 1 error, 2 warnings, see above" in ended.out
     assert "phase 'carry' has failed at 0.42 s of simulated time" in ended.out
     recorded = read_run(tmp_path / "out" / "bag")
     scenario = load_scenario({"common": {"schedule": str(path)}, "trajectory": {"failure_hold": 0.06}})

@@ -7,7 +7,8 @@ second time from the source: a wrong sign in a light link hides in any test of t
 import numpy as np
 import pytest
 
-from sms_handover.model.description import RobotDescription, load_robot
+from sms_handover.model.assembly import RobotDescription
+from sms_handover.model.description import load_robot
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import Array, Pose
 from test.verification.conftest import Record

@@ -111,8 +111,8 @@ def test_momentum_is_measured_alike(description: RobotDescription, record: Recor
     errors = np.zeros(2)
     for q, v, effort in _states(robot):
         other.dynamics(q, v, effort)
-        receipt = conserved_quantities(robot, q, v)
-        pairs = zip(other.momentum(), (receipt.linear_momentum, receipt.angular_momentum), strict=True)
+        conserved = conserved_quantities(robot, q, v)
+        pairs = zip(other.momentum(), (conserved.linear_momentum, conserved.angular_momentum), strict=True)
         errors = np.maximum(errors, [np.linalg.norm(a - b) / np.linalg.norm(b) for a, b in pairs])
     name = "shipped" if description == load_robot() else "skewed"
     record(f"linear momentum, {name} robot, relative", errors[0], _ROUNDING, against=_AGAINST)
