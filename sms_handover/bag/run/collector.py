@@ -4,11 +4,12 @@ from collections.abc import Callable, Iterator
 
 from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import BagInfo
-from sms_handover.bag.run.columns import BlockCollector, joint_state_layout, odometry_layout
+from sms_handover.bag.run.columns import BlockCollector
 from sms_handover.bag.run.series import RowCollector
 from sms_handover.errors import BagError
 from sms_handover.graph import topics
 from sms_handover.graph.events import RunEvent
+from sms_handover.messages.layout import joint_state, odometry
 from sms_handover.messages.message_types import MessageTypes
 from sms_handover.messages.stamps import stamp_ns
 from sms_handover.messages.values import (
@@ -40,9 +41,9 @@ class RunCollector:
         self.arms = tuple(self._found_arms())
         self._check_types()
         self.joints = {
-            name: BlockCollector(joint_state_layout, (POSITION, VELOCITY, EFFORT)) for name in JOINT_TOPICS
+            name: BlockCollector(joint_state, (POSITION, VELOCITY, EFFORT)) for name in JOINT_TOPICS
         }
-        self.odometry = BlockCollector(odometry_layout, _POSE_WITHOUT_COVARIANCE)
+        self.odometry = BlockCollector(odometry, _POSE_WITHOUT_COVARIANCE)
         self.rows = {
             topics.DEPUTY_POSE: RowCollector(7, pose_values),
             topics.LINEAR_MOMENTUM: RowCollector(3, vector_values),

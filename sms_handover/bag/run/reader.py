@@ -44,7 +44,7 @@ def read_run(path: Path, namespace: str | None = None) -> RunData:
 
 def _assemble(collector: RunCollector) -> RunData:
     """Put what was collected into rows."""
-    joint_names = collector.joints[topics.JOINT_STATES].first_texts()
+    joint_names = collector.joints[topics.JOINT_STATES].first_names()
 
     def joint(topic: str, block: int) -> Series:
         return collector.joints[topic].series(block, joint_names).settled()
