@@ -1,4 +1,4 @@
-"""The description of a bag that rosbag2 keeps in ``metadata.yaml`` and inside the file, version 9."""
+"""Metadata of a bag as rosbag2 keeps it in ``metadata.yaml`` and inside the file, version 9."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ _ROS_DISTRO = "jazzy"
 
 @dataclass(frozen=True)
 class TopicCount:
-    """One topic of a bag and how many messages it holds; ``qos`` are the profiles as rosbag2 writes them."""
+    """A topic of a bag with its number of messages; ``qos`` are profiles as rosbag2 writes them."""
 
     name: str
     type: str
@@ -32,7 +32,7 @@ class TopicCount:
 
 @dataclass(frozen=True)
 class FileSpan:
-    """One file of a bag: its first and last log time, both 0 without a message, and how many it holds."""
+    """A file of a bag: first and last log time, 0 without messages, and number of messages."""
 
     name: str
     start_ns: int
@@ -62,10 +62,7 @@ def bag_information(files: Sequence[FileSpan], topics: Sequence[TopicCount]) -> 
 
 
 def metadata_of(bag: Path) -> dict[str, Any] | None:
-    """Return the body of ``metadata.yaml``; raises BagError if it is no such.
-
-    None if the bag has none, or is given as one of its files.
-    """
+    """Return the body of the ``metadata.yaml`` in a folder, None without one; raises BagError."""
     file = bag / METADATA_FILE
     if not file.is_file():
         return None
@@ -77,7 +74,7 @@ def metadata_of(bag: Path) -> dict[str, Any] | None:
 
 
 def counts_of(metadata: Mapping[str, Any]) -> dict[str, int]:
-    """Return the number of messages by topic in the body of a ``metadata.yaml``; raises BagError."""
+    """Return the number of messages by topic from the body of ``metadata.yaml``; raises BagError."""
     counts: dict[str, int] = {}
     try:
         for item in metadata.get("topics_with_message_count") or ():
@@ -89,7 +86,7 @@ def counts_of(metadata: Mapping[str, Any]) -> dict[str, int]:
 
 
 def counts_in_metadata(bag: Path) -> dict[str, int]:
-    """Return the number of messages by topic that ``metadata.yaml`` tells; nothing if it tells none."""
+    """Return the number of messages by topic as far as ``metadata.yaml`` states it."""
     try:
         return counts_of(metadata_of(bag) or {})
     except BagError:
@@ -107,7 +104,7 @@ def qos_text(profiles: Sequence[Mapping[str, object]]) -> str:
 
 
 def _span(start_ns: int, end_ns: int, message_count: int) -> dict[str, Any]:
-    """Return what both a bag and a file of it tell; a new object each time, so YAML needs no anchors."""
+    """Return the entries of both a bag and a file; new objects each time, so YAML needs no anchors."""
     return {
         "duration": {"nanoseconds": end_ns - start_ns},
         "starting_time": {"nanoseconds_since_epoch": start_ns},
@@ -116,7 +113,6 @@ def _span(start_ns: int, end_ns: int, message_count: int) -> dict[str, Any]:
 
 
 def _topic_information(topic: TopicCount) -> dict[str, Any]:
-    """Return the entry of one topic."""
     return {
         "topic_metadata": {
             "name": topic.name,

@@ -56,14 +56,14 @@ def joint_state(data: bytes) -> Shape:
 
 
 def odometry(data: bytes) -> Shape:
-    """Return the shape of an Odometry: its frames; blocks pose (7), its covariance, twist (6), its covariance."""
+    """Return the shape of an Odometry: its frames; blocks pose, covariance (36), twist, covariance (36)."""
     cursor = _Cursor(data)
     frames = (cursor.text(), cursor.text())
     return cursor.shape(frames, [cursor.doubles(count) for count in (7, 36, 6, 36)])
 
 
 def numbers_behind_header(count: int) -> Parse:
-    """Return what finds the one block of a message that is a header and ``count`` doubles, as a PoseStamped."""
+    """Return the parser of a message that is a header and ``count`` doubles, e.g. a PoseStamped."""
 
     def parse(data: bytes) -> Shape:
         cursor = _Cursor(data)
@@ -146,7 +146,6 @@ class _Cursor:
         self._unsigned = struct.Struct("<I" if self._little_endian else ">I")
 
     def shape(self, names: tuple[str, ...], blocks: Sequence[Block]) -> Shape:
-        """Return what was found up to this place."""
         return Shape(self._little_endian, names, tuple(blocks), self._place)
 
     def count(self) -> int:
@@ -155,7 +154,6 @@ class _Cursor:
         return int(self._unsigned.unpack_from(self._data, begin)[0])
 
     def text(self) -> str:
-        """Read a text."""
         begin, self._place = self._span(self.count(), 1)
         return self._data[begin : self._place].rstrip(b"\0").decode(errors="replace")
 

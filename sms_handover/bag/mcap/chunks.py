@@ -1,4 +1,4 @@
-"""Take the messages out of a chunk, whole or cut off, if what it says of itself holds."""
+"""Records of a chunk, whole or cut off, provided that size and checksum match."""
 
 import zlib
 from collections.abc import Iterator
@@ -22,11 +22,11 @@ class Inner(NamedTuple):
 
 
 class DamagedChunkError(Exception):
-    """The records of a chunk cannot be had; the text says why."""
+    """The records of a chunk are unreadable; the text says why."""
 
 
 def records_of(head: ChunkHead, body: bytes) -> bytes:
-    """Return the records of a whole chunk; raises DamagedChunkError unless they are as they were written."""
+    """Return the records of a whole chunk; raises DamagedChunkError unless they are intact."""
     stored = memoryview(body)[head.begin :]
     try:
         records = _inflated(head.compression, stored, head.uncompressed_size)
@@ -40,7 +40,7 @@ def records_of(head: ChunkHead, body: bytes) -> bytes:
 
 
 def records_of_cut(head: ChunkHead, body: bytes) -> bytes:
-    """Return what can be had of the records of a chunk of which only the beginning is there."""
+    """Return the readable records of a chunk of which only the beginning is there."""
     stored = body[head.begin :]
     try:
         if head.compression == "zstd":
@@ -53,7 +53,7 @@ def records_of_cut(head: ChunkHead, body: bytes) -> bytes:
 
 
 def inner_records(records: bytes) -> Iterator[Inner]:
-    """Yield the records of a chunk that are whole, up to the first that is not."""
+    """Yield the whole records of a chunk, up to the first that is not."""
     place, size = 0, len(records)
     while place + RECORD_HEAD.size <= size:
         opcode, length = RECORD_HEAD.unpack_from(records, place)
@@ -71,7 +71,6 @@ def inner_records(records: bytes) -> Iterator[Inner]:
 
 
 def _inflated(compression: str, stored: memoryview, size: int) -> bytes:
-    """Return the records in the stored bytes of a whole chunk; raises one of ``_ERRORS``."""
     if compression == "zstd":
         return zstandard.ZstdDecompressor().decompress(stored, max_output_size=size)
     if compression == "lz4":

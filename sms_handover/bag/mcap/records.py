@@ -1,4 +1,4 @@
-"""Read MCAP records from bytes that may be damaged: a record is taken only if it fits its own length."""
+"""MCAP records from bytes that may be damaged: only a record that fits its own length is read."""
 
 import struct
 import zlib
@@ -33,7 +33,7 @@ _CHUNK_HEAD = struct.Struct("<QQQII")  # first and last log time [ns], size [byt
 _INDEX_HEAD = struct.Struct("<HI")  # channel, length of its entries [byte]
 _LENGTH = struct.Struct("<Q")
 _CHECKSUM = struct.Struct("<I")
-_LONGEST = 2**40  # [byte] a record whose length claims more is none
+_LONGEST = 2**40  # [byte] no record is longer
 
 _READ: dict[int, Callable[[ReadDataStream], Any]] = {
     Opcode.HEADER: Header.read,
@@ -56,7 +56,7 @@ _ERRORS = (struct.error, EndOfFile, UnicodeDecodeError, ValueError, OverflowErro
 
 @dataclass(frozen=True)
 class ChunkHead:
-    """What a chunk says of itself; its records are ``size`` bytes from ``begin`` on in its body."""
+    """The fields of a chunk; its records are ``size`` bytes from ``begin`` on in its body."""
 
     start_ns: int
     end_ns: int
@@ -68,12 +68,12 @@ class ChunkHead:
 
 
 def plausible_head(opcode: int, length: int) -> bool:
-    """Whether this may begin a record. What MCAP does not define is none: it could not be kept."""
+    """Whether a record may begin like this."""
     return opcode in _KNOWN and length < _LONGEST
 
 
 def fits(opcode: int, body: bytes) -> bool:
-    """Whether a body is one of that kind of record: every length in it agrees with the whole."""
+    """Whether a body is a record of this kind: every length in it agrees with the whole."""
     if opcode == Opcode.CHUNK:
         head = chunk_head(body)
         return head is not None and head.begin + head.size == len(body)
@@ -88,12 +88,12 @@ def fits(opcode: int, body: bytes) -> bool:
 
 
 def parse(opcode: int, body: bytes) -> Any:
-    """Return the record in a body that fits, None for a chunk or a message."""
+    """Return the record in a body that fits, None for a chunk or message."""
     return _parse(opcode, body)[0] if opcode in _READ else None
 
 
 def chunk_head(body: bytes) -> ChunkHead | None:
-    """Return what the beginning of a chunk says, None if that is not whole or no such thing."""
+    """Return the fields at the beginning of a chunk, None if they are malformed."""
     try:
         start_ns, end_ns, size, checksum, length = _CHUNK_HEAD.unpack_from(body)
         text_end = _CHUNK_HEAD.size + length
@@ -105,7 +105,7 @@ def chunk_head(body: bytes) -> ChunkHead | None:
 
 
 def attachment_is_sound(body: bytes) -> bool:
-    """Whether the checksum of an attachment holds, or there is none."""
+    """Whether the checksum of an attachment matches, or there is none."""
     (stored,) = _CHECKSUM.unpack_from(body, len(body) - _CHECKSUM.size)
     return stored in (0, zlib.crc32(body[: -_CHECKSUM.size]))
 

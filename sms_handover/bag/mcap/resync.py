@@ -1,4 +1,4 @@
-"""Find the records of an MCAP file one after another, and go on behind places that are damaged."""
+"""Resync: the records of an MCAP file one after another, resuming behind damage."""
 
 import re
 from collections.abc import Iterator
@@ -11,12 +11,12 @@ from sms_handover.bag.mcap.records import RECORD_HEAD, chunk_head, fits, plausib
 
 MAGIC = b"\x89MCAP0\r\n"  # the first and the last bytes of a complete file
 
-_SEARCH_BLOCK = 2**20  # [byte] looked through at once
-_HEAD_OF_CHUNK = 64  # [byte] enough to judge whether a chunk begins
-_LARGEST_INDEX = 2**26  # [byte] a record other than a chunk or an attachment that claims more is none
+_SEARCH_BLOCK = 2**20  # [byte] searched at once
+_HEAD_OF_CHUNK = 64  # [byte] enough for the fields of a chunk
+_LARGEST_INDEX = 2**26  # [byte] no other record than a chunk or attachment is longer
 _CHECKED = (Opcode.CHUNK, Opcode.ATTACHMENT)
 _IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
-# a record whose length is below 2**40: how the search behind damage recognises where one may begin
+# opcode and length below 2**40: where a record may begin, for the search behind damage
 _CANDIDATE = re.compile(rb"(?=[\x03-\x0f].{5}\0\0\0)", re.DOTALL)
 
 
@@ -31,7 +31,7 @@ class Frame(NamedTuple):
 
 @dataclass(frozen=True)
 class Gap:
-    """Bytes that are no record; of one that the end of the file cuts off, opcode and what there is of it."""
+    """Bytes that are no record; of one cut off by the end of the file, its opcode and beginning."""
 
     begin: int
     end: int
@@ -44,19 +44,18 @@ class FrameWalk:
     """The records at the top level of a file, in order."""
 
     def __init__(self, stream: BinaryIO, size: int) -> None:
-        """Walk through the ``size`` bytes of a stream."""
         self._stream = stream
         self._size = size
-        self._newest: Frame | None = None
+        self._latest: Frame | None = None
         self._chunked: bool | None = None  # whether messages lie in chunks; None until that is known
 
     def __iter__(self) -> Iterator[Frame | Gap]:
-        """Yield every record and every gap; the magic at both ends is neither."""
+        """Yield every record and gap, without the magic at both ends."""
         place = 0
         if self._bytes(0, len(MAGIC)) == MAGIC:
             place = len(MAGIC)
         elif self._frame(len(MAGIC)) is not None:
-            yield Gap(0, len(MAGIC), "it does not begin as an MCAP file does")
+            yield Gap(0, len(MAGIC), "the magic of an MCAP file is missing")
             place = len(MAGIC)
         while place < self._size and not self._is_end(place):
             found = self._trusted(place) or self._gap(place)
@@ -66,13 +65,12 @@ class FrameWalk:
             place = found.end
 
     def _frame(self, place: int) -> Frame | None:
-        """Return the record at a place, None if there is none that is whole; the newest is kept at hand."""
-        if self._newest is None or self._newest.begin != place:
-            self._newest = self._read_frame(place)
-        return self._newest
+        """Return the whole record at a place, None without one; the latest is cached."""
+        if self._latest is None or self._latest.begin != place:
+            self._latest = self._read_frame(place)
+        return self._latest
 
     def _read_frame(self, place: int) -> Frame | None:
-        """Read the record at a place."""
         head = self._head(place)
         if head is None:
             return None
@@ -86,10 +84,10 @@ class FrameWalk:
         return frame if fits(opcode, frame.body) else None
 
     def _trusted(self, place: int) -> Frame | None:
-        """Return the record at a place if nothing speaks against it.
+        """Return the record at a place unless it is implausible.
 
-        A chunk and an attachment have checksums to be judged by. Of any other record a wrong length
-        shows by no record following, while one begins within what it claims for itself.
+        Chunks and attachments have checksums. The length of any other record is wrong if no record
+        follows it, but one begins within it.
         """
         frame = self._frame(place)
         if frame is None or frame.opcode in _CHECKED or self._goes_on(frame.end):
@@ -100,7 +98,7 @@ class FrameWalk:
         return frame if first >= frame.end else None
 
     def _stray(self, frame: Frame) -> bool:
-        """Whether it is a message outside of the chunks of a file that has chunks."""
+        """Whether it is a message outside the chunks of a file with chunks."""
         return frame.opcode == Opcode.MESSAGE and self._chunked is True
 
     def _gap(self, place: int) -> Gap:
@@ -110,11 +108,11 @@ class FrameWalk:
             return cut
         for candidate in self._candidates(place + 1):
             if self._is_end(candidate) or self._resumes(candidate):
-                return Gap(place, candidate, "what is there is no record")
-        return cut or Gap(place, self._size, "no record is found from there to the end")
+                return Gap(place, candidate, "no record")
+        return cut or Gap(place, self._size, "no record up to the end of the file")
 
     def _cut(self, place: int) -> Gap | None:
-        """Return what looks like a record that the end of the file cuts off."""
+        """Return what looks like a record cut off by the end of the file."""
         head = self._head(place)
         if head is None:
             return Gap(place, self._size, "the file ends within the head of a record")
@@ -126,7 +124,7 @@ class FrameWalk:
         return Gap(place, self._size, reason, opcode, self._bytes(begin, self._size - begin))
 
     def _resumes(self, place: int) -> bool:
-        """Whether a record begins at a place for sure, so that the walk can go on there."""
+        """Whether a record certainly begins at a place, so that the walk can resume there."""
         head = self._head(place)
         if head is None:
             return False
@@ -138,14 +136,14 @@ class FrameWalk:
         return head[0] not in _IN_CHUNKS or not self._holds_chunks(frame.end)
 
     def _holds_chunks(self, place: int) -> bool:
-        """Whether messages lie in chunks: then what looks like one elsewhere is in a broken chunk."""
+        """Whether messages are in chunks: then one elsewhere is in a broken chunk."""
         if self._chunked is None:
             chunks = (c for c in self._candidates(place) if (self._head(c) or (0,))[0] == Opcode.CHUNK)
             self._chunked = any(self._frame(chunk) is not None for chunk in chunks)
         return self._chunked
 
     def _candidates(self, place: int) -> Iterator[int]:
-        """Yield the places from ``place`` on where a record, or the end of the file, may begin."""
+        """Yield the places from ``place`` on where a record or the final magic may begin."""
         start = place
         while place < self._size:
             block = self._bytes(place, _SEARCH_BLOCK + RECORD_HEAD.size)
@@ -157,13 +155,13 @@ class FrameWalk:
             yield self._size - len(MAGIC)
 
     def _chunk_begins(self, place: int) -> bool:
-        """Tell by its first bytes whether a chunk is at a place, before all of it is read."""
+        """Whether a chunk is at a place, judged by its first bytes."""
         opcode, length = self._head(place) or (0, 0)
         head = chunk_head(self._bytes(place + RECORD_HEAD.size, min(length, _HEAD_OF_CHUNK)))
         return opcode == Opcode.CHUNK and head is not None and head.begin + head.size == length
 
     def _goes_on(self, place: int) -> bool:
-        """Whether a record, one that the end of the file cuts off, or that end itself is at a place."""
+        """Whether a record, one cut off by the end of the file, or that end is at a place."""
         if place == self._size or self._is_end(place):
             return True
         head = self._head(place)
@@ -174,7 +172,7 @@ class FrameWalk:
         return self._frame(place) is not None
 
     def _is_end(self, place: int) -> bool:
-        """Whether the magic that ends a file is at a place."""
+        """Whether the final magic is at a place."""
         return place == self._size - len(MAGIC) and self._bytes(place, len(MAGIC)) == MAGIC
 
     def _head(self, place: int) -> tuple[int, int] | None:
@@ -186,6 +184,5 @@ class FrameWalk:
         return opcode, length
 
     def _bytes(self, place: int, length: int) -> bytes:
-        """Return bytes of the file, fewer at its end."""
         self._stream.seek(place)
         return self._stream.read(length)

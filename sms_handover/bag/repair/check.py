@@ -1,4 +1,4 @@
-"""Whether a bag is complete, and what is missing in it."""
+"""Check of a bag: whether it is complete, and what is missing."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -23,45 +23,43 @@ _MOST = 20  # places of damage that are listed one by one
 def check(path: Path, progress: Progress | None = None) -> CheckResult:
     """Return what is wrong with the bag at ``path``, its folder or a file.
 
-    Looked at are every checksum, the index and the summary against what is in the file,
-    ``metadata.yaml`` against both, the schema of every topic, the stamps of the messages against
-    the loss ledger, and for a run of ours whether it was finished and everything published came.
-    Raises BagError if it is no MCAP bag at all.
+    Checked are every checksum, index and summary against the file, ``metadata.yaml`` against both,
+    the schema of every topic, stamps against the loss ledger, and of a recorded run whether it ended
+    and every published message is there. Raises BagError if it is no MCAP bag at all.
     """
     files = files_of(path)
     with damage_reported(path):
         sizes = [file.stat().st_size for file in files]
-    findings, content, claims = Findings(), ContentCheck(), MessageCounts()
+    findings, content, stated = Findings(), ContentCheck(), MessageCounts()
     counts: Counter[str] = Counter()
     before = 0
     for file, size in zip(files, sizes, strict=True):
-        report = None if progress is None else partial(_tell, progress, before, sum(sizes))
+        report = None if progress is None else partial(_report, progress, before, sum(sizes))
         with damage_reported(file):
             if size == 0:
                 findings.damaged(f"{file.name} is empty")
                 continue
-            _check_file(FileScan(file), _Into(findings, content, claims, counts), report)
+            _check_file(FileScan(file), _Into(findings, content, stated, counts), report)
         before += size
     if not content.any_record:
         raise BagError(f"{path} is not a bag: no record of an MCAP file is in it")
-    _check_metadata(path, files, _Into(findings, content, claims, counts))
-    content.close(findings, claims)
-    claims.close(counts, findings)
+    _check_metadata(path, files, _Into(findings, content, stated, counts))
+    content.close(findings, stated)
+    stated.close(counts, findings)
     return CheckResult(path, files, dict(counts), content.is_ours, findings.all)
 
 
 @dataclass(frozen=True)
 class _Into:
-    """What all files of a bag are gathered into."""
+    """The results of all files of a bag."""
 
     findings: Findings
     content: ContentCheck
-    claims: MessageCounts
+    stated: MessageCounts
     counts: Counter[str]
 
 
 def _check_file(scan: FileScan, into: _Into, report: Callable[[int], None] | None) -> None:
-    """Look at one file."""
     findings, content = into.findings, into.content
     index = IndexCheck()
     damages: list[Damage] = []
@@ -88,23 +86,23 @@ def _check_file(scan: FileScan, into: _Into, report: Callable[[int], None] | Non
         findings.damaged(
             f"{scan.file.name} was not closed: the recorder was killed, the disk was full or the file was cut"
         )
-    index.close(scan, findings, into.claims)
+    index.close(scan, findings, into.stated)
 
 
 def _check_metadata(path: Path, files: tuple[Path, ...], into: _Into) -> None:
-    """Hold ``metadata.yaml`` against the files."""
+    """Compare ``metadata.yaml`` with the files."""
     findings = into.findings
     if not path.is_dir():
-        findings.note("metadata.yaml was not looked at, as the bag was given as a file")
+        findings.note("metadata.yaml was not checked, as the bag was given as a file")
         return
     try:
         metadata = metadata_of(path)
-        told = counts_of(metadata or {})
+        counts = counts_of(metadata or {})
     except BagError as error:
         findings.damaged(str(error))
         return
     if metadata is None:
-        findings.missing("metadata.yaml is not there: ros2 bag finds the topics by going through the file")
+        findings.missing("metadata.yaml is not there: ros2 bag must scan the file for its topics")
         return
     listed = {str(name) for name in metadata.get("relative_file_paths") or ()}
     there = {file.name for file in files}
@@ -112,11 +110,10 @@ def _check_metadata(path: Path, files: tuple[Path, ...], into: _Into) -> None:
         findings.missing(f"{name} is not there, metadata.yaml lists it")
     for name in sorted(there - listed):
         findings.damaged(f"{name} is there, metadata.yaml does not list it")
-    into.claims.add("metadata.yaml", {**dict.fromkeys(into.counts, 0), **told})
-    if metadata.get("message_count") != sum(told.values()):
+    into.stated.add("metadata.yaml", {**dict.fromkeys(into.counts, 0), **counts})
+    if metadata.get("message_count") != sum(counts.values()):
         findings.damaged("metadata.yaml contradicts itself about the number of messages")
 
 
-def _tell(progress: Progress, before: int, size: int, place: int) -> None:
-    """Report progress over all files."""
+def _report(progress: Progress, before: int, size: int, place: int) -> None:
     progress(before + place, size)

@@ -1,6 +1,7 @@
-"""Sort the messages of a recorded run by topic and take from each what an analysis needs."""
+"""Collector of the messages of a recorded run, by topic, for an analysis."""
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import BagInfo
@@ -31,10 +32,10 @@ _POSE_WITHOUT_COVARIANCE = (0, 2)  # where these are among the blocks of the lay
 
 
 class RunCollector:
-    """What the messages of one run hold, by topic name without the namespace."""
+    """The content of one run by topic name, without the namespace."""
 
     def __init__(self, info: BagInfo, prefix: str) -> None:
-        """Make a collector for each topic of a run; ``prefix`` is the namespace, '' for the root."""
+        """Prepare for each topic of a run; ``prefix`` is the namespace, '' for the root."""
         self._info = info
         self._prefix = prefix
         self._types = MessageTypes(roots=())
@@ -60,28 +61,25 @@ class RunCollector:
         self._newest_ns = 0
 
     def collect(self) -> None:
-        """Go through the messages of the bag once."""
+        """Read the messages of the bag once."""
+        decoders: dict[str, Callable[[Any], None]] = {
+            topics.TASK_PHASE: lambda message: self.phases.append(task_phase(message)),
+            topics.GRASP_EVENT: lambda message: self.events.append(grasp_event(message)),
+            topics.RUN_EVENTS: lambda message: self.run_events.append(run_event(message)),
+            **{name: rows.add for name, rows in self.rows.items()},
+        }
         takers: dict[str, Callable[[bytes], None]] = {
+            **{name: collector.add for name, collector in self.joints.items()},
             topics.JOINT_STATES: self._take_state,
             topics.BASE_ODOMETRY: self.odometry.add,
-            topics.TASK_PHASE: self._decoded(topics.TASK_PHASE, lambda m: self.phases.append(task_phase(m))),
-            topics.GRASP_EVENT: self._decoded(
-                topics.GRASP_EVENT, lambda m: self.events.append(grasp_event(m))
-            ),
-            topics.RUN_EVENTS: self._decoded(
-                topics.RUN_EVENTS, lambda m: self.run_events.append(run_event(m))
-            ),
+            **{name: self._decoded(name, take) for name, take in decoders.items()},
         }
-        takers.update(
-            (name, self.joints[name].add) for name in (topics.JOINT_COMMAND, topics.JOINT_REFERENCE)
-        )
-        takers.update((name, self._decoded(name, rows.add)) for name, rows in self.rows.items())
         by_name = {self.full_name(name): taker for name, taker in takers.items()}
         for message in read_messages(self._info.path, by_name):
             by_name[message.topic](message.data)
 
     def _take_state(self, data: bytes) -> None:
-        """Take a joint state; one that starts anew, after a reset, makes the events so far void."""
+        """Take a joint state; one that begins a new run, after a reset, drops the events so far."""
         time_ns = stamp_ns(data)
         if self._first_ns is None:
             self._first_ns = time_ns
@@ -92,11 +90,11 @@ class RunCollector:
         self.joints[topics.JOINT_STATES].add(data)
 
     def full_name(self, name: str) -> str:
-        """Return the name that a topic of the run has in the bag."""
+        """Return the name of a topic of the run in the bag."""
         return f"{self._prefix}/{name}"
 
     def _decoded(self, name: str, take: Callable[..., None]) -> Callable[[bytes], None]:
-        """Return what decodes a message of a topic, by the schema in the bag, and hands it to ``take``."""
+        """Return a function that decodes a message by the schema in the bag and calls ``take``."""
         topic = self._info.topics.get(self.full_name(name))
         type_name = "" if topic is None else topic.type
         if topic is not None:
@@ -113,7 +111,7 @@ class RunCollector:
         return decode
 
     def _check_types(self) -> None:
-        """Raise BagError if a topic of a run has another type in the bag."""
+        """Raise BagError if a topic has another type in the bag."""
         for topic in topics.graph_topics(self.arms):
             recorded = self._info.topics.get(self.full_name(topic.name))
             if recorded is not None and (recorded.type, recorded.encoding) != (topic.type, "cdr"):

@@ -40,7 +40,7 @@ class BlockCollector:
         group.rows.append(len(self._stamps))
         self._stamps.append(stamp)
         for (begin, end), column in zip(group.layout.blocks, group.columns, strict=True):
-            column += data[begin:end]
+            column.extend(data[begin:end])
 
     def first_names(self) -> tuple[str, ...]:
         """Return the names in the first message, () if there is none."""

@@ -1,4 +1,4 @@
-"""Read when the ticks of a recorded run took place, by the clock on the wall."""
+"""Loop record: the wall times of the ticks of a recorded run."""
 
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -22,10 +22,10 @@ from sms_handover.units import NS_PER_S
 class LoopRecord:
     """The course of a run in wall time.
 
-    Rows per tick (N,): ``tick_ns``, and ``wall`` s, when the recorder got the state of that tick, since it
-    got the first one. Rows per LoopTiming message of the plant (M,): ``report_ns``; ``ticks``,
+    Rows per tick (N,): ``tick_ns``, and ``wall`` s, when the recorder received its state, since the
+    first one. Rows per LoopTiming message of the plant (M,): ``report_ns``; ``ticks``,
     ``late_ticks`` and ``held_commands`` since the start; ``period_mean``, ``period_std`` and
-    ``period_max`` s between the ticks since the report before.
+    ``period_max`` s between the ticks since the previous report.
     """
 
     tick_ns: Stamps
@@ -47,10 +47,10 @@ _REPORTED = ("ticks", "late_ticks", "held_commands", "period_mean", "period_std"
 
 
 def read_loop(path: Path, namespace: str | None = None) -> LoopRecord:
-    """Return when the ticks of the run in the bag at ``path`` took place; of the last run after a reset.
+    """Return the wall times of the run in the bag at ``path``, of the last one after a reset.
 
-    ``namespace`` is the one the graph ran in; without it the bag must hold one run only. Raises
-    BagError if there is no bag, it is damaged, was not closed, or holds no run of ours.
+    ``namespace`` is that of the graph; without it the bag must hold one run only. Raises BagError
+    if the bag is missing or damaged, was not closed, or holds no run.
     """
     info = read_info(path)
     prefix = find_namespace(info) if namespace is None else namespace.rstrip("/")
@@ -79,5 +79,4 @@ def read_loop(path: Path, namespace: str | None = None) -> LoopRecord:
 
 
 def _reported(message: Any) -> tuple[float, ...]:
-    """Return the numbers of a LoopTiming."""
     return tuple(float(getattr(message, name)) for name in _REPORTED)
