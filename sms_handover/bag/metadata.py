@@ -85,6 +85,42 @@ def counts_of(metadata: Mapping[str, Any]) -> dict[str, int]:
     return counts
 
 
+@dataclass(frozen=True)
+class FileList:
+    """The files that ``metadata.yaml`` lists, in its order, and the names of those that are not there."""
+
+    files: tuple[Path, ...] = ()
+    missing: tuple[str, ...] = ()
+
+
+def files_in_metadata(bag: Path) -> FileList:
+    """Return the files that the ``metadata.yaml`` in a folder lists, none if it is missing or unreadable.
+
+    Raises BagError on a compression that is not zstd.
+    """
+    try:
+        metadata = metadata_of(bag) or {}
+        names = [str(name) for name in metadata.get("relative_file_paths") or ()]
+    except (BagError, TypeError):
+        return FileList()
+    mode, form = (str(metadata.get(f"compression_{key}") or "") for key in ("mode", "format"))
+    if mode.upper() in {"FILE", "MESSAGE"} and form != "zstd":
+        raise BagError(
+            f"{bag} is compressed as {form!r}, only zstd is read; 'ros2 bag convert' makes another bag of it"
+        )
+    found = {name: _listed(bag, name) for name in dict.fromkeys(names)}
+    missing = [Path(name).name for name, file in found.items() if file is None]
+    return FileList(tuple(file for file in found.values() if file), tuple(missing))
+
+
+def _listed(bag: Path, name: str) -> Path | None:
+    """Return a listed file: by its path in the bag, or as of old rosbag2 versions beside the metadata."""
+    for file in (bag / name, bag / Path(name).name):
+        if file.exists() and file.resolve().is_relative_to(bag.resolve()):
+            return file
+    return None
+
+
 def counts_in_metadata(bag: Path) -> dict[str, int]:
     """Return the number of messages by topic as far as ``metadata.yaml`` states it."""
     try:

@@ -22,8 +22,10 @@ def overview(info: BagInfo) -> dict[str, object]:
         "message_count": info.message_count,
         "topics": [
             {"name": topic.name, "type": topic.type, "message_count": topic.message_count}
-            for topic in info.topics.values()
+            for topic in info.channels
         ],
+        "missing": list(info.missing),
+        "notes": list(info.notes),
         "run": _run(info),
         "provenance": dict(info.provenance),
         "attachments": {name: len(content) for name, content in info.attachments.items()},

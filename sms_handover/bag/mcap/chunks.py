@@ -8,9 +8,8 @@ import lz4.frame
 import zstandard
 from mcap.opcode import Opcode
 
-from sms_handover.bag.mcap.records import MESSAGE_HEAD, RECORD_HEAD, ChunkHead, fits, plausible_head
-
-_ERRORS = (zstandard.ZstdError, RuntimeError, EOFError, ValueError, MemoryError, OverflowError)
+from sms_handover.bag.mcap.compression import COMPRESSION_ERRORS, inflate
+from sms_handover.bag.mcap.records import MESSAGE_HEAD, RECORD_HEAD, ChunkHead, plausible_head, used_length
 
 
 class Inner(NamedTuple):
@@ -27,10 +26,10 @@ class DamagedChunkError(Exception):
 
 def records_of(head: ChunkHead, body: bytes) -> bytes:
     """Return the records of a whole chunk; raises DamagedChunkError unless they are intact."""
-    stored = memoryview(body)[head.begin :]
+    stored = memoryview(body)[head.begin : head.begin + head.size]
     try:
-        records = _inflated(head.compression, stored, head.uncompressed_size)
-    except _ERRORS as error:
+        records = inflate(head.compression, stored, head.uncompressed_size)
+    except COMPRESSION_ERRORS as error:
         raise DamagedChunkError(f"the chunk does not decompress: {' '.join(str(error).split())}") from error
     if len(records) != head.uncompressed_size:
         raise DamagedChunkError(f"the chunk holds {len(records)} bytes instead of {head.uncompressed_size}")
@@ -47,7 +46,7 @@ def records_of_cut(head: ChunkHead, body: bytes) -> bytes:
             return zstandard.ZstdDecompressor().decompressobj().decompress(stored)
         if head.compression == "lz4":
             return bytes(lz4.frame.LZ4FrameDecompressor().decompress(stored))
-    except _ERRORS:
+    except COMPRESSION_ERRORS:
         return b""
     return stored if head.compression == "" else b""
 
@@ -64,17 +63,7 @@ def inner_records(records: bytes) -> Iterator[Inner]:
         if opcode == Opcode.MESSAGE:
             if length < MESSAGE_HEAD.size:
                 return
-        elif not fits(opcode, records[begin:end]):
+        elif used_length(opcode, records[begin:end]) is None:
             return
         yield Inner(opcode, begin, end)
         place = end
-
-
-def _inflated(compression: str, stored: memoryview, size: int) -> bytes:
-    if compression == "zstd":
-        return zstandard.ZstdDecompressor().decompress(stored, max_output_size=size)
-    if compression == "lz4":
-        return bytes(lz4.frame.decompress(stored))
-    if compression:
-        raise ValueError(f"unknown compression {compression!r}")
-    return bytes(stored)

@@ -1,4 +1,8 @@
-"""MCAP records from bytes that may be damaged: only a record that fits its own length is read."""
+"""MCAP records from bytes that may be damaged: only a record that fits its own length is read.
+
+Records may grow at their end, and opcodes from 0x80 are for private records
+(https://mcap.dev/spec): unknown bytes behind the known fields are skipped.
+"""
 
 import struct
 import zlib
@@ -51,7 +55,9 @@ _READ: dict[int, Callable[[ReadDataStream], Any]] = {
     Opcode.DATA_END: DataEnd.read,
 }
 _KNOWN = frozenset(Opcode)
-_ERRORS = (struct.error, EndOfFile, UnicodeDecodeError, ValueError, OverflowError, MemoryError)
+_PRIVATE = 0x80  # first opcode of private records
+_CHECKED = (Opcode.CHUNK, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.ATTACHMENT, Opcode.METADATA)
+_ERRORS = (struct.error, EndOfFile, UnicodeDecodeError, ValueError, OverflowError, MemoryError, KeyError)
 
 
 @dataclass(frozen=True)
@@ -69,22 +75,36 @@ class ChunkHead:
 
 def plausible_head(opcode: int, length: int) -> bool:
     """Whether a record may begin like this."""
-    return opcode in _KNOWN and length < _LONGEST
+    return (opcode in _KNOWN or opcode >= _PRIVATE) and length < _LONGEST
 
 
-def fits(opcode: int, body: bytes) -> bool:
-    """Whether a body is a record of this kind: every length in it agrees with the whole."""
-    if opcode == Opcode.CHUNK:
-        head = chunk_head(body)
-        return head is not None and head.begin + head.size == len(body)
-    if opcode == Opcode.MESSAGE:
-        return len(body) >= MESSAGE_HEAD.size
-    if opcode == Opcode.MESSAGE_INDEX:
-        return _INDEX_HEAD.size + _stated(body) == len(body)
+def used_length(opcode: int, body: bytes) -> int | None:
+    """Return how many bytes of a body its known fields take, None if it is no record of this kind.
+
+    A private record that is one of MCAP but for the highest bit of its opcode is taken for damage.
+    """
     try:
-        return opcode in _READ and _parse(opcode, body)[1].count == len(body)
+        if opcode == Opcode.MESSAGE:
+            used = max(len(body), MESSAGE_HEAD.size)
+        elif opcode == Opcode.CHUNK:
+            head = chunk_head(body)
+            used = _LONGEST if head is None else head.begin + head.size
+        elif opcode == Opcode.MESSAGE_INDEX:
+            used = _INDEX_HEAD.size + int(_INDEX_HEAD.unpack_from(body)[1])
+        elif opcode >= _PRIVATE:
+            known = opcode - _PRIVATE
+            used = _LONGEST if known in _CHECKED and used_length(known, body) == len(body) else len(body)
+        else:
+            used = _parse(opcode, body)[1].count
     except _ERRORS:
-        return False
+        return None
+    return used if used <= len(body) else None
+
+
+def is_misread(body: bytes) -> bool:
+    """Whether the body of a message is one of another record, of which a bit of the opcode was flipped."""
+    kinds = (*_CHECKED, Opcode.MESSAGE_INDEX)
+    return any(used_length(opcode, body) == len(body) for opcode in kinds)
 
 
 def parse(opcode: int, body: bytes) -> Any:
@@ -106,13 +126,9 @@ def chunk_head(body: bytes) -> ChunkHead | None:
 
 def attachment_is_sound(body: bytes) -> bool:
     """Whether the checksum of an attachment matches, or there is none."""
-    (stored,) = _CHECKSUM.unpack_from(body, len(body) - _CHECKSUM.size)
-    return stored in (0, zlib.crc32(body[: -_CHECKSUM.size]))
-
-
-def _stated(body: bytes) -> int:
-    """Return the length in byte that a message index claims for its entries, -1 if it claims none."""
-    return int(_INDEX_HEAD.unpack_from(body)[1]) if len(body) >= _INDEX_HEAD.size else -1
+    end = _parse(Opcode.ATTACHMENT, body)[1].count - _CHECKSUM.size
+    (stored,) = _CHECKSUM.unpack_from(body, end)
+    return stored in (0, zlib.crc32(body[:end]))
 
 
 class _StrictStream(ReadDataStream):

@@ -7,7 +7,7 @@ from typing import BinaryIO, NamedTuple
 
 from mcap.opcode import Opcode
 
-from sms_handover.bag.mcap.records import RECORD_HEAD, chunk_head, fits, plausible_head
+from sms_handover.bag.mcap.records import RECORD_HEAD, chunk_head, is_misread, plausible_head, used_length
 
 MAGIC = b"\x89MCAP0\r\n"  # the first and the last bytes of a complete file
 
@@ -21,12 +21,16 @@ _CANDIDATE = re.compile(rb"(?=[\x03-\x0f].{5}\0\0\0)", re.DOTALL)
 
 
 class Frame(NamedTuple):
-    """A record in a file, from byte ``begin`` to ``end``; ``body`` is without opcode and length."""
+    """A record in a file, from byte ``begin`` to ``end``.
+
+    ``body`` is without opcode and length; its known fields take ``used`` bytes.
+    """
 
     begin: int
     end: int
     opcode: int
     body: bytes
+    used: int
 
 
 @dataclass(frozen=True)
@@ -47,7 +51,8 @@ class FrameWalk:
         self._stream = stream
         self._size = size
         self._latest: Frame | None = None
-        self._chunked: bool | None = None  # whether messages lie in chunks; None until that is known
+        self._in_index = False  # behind a chunk or one of its message indexes
+        self._chunked: bool | None = None  # whether messages are in chunks; None if not known yet
 
     def __iter__(self) -> Iterator[Frame | Gap]:
         """Yield every record and gap, without the magic at both ends."""
@@ -59,8 +64,9 @@ class FrameWalk:
             place = len(MAGIC)
         while place < self._size and not self._is_end(place):
             found = self._trusted(place) or self._gap(place)
-            if self._chunked is None and found.opcode in (Opcode.CHUNK, Opcode.MESSAGE):
-                self._chunked = found.opcode == Opcode.CHUNK
+            if found.opcode == Opcode.CHUNK:
+                self._chunked = True
+            self._in_index = found.opcode in (Opcode.CHUNK, Opcode.MESSAGE_INDEX)
             yield found
             place = found.end
 
@@ -80,8 +86,9 @@ class FrameWalk:
             return None
         if opcode == Opcode.CHUNK and not self._chunk_begins(place):
             return None
-        frame = Frame(place, end, opcode, self._bytes(place + RECORD_HEAD.size, length))
-        return frame if fits(opcode, frame.body) else None
+        body = self._bytes(place + RECORD_HEAD.size, length)
+        used = used_length(opcode, body)
+        return None if used is None else Frame(place, end, opcode, body, used)
 
     def _trusted(self, place: int) -> Frame | None:
         """Return the record at a place unless it is implausible.
@@ -90,16 +97,15 @@ class FrameWalk:
         follows it, but one begins within it.
         """
         frame = self._frame(place)
-        if frame is None or frame.opcode in _CHECKED or self._goes_on(frame.end):
-            return None if frame is not None and self._stray(frame) else frame
+        if frame is None or (self._in_index and frame.opcode == Opcode.MESSAGE and is_misread(frame.body)):
+            return None
+        exact = frame.opcode in _CHECKED and frame.used == len(frame.body)
+        if exact or self._goes_on(frame.end):
+            return frame
         if frame.opcode == Opcode.MESSAGE:
             return None
         first = next((found for found in self._candidates(place + 1) if self._resumes(found)), frame.end)
         return frame if first >= frame.end else None
-
-    def _stray(self, frame: Frame) -> bool:
-        """Whether it is a message outside the chunks of a file with chunks."""
-        return frame.opcode == Opcode.MESSAGE and self._chunked is True
 
     def _gap(self, place: int) -> Gap:
         """Return the bytes up to the next record."""
@@ -158,7 +164,7 @@ class FrameWalk:
         """Whether a chunk is at a place, judged by its first bytes."""
         opcode, length = self._head(place) or (0, 0)
         head = chunk_head(self._bytes(place + RECORD_HEAD.size, min(length, _HEAD_OF_CHUNK)))
-        return opcode == Opcode.CHUNK and head is not None and head.begin + head.size == length
+        return opcode == Opcode.CHUNK and head is not None and head.begin + head.size <= length
 
     def _goes_on(self, place: int) -> bool:
         """Whether a record, one cut off by the end of the file, or that end is at a place."""

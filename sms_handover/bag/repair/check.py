@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from sms_handover.bag.files import damage_reported, files_of
+from sms_handover.bag.files import BagFiles, damage_reported, files_of
 from sms_handover.bag.mcap.damage import Damage
 from sms_handover.bag.mcap.scan import FileScan, ScannedMessage, Source
 from sms_handover.bag.metadata import counts_of, metadata_of
@@ -27,30 +27,29 @@ def check(path: Path, progress: Progress | None = None) -> CheckResult:
     the schema of every topic, stamps against the loss ledger, and of a recorded run whether it ended
     and every published message is there. Raises BagError if it is no MCAP bag at all.
     """
-    files = files_of(path)
-    with damage_reported(path):
-        sizes = [file.stat().st_size for file in files]
-    findings, content, stated = Findings(), ContentCheck(), MessageCounts()
-    counts: Counter[str] = Counter()
+    bag = files_of(path)
+    result = _Result(Findings(), ContentCheck(), MessageCounts(), Counter())
+    findings, content = result.findings, result.content
     before = 0
-    for file, size in zip(files, sizes, strict=True):
-        report = None if progress is None else partial(_report, progress, before, sum(sizes))
-        with damage_reported(file):
-            if size == 0:
+    with damage_reported(path), bag.opened() as files:
+        sizes = [file.stat().st_size for file in files]
+        for file, size in zip(files, sizes, strict=True):
+            report = None if progress is None else partial(_report, progress, before, sum(sizes))
+            if size:
+                _check_file(FileScan(file), result, report)
+            else:
                 findings.damaged(f"{file.name} is empty")
-                continue
-            _check_file(FileScan(file), _Into(findings, content, stated, counts), report)
-        before += size
+            before += size
     if not content.any_record:
         raise BagError(f"{path} is not a bag: no record of an MCAP file is in it")
-    _check_metadata(path, files, _Into(findings, content, stated, counts))
-    content.close(findings, stated)
-    stated.close(counts, findings)
-    return CheckResult(path, files, dict(counts), content.is_ours, findings.all)
+    _check_metadata(bag, result)
+    content.close(findings, result.stated)
+    result.stated.close(result.counts, findings)
+    return CheckResult(path, bag.files, dict(result.counts), content.is_ours, findings.all)
 
 
 @dataclass(frozen=True)
-class _Into:
+class _Result:
     """The results of all files of a bag."""
 
     findings: Findings
@@ -59,17 +58,17 @@ class _Into:
     counts: Counter[str]
 
 
-def _check_file(scan: FileScan, into: _Into, report: Callable[[int], None] | None) -> None:
-    findings, content = into.findings, into.content
+def _check_file(scan: FileScan, result: _Result, report: Callable[[int], None] | None) -> None:
+    findings, content = result.findings, result.content
     index = IndexCheck()
     damages: list[Damage] = []
     for found in scan:
         if isinstance(found, ScannedMessage):
-            into.counts[found.source.topic] += 1
+            result.counts[found.source.topic] += 1
             index.message(found)
             content.message(found)
         elif isinstance(found, Source):
-            into.counts[found.topic] += 0
+            result.counts[found.topic] += 0
             content.source(found)
         elif isinstance(found, Damage):
             damages.append(found)
@@ -86,17 +85,17 @@ def _check_file(scan: FileScan, into: _Into, report: Callable[[int], None] | Non
         findings.damaged(
             f"{scan.file.name} was not closed: the recorder was killed, the disk was full or the file was cut"
         )
-    index.close(scan, findings, into.stated)
+    index.close(scan, findings, result.stated)
 
 
-def _check_metadata(path: Path, files: tuple[Path, ...], into: _Into) -> None:
+def _check_metadata(bag: BagFiles, result: _Result) -> None:
     """Compare ``metadata.yaml`` with the files."""
-    findings = into.findings
-    if not path.is_dir():
+    findings = result.findings
+    if not bag.path.is_dir():
         findings.note("metadata.yaml was not checked, as the bag was given as a file")
         return
     try:
-        metadata = metadata_of(path)
+        metadata = metadata_of(bag.path)
         counts = counts_of(metadata or {})
     except BagError as error:
         findings.damaged(str(error))
@@ -104,13 +103,15 @@ def _check_metadata(path: Path, files: tuple[Path, ...], into: _Into) -> None:
     if metadata is None:
         findings.missing("metadata.yaml is not there: ros2 bag must scan the file for its topics")
         return
-    listed = {str(name) for name in metadata.get("relative_file_paths") or ()}
-    there = {file.name for file in files}
+    listed = {Path(str(name)).name for name in metadata.get("relative_file_paths") or ()}
+    there = {file.name for file in bag.files}
     for name in sorted(listed - there):
         findings.missing(f"{name} is not there, metadata.yaml lists it")
     for name in sorted(there - listed):
         findings.damaged(f"{name} is there, metadata.yaml does not list it")
-    into.stated.add("metadata.yaml", {**dict.fromkeys(into.counts, 0), **counts})
+    for name in sorted(set(bag.unlisted) - there):
+        findings.note(f"{name} is not read, metadata.yaml does not list it")
+    result.stated.add("metadata.yaml", {**dict.fromkeys(result.counts, 0), **counts})
     if metadata.get("message_count") != sum(counts.values()):
         findings.damaged("metadata.yaml contradicts itself about the number of messages")
 

@@ -30,7 +30,7 @@ class ContentCheck:
         self.any_record = False
         self.is_ours = False
         self._types: dict[Source, SchemaTypes | str] = {}  # or why there are none
-        self._undecoded: set[Source] = set()
+        self._undecoded: dict[Source, str] = {}
         self._seen: set[Source] = set()
         self._rebuild = LedgerRebuild()
         self._ledger: Ledger | None = None
@@ -90,11 +90,11 @@ class ContentCheck:
         """Report what is wrong."""
         for source, types in self._types.items():
             if isinstance(types, str):
-                report = findings.damaged if source.encoding == "cdr" else findings.note
-                report(f"{source.topic} cannot be decoded: {types}")
-        for source in self._undecoded:
+                findings.note(f"{source.topic} cannot be decoded: {types}; its messages are kept as bytes")
+        report = findings.missing if self.is_ours else findings.note
+        for source, reason in self._undecoded.items():
             if not self._is_refused(source.topic):  # others may send anything
-                findings.damaged(f"{source.topic} cannot be decoded: its messages do not fit its schema")
+                report(f"{source.topic} cannot be decoded: {reason}")
         if self._recovery is not None:
             self._report_recovery(self._recovery, findings)
         if not self.is_ours:
@@ -177,8 +177,8 @@ class ContentCheck:
             return None
         try:
             return types.decode(message.data)
-        except BagError:
-            self._undecoded.add(message.source)
+        except BagError as error:
+            self._undecoded.setdefault(message.source, str(error))
             return None
 
 

@@ -32,28 +32,28 @@ def recover(source: Path, folder: Path, progress: Progress | None = None) -> Rec
     with attachments and metadata records. One chunk is held at a time. Raises BagError if nothing
     can be read, or if ``folder`` exists or cannot be written; then ``folder`` is deleted.
     """
-    files = files_of(source)
-    with damage_reported(source):
-        sizes = [file.stat().st_size for file in files]
+    bag = files_of(source)
+    with damage_reported(source), bag.opened() as files:
         _require_something(source, files)
-    writer = BagWriter(folder, chunk_size=_CHUNK_SIZE, flush_period_ns=_NEVER_NS)
-    try:
-        salvage = _Salvage(writer)
-        salvage.expect(counts_in_metadata(source))
-        before = 0
-        for file, size in zip(files, sizes, strict=True):
-            report = partial(_report, progress, before, sum(sizes))
-            with damage_reported(file):
-                salvage.take(FileScan(file), report)
-            before += size
-        result = salvage.result(source, sum(sizes))
-        if result.ledger is not None:
-            writer.record(LEDGER_RECORD, result.ledger.to_record())
-        writer.record(RECOVERY_RECORD, result.to_record())
-        writer.close()
-    except BaseException:
-        writer.abandon()
-        raise
+        sizes = [file.stat().st_size for file in files]
+        writer = BagWriter(folder, chunk_size=_CHUNK_SIZE, flush_period_ns=_NEVER_NS)
+        try:
+            salvage = _Salvage(writer)
+            salvage.expect(counts_in_metadata(source))
+            before = 0
+            for file, size in zip(files, sizes, strict=True):
+                report = partial(_report, progress, before, sum(sizes))
+                with damage_reported(file):
+                    salvage.take(FileScan(file), report)
+                before += size
+            result = salvage.result(source, sum(sizes), bag.missing)
+            if result.ledger is not None:
+                writer.record(LEDGER_RECORD, result.ledger.to_record())
+            writer.record(RECOVERY_RECORD, result.to_record())
+            writer.close()
+        except BaseException:
+            writer.abandon()
+            raise
     return result
 
 
@@ -71,7 +71,7 @@ class _Salvage:
         self._span: tuple[int, int] | None = None  # [ns] of the recording, if known
         self._damages: list[Damage] = []
         self._closed = True
-        self._from_cut_chunk = 0
+        self._from_cut_chunk = self._private = 0
         self._hole = Hole()
 
     def take(self, scan: FileScan, progress: Callable[[int], None]) -> None:
@@ -95,13 +95,14 @@ class _Salvage:
         progress(scan.place)
         self._closed = self._closed and scan.closed
         self._from_cut_chunk += scan.from_cut_chunk
+        self._private += scan.private
 
     def expect(self, counts: Mapping[str, int]) -> None:
         """Take numbers of recorded messages by topic; the largest of several counts."""
         for name, count in counts.items():
             self._recorded[name] = max(self._recorded.get(name, 0), count)
 
-    def result(self, source: Path, size: int) -> Recovery:
+    def result(self, source: Path, size: int, missing: Sequence[str]) -> Recovery:
         """Return the result for a bag of ``size`` bytes."""
         recovered: dict[str, int] = {}
         for key, count in self._writer.message_counts.items():
@@ -120,6 +121,8 @@ class _Salvage:
                 TopicRecovery(name, recovered.get(name, 0), self._recorded.get(name)) for name in names
             ),
             from_cut_chunk=self._from_cut_chunk,
+            missing=tuple(missing),
+            private=self._private,
             start_ns=self._hole.first_ns,
             end_ns=self._hole.latest_ns,
             largest_loss_ns=largest_ns,

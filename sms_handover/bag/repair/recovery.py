@@ -30,7 +30,9 @@ class Recovery:
     """The result of a recovery from ``source`` into the new bag ``folder``.
 
     ``size`` is what was read [byte], ``closed`` is whether every file had its end,
-    ``from_cut_chunk`` counts messages out of chunks cut off by the end of a file. Times are log
+    ``from_cut_chunk`` counts messages out of chunks cut off by the end of a file, ``missing`` names
+    files that ``metadata.yaml`` lists, ``private`` counts records that only their writer understands,
+    which are not kept. Times are log
     times, None without messages. ``largest_loss_ns`` is the longest interval of log time without
     messages around damage; unless ``ends_known``, damage reaches an end of the bag, and how much was
     beyond is unknown. ``ledger`` is that of the new bag, None if the old one had none.
@@ -43,6 +45,8 @@ class Recovery:
     damages: tuple[Damage, ...]
     topics: tuple[TopicRecovery, ...]
     from_cut_chunk: int
+    missing: tuple[str, ...]
+    private: int
     start_ns: int | None
     end_ns: int | None
     largest_loss_ns: int
@@ -67,7 +71,7 @@ class Recovery:
     @property
     def clean(self) -> bool:
         """Whether everything in the files was recovered."""
-        return not self.losses and not any(topic.lost for topic in self.topics)
+        return not self.losses and not self.missing and not any(topic.lost for topic in self.topics)
 
     def to_record(self) -> dict[str, str]:
         """Return the metadata record in the new bag that describes its origin."""
@@ -76,6 +80,8 @@ class Recovery:
             "bytes_read": self.size,
             "bytes_lost": self.lost_bytes,
             "closed": self.closed,
+            "files_missing": self.missing,
+            "private_records": self.private,
             "damage": [str(damage) for damage in self.damages],
             "messages_lost": {topic.name: topic.lost for topic in self.topics if topic.lost},
             "largest_loss_ns": self.largest_loss_ns,
