@@ -159,7 +159,6 @@ def _files_of(path: Path) -> BagFiles:
     """Return the files of a bag by ``metadata.yaml``, or by their names."""
     if path.is_file():
         _reject_others(path, (path,))
-        files_in_metadata(path.parent)
         return BagFiles(path, (path,))
     there = [file for file in path.iterdir() if _is_mcap(file)]
     listed = files_in_metadata(path)

@@ -14,7 +14,7 @@ import yaml
 import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, ChunkIndex, Footer, McapRecord, Message, Schema, Statistics
-from mcap.writer import CompressionType
+from mcap.writer import CompressionType, Writer
 
 from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import read_info
@@ -202,7 +202,7 @@ def with_summary(content: bytes, change: Callable[[Records], Records], insert: b
     data_end = begin - 13
     Footer(summary_start=begin + len(insert), summary_offset_start=0, summary_crc=0).write(builder)
     data = content[:data_end] + insert + content[data_end : begin - 4] + bytes(4)
-    return data + summary + builder.end() + content[-8:]
+    return bytes(data + summary + builder.end() + content[-8:])
 
 
 def outside() -> bytes:
@@ -210,7 +210,7 @@ def outside() -> bytes:
     builder = RecordBuilder()
     data = TYPES.serialize(text("outside"))
     Message(channel_id=1, log_time=7, data=data, publish_time=7, sequence=0).write(builder)
-    return builder.end()
+    return bytes(builder.end())
 
 
 @pytest.mark.parametrize(
@@ -221,7 +221,7 @@ def outside() -> bytes:
         (without(Schema), b"", "schemas"),
         (without(Statistics), b"", "no statistics"),
         (without(ChunkIndex), b"", "chunks"),
-        (one_chunk_less, b"", "is not in its index"),
+        (one_chunk_less, b"", "a chunk at byte"),
         (changed(Statistics, message_start_time=30), b"", "log time"),
         (changed(Statistics, channel_message_counts={1: 60, 2: 59}), b"", "count other messages"),
         (changed(Statistics, channel_message_counts={2: 120}), b"", "count other messages"),
@@ -262,6 +262,25 @@ def test_chunks_of_several_frames_are_read(tmp_path: Path, compression: Compress
         write_file(file, compression)
     assert len(times(file)) == 120 and check(file).complete
     assert recover(file, tmp_path / "new").clean
+
+
+def test_log_times_up_to_the_largest_keep_their_order(tmp_path: Path) -> None:
+    file = tmp_path / "a.mcap"
+    large = [2**64 - 1, 0, 2**63, 2**53 + 1]
+    with file.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("ros2")
+        channel = writer.register_channel(
+            "/t", "cdr", writer.register_schema(STRING, "ros2msg", b"string data")
+        )
+        for time_ns in large:
+            writer.add_message(channel, time_ns, TYPES.serialize(text("t")), time_ns)
+        writer.finish()
+    assert recover(file, tmp_path / "new").message_count == 4
+    for path in (file, tmp_path / "new"):
+        assert (read_info(path).start_ns, read_info(path).end_ns) == (0, 2**64 - 1)
+        assert times(path) == sorted(large) and not check(path).damaged
+        assert times(path, TimeSpan(2**53 + 1, 2**63)) == [2**53 + 1, 2**63]
 
 
 def test_private_records_are_skipped_and_counted(tmp_path: Path) -> None:

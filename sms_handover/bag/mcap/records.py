@@ -55,7 +55,7 @@ _READ: dict[int, Callable[[ReadDataStream], Any]] = {
     Opcode.DATA_END: DataEnd.read,
 }
 _KNOWN = frozenset(Opcode)
-_PRIVATE = 0x80  # first opcode of private records
+PRIVATE = 0x80  # first opcode of private records
 _CHECKED = (Opcode.CHUNK, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.ATTACHMENT, Opcode.METADATA)
 _ERRORS = (struct.error, EndOfFile, UnicodeDecodeError, ValueError, OverflowError, MemoryError, KeyError)
 
@@ -75,7 +75,7 @@ class ChunkHead:
 
 def plausible_head(opcode: int, length: int) -> bool:
     """Whether a record may begin like this."""
-    return (opcode in _KNOWN or opcode >= _PRIVATE) and length < _LONGEST
+    return (opcode in _KNOWN or opcode >= PRIVATE) and length < _LONGEST
 
 
 def used_length(opcode: int, body: bytes) -> int | None:
@@ -91,8 +91,8 @@ def used_length(opcode: int, body: bytes) -> int | None:
             used = _LONGEST if head is None else head.begin + head.size
         elif opcode == Opcode.MESSAGE_INDEX:
             used = _INDEX_HEAD.size + int(_INDEX_HEAD.unpack_from(body)[1])
-        elif opcode >= _PRIVATE:
-            known = opcode - _PRIVATE
+        elif opcode >= PRIVATE:
+            known = opcode - PRIVATE
             used = _LONGEST if known in _CHECKED and used_length(known, body) == len(body) else len(body)
         else:
             used = _parse(opcode, body)[1].count

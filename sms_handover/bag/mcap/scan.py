@@ -64,7 +64,7 @@ class Located(NamedTuple):
 Found = Source | ScannedMessage | Located | Damage
 
 _DEFINED = frozenset(Opcode)
-_NO_SCHEMA = Schema(id=0, data=b"", encoding="", name="")
+NO_SCHEMA = Schema(id=0, data=b"", encoding="", name="")
 
 
 class FileScan:
@@ -82,7 +82,7 @@ class FileScan:
         self.closed = False
         self.from_cut_chunk = 0
         self.private = 0
-        self._schemas: dict[int, Schema] = {0: _NO_SCHEMA}
+        self._schemas: dict[int, Schema] = {0: NO_SCHEMA}
         self._sources = dict(sources or {})
         self._in_summary = False
         self._data_end = 0  # [byte]

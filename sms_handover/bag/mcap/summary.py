@@ -5,26 +5,29 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
-import numpy.typing as npt
 from mcap.opcode import Opcode
-from mcap.records import Attachment, AttachmentIndex, ChunkIndex, Header, Metadata, Schema
+from mcap.records import Attachment, AttachmentIndex, ChunkIndex, Header, Metadata
 
 from sms_handover.bag.mcap.damage import Damage
-from sms_handover.bag.mcap.records import RECORD_HEAD, attachment_is_sound, chunk_head, parse, used_length
+from sms_handover.bag.mcap.records import (
+    PRIVATE,
+    RECORD_HEAD,
+    attachment_is_sound,
+    chunk_head,
+    parse,
+    used_length,
+)
 from sms_handover.bag.mcap.resync import MAGIC
-from sms_handover.bag.mcap.scan import FileScan, Located, ScannedMessage, Source
+from sms_handover.bag.mcap.scan import NO_SCHEMA, FileScan, Located, ScannedMessage, Source
 from sms_handover.bag.mcap.summary_section import SummarySection, read_summary_section
 
-NO_SCHEMA = Schema(id=0, data=b"", encoding="", name="")
-
 _CHUNK_HEAD = 64  # [byte] enough for the fields of a chunk
+_INDEX_HEAD = struct.Struct("<HI")  # channel, length of the entries [byte]
 _ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
-_INDEX_ENTRIES_AT = 6  # [byte]
 _FREE = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.DATA_END)  # not in any index
-_PRIVATE = 0x80  # first opcode of private records
 
 
 @dataclass
@@ -58,7 +61,7 @@ def summarize(file: Path) -> FileSummary:
         section = read_summary_section(stream, size)
         try:
             return _Agreement(stream, section).summary()
-        except (_DoubtError, struct.error) as error:
+        except (_DoubtError, struct.error, ValueError) as error:
             return _scan(file, str(error) or "it is cut short")
 
 
@@ -67,38 +70,28 @@ class _Agreement:
 
     def __init__(self, stream: BinaryIO, section: SummarySection) -> None:
         self._stream, self._section = stream, section
-        self._header: Header | None = None
-        self._counts: Counter[int] = Counter()
-        self._start_ns: int | None = None
-        self._end_ns: int | None = None
-        self._attachments: list[Attachment] = []
-        self._records: list[Metadata] = []
+        self._counts: Counter[int] = Counter()  # messages by channel
+        self._spans: list[tuple[int, int]] = []  # first and last log time by chunk
+        self._files: list[Any] = []
 
     def summary(self) -> FileSummary:
         """Return the summary; raises _DoubtError if something does not agree."""
         self._check_numbers()
-        self._check_places()
-        self._check_statistics()
-        if self._header is None:
-            raise _DoubtError("the file has no header")
-        section = self._section
+        header = self._walk()
+        start_ns, end_ns = self._check_statistics()
+        schemas = {0: NO_SCHEMA, **self._section.schemas}
         sources = {
-            number: Source(
-                channel.topic,
-                channel.message_encoding,
-                section.schemas.get(channel.schema_id, NO_SCHEMA),
-                channel.metadata,
-            )
-            for number, channel in section.channels.items()
+            number: Source(item.topic, item.message_encoding, schemas[item.schema_id], item.metadata)
+            for number, item in self._section.channels.items()
         }
         return FileSummary(
-            self._header,
+            header,
             {source: self._counts[number] for number, source in sources.items()},
-            self._start_ns,
-            self._end_ns,
-            self._attachments,
-            self._records,
-            tuple(section.chunks),
+            start_ns,
+            end_ns,
+            [item for item in self._files if isinstance(item, Attachment)],
+            [item for item in self._files if isinstance(item, Metadata)],
+            tuple(self._section.chunks),
             sources,
         )
 
@@ -123,118 +116,96 @@ class _Agreement:
             if channel.schema_id and channel.schema_id not in section.schemas:
                 raise _DoubtError(f"its summary lacks the schema of {channel.topic}")
 
-    def _check_places(self) -> None:
-        """Walk over the file from record to record, jumping over chunks, attachments and metadata."""
+    def _walk(self) -> Header:
+        """Go from record to record, which must be in the index, past chunks; return the header."""
         section = self._section
+        header: Header | None = None
         chunks = {index.chunk_start_offset: index for index in section.chunks}
-        files = {index.offset: index for index in section.files}
+        files = {index.offset: index.length for index in section.files}
         place, found = len(MAGIC), 0
         while place < section.begin:
             opcode, length = RECORD_HEAD.unpack(self._bytes(place, RECORD_HEAD.size))
             end = place + RECORD_HEAD.size + length
-            if opcode == Opcode.CHUNK:
-                if place not in chunks:
-                    raise _DoubtError(f"the chunk at byte {place} is not in its index")
+            if opcode == Opcode.CHUNK and place in chunks:
+                found += 1
                 end = self._check_chunk(chunks[place], end)
-                found += 1
-            elif opcode in (Opcode.ATTACHMENT, Opcode.METADATA):
-                if place not in files or files[place].length != end - place:
-                    raise _DoubtError(f"the attachment or metadata at byte {place} is not in its index")
-                self._take_file(opcode, self._bytes(place + RECORD_HEAD.size, length))
-                found += 1
-            elif opcode == Opcode.HEADER:
-                self._header = parse(opcode, self._body(opcode, place, length))
-            elif opcode not in _FREE and opcode < _PRIVATE:
-                what = "a message" if opcode == Opcode.MESSAGE else "a record"
-                raise _DoubtError(f"{what} at byte {place} is not in its index")
+            elif opcode == Opcode.HEADER or files.get(place) == end - place:
+                found += opcode != Opcode.HEADER
+                record = self._record(opcode, self._bytes(place + RECORD_HEAD.size, length))
+                header = record if opcode == Opcode.HEADER else header
+                self._files.append(record)
+            elif opcode not in _FREE and opcode < PRIVATE:
+                raise _DoubtError(f"a {Opcode(opcode).name.lower()} at byte {place} is not in its index")
             place = end
-        if place != section.begin or found != len(chunks) + len(files):
+        if place != section.begin or found != len(chunks) + len(files) or header is None:
             raise _DoubtError("its index names places where nothing is")
+        return header
 
     def _check_chunk(self, index: ChunkIndex, end: int) -> int:
-        """Check a chunk and its message indexes; return where these end."""
+        """Check a chunk, which ends at ``end``, and its message indexes; return where these end."""
         place = index.chunk_start_offset
         head = chunk_head(self._bytes(place + RECORD_HEAD.size, _CHUNK_HEAD))
-        stated = index.message_start_time, index.message_end_time, index.uncompressed_size
+        span = index.message_start_time, index.message_end_time
         if (
             head is None
-            or (head.start_ns, head.end_ns, head.uncompressed_size) != stated
-            or (head.compression, end) != (index.compression, place + index.chunk_length)
+            or (head.start_ns, head.end_ns, head.compression) != (*span, index.compression)
+            or end != place + index.chunk_length
         ):
             raise _DoubtError(f"the chunk at byte {place} is not as its index says")
-        offsets, first_ns, last_ns = {}, None, 0
-        for begin, body in self._indexes(end, index.message_index_length):
-            channel, entries = _entries(body)
-            if channel not in self._section.channels:
-                raise _DoubtError(f"its summary lacks channel {channel}")
-            self._counts[channel] += len(entries)
+        offsets, entries = {}, []
+        for begin, body in self._message_indexes(end, index.message_index_length):
+            channel, length = _INDEX_HEAD.unpack_from(body)
             offsets[channel] = begin
-            if len(entries):
-                times = entries["log_time"]
-                first_ns = int(times.min()) if first_ns is None else min(first_ns, int(times.min()))
-                last_ns = max(last_ns, int(times.max()))
-        if offsets != index.message_index_offsets or (
-            first_ns is not None and (first_ns, last_ns) != (index.message_start_time, index.message_end_time)
-        ):
+            entries.append(body[_INDEX_HEAD.size : _INDEX_HEAD.size + length])
+            if (
+                channel not in self._section.channels
+                or len(entries[-1]) != length
+                or length % _ENTRY.itemsize
+            ):
+                raise _DoubtError(f"the message index of channel {channel} at byte {begin} is malformed")
+            self._counts[channel] += length // _ENTRY.itemsize
+        times = np.frombuffer(b"".join(entries), _ENTRY)["log_time"]
+        if len(times):
+            self._spans.append((int(times.min()), int(times.max())))
+        if offsets != index.message_index_offsets or (len(times) and self._spans[-1] != span):
             raise _DoubtError(f"the chunk at byte {place} has other message indexes than its index says")
-        if first_ns is not None:
-            self._start_ns = first_ns if self._start_ns is None else min(self._start_ns, first_ns)
-            self._end_ns = max(self._end_ns or 0, last_ns)
         return end + index.message_index_length
 
-    def _indexes(self, begin: int, length: int) -> Iterator[tuple[int, bytes]]:
+    def _message_indexes(self, begin: int, length: int) -> Iterator[tuple[int, bytes]]:
         """Yield place and body of the message indexes behind a chunk."""
         data, place = self._bytes(begin, length), 0
         while place < length:
             opcode, size = RECORD_HEAD.unpack_from(data, place)
             at, place = place, place + RECORD_HEAD.size + size
-            body = data[at + RECORD_HEAD.size : place]
-            if len(body) < size or (opcode != Opcode.MESSAGE_INDEX and opcode < _PRIVATE):
-                raise _DoubtError(f"the message indexes at byte {begin} are something else")
             if opcode == Opcode.MESSAGE_INDEX:
-                yield begin + at, body
+                yield begin + at, data[at + RECORD_HEAD.size : place]
+            elif opcode < PRIVATE:
+                raise _DoubtError(f"the record at byte {begin + at} is no message index")
 
-    def _take_file(self, opcode: int, body: bytes) -> None:
-        """Take an attachment or metadata record."""
-        if used_length(opcode, body) is None or (
-            opcode == Opcode.ATTACHMENT and not attachment_is_sound(body)
-        ):
-            raise _DoubtError("an attachment or metadata record is damaged")
-        record = parse(opcode, body)
-        (self._attachments if opcode == Opcode.ATTACHMENT else self._records).append(record)
-
-    def _check_statistics(self) -> None:
-        """Check counts and times of the statistics against those of the message indexes."""
+    def _check_statistics(self) -> tuple[int | None, int | None]:
+        """Check the statistics against the message indexes; return the first and last log time."""
         statistics = self._section.statistics
-        if statistics is None:
-            return
-        stated = {number: count for number, count in statistics.channel_message_counts.items() if count}
-        if stated != {number: count for number, count in self._counts.items() if count}:
+        if statistics is None or +Counter(statistics.channel_message_counts) != +self._counts:
             raise _DoubtError("its statistics count other messages than its message indexes")
-        if statistics.message_count != sum(stated.values()):
+        if statistics.message_count != self._counts.total():
             raise _DoubtError("its statistics contradict themselves")
-        span = statistics.message_start_time, statistics.message_end_time
-        if self._start_ns is not None and span != (self._start_ns, self._end_ns):
+        if not self._spans:
+            return None, None
+        span = min(first for first, _ in self._spans), max(last for _, last in self._spans)
+        if span != (statistics.message_start_time, statistics.message_end_time):
             raise _DoubtError("its statistics have another first or last log time")
+        return span
 
-    def _body(self, opcode: int, place: int, length: int) -> bytes:
-        """Return the body of a record; raises _DoubtError if it is malformed."""
-        body = self._bytes(place + RECORD_HEAD.size, length)
-        if used_length(opcode, body) is None:
-            raise _DoubtError(f"the record at byte {place} is malformed")
-        return body
+    def _record(self, opcode: int, body: bytes) -> Any:
+        """Return a record; raises _DoubtError if it is damaged."""
+        sound = used_length(opcode, body) is not None
+        if not sound or (opcode == Opcode.ATTACHMENT and not attachment_is_sound(body)):
+            raise _DoubtError(f"a {Opcode(opcode).name.lower()} is damaged")
+        return parse(opcode, body)
 
     def _bytes(self, place: int, length: int) -> bytes:
         self._stream.seek(place)
-        return self._stream.read(min(length, self._section.begin - place))
-
-
-def _entries(body: bytes) -> tuple[int, npt.NDArray[np.void]]:
-    """Return the channel and the entries of a message index."""
-    channel, length = struct.unpack_from("<HI", body)
-    if length % _ENTRY.itemsize or _INDEX_ENTRIES_AT + length > len(body):
-        raise _DoubtError("a message index is malformed")
-    return channel, np.frombuffer(body, _ENTRY, length // _ENTRY.itemsize, _INDEX_ENTRIES_AT)
+        return self._stream.read(max(0, min(length, self._section.begin - place)))
 
 
 def _scan(file: Path, doubt: str) -> FileSummary:

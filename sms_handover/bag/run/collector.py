@@ -124,5 +124,6 @@ class RunCollector:
         """Yield the names of the arms whose tool pose is in the bag."""
         head, tail = f"{self._prefix}/", topics.tool_pose("")
         for name in self._info.topics:
-            if name.startswith(head) and name.endswith(tail):
-                yield name[len(head) : -len(tail)]
+            arm = name.removeprefix(head).removesuffix(tail)
+            if name == f"{head}{arm}{tail}" and "/" not in arm:
+                yield arm

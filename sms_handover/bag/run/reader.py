@@ -56,7 +56,7 @@ def _assemble(collector: RunCollector) -> RunData:
     ticks: Stamps = np.intersect1d(position.stamp_ns, pose.stamp_ns)
     reference = joint(topics.JOINT_REFERENCE, POSITION)
     periods = reference.stamp_ns
-    arms = sorted(collector.arms, key=lambda arm: (_first_joint(arm, joint_names), arm))
+    arms = _by_first_joint(collector.arms, joint_names)
     energy = rows(topics.ENERGY)
     return RunData(
         joint_names=joint_names,
@@ -114,10 +114,12 @@ def _listed(names: Sequence[str]) -> str:
     return (", ".join(names[:_MOST_NAMES]) or "none") + more
 
 
-def _first_joint(arm: str, joint_names: Sequence[str]) -> int:
-    """Return the place of an arm's first joint, behind all others if it has none."""
-    places = [place for place, name in enumerate(joint_names) if name.startswith(f"{arm}_")]
-    return min(places, default=len(joint_names))
+def _by_first_joint(arms: Sequence[str], joint_names: Sequence[str]) -> list[str]:
+    """Return the arms by their first joints; a joint belongs to the longest arm name it begins with."""
+    owners = [
+        max((arm for arm in arms if name.startswith(f"{arm}_")), key=len, default="") for name in joint_names
+    ]
+    return sorted(arms, key=lambda arm: (owners.index(arm) if arm in owners else len(owners), arm))
 
 
 def _last_run(phases: Sequence[TaskPhase]) -> tuple[TaskPhase, ...]:
