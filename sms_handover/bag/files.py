@@ -2,9 +2,10 @@
 
 import shlex
 import struct
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -24,6 +25,9 @@ _CONVERSIONS = {  # by suffix
     ".bag": "'rosbags-convert --src {file} --dst NEW --dst-storage mcap' makes one of it",
 }
 _DAMAGE = (McapError, zstandard.ZstdError, struct.error, ValueError, KeyError, RuntimeError, MemoryError)
+
+
+Progress = Callable[[int, int], None]  # bytes read, bytes in all
 
 
 class RawMessage(NamedTuple):
@@ -68,6 +72,16 @@ class BagFiles:
                     files.append(file)
             yield tuple(files)
 
+    def scans(self, progress: Progress | None = None) -> Iterator[FileScan]:
+        """Yield a scan of each file, whatever its content; valid until the next one is asked for."""
+        with self.opened() as files, damage_reported(self.path):
+            total, before = sum(file.stat().st_size for file in files), 0
+            for file in files:
+                report = None if progress is None else partial(_report, progress, before, total)
+                scan = FileScan(file, report=report)
+                before += scan.size
+                yield scan
+
 
 def files_of(path: Path) -> BagFiles:
     """Return the files of a bag, given its folder or a file, whatever their content.
@@ -102,12 +116,9 @@ def whole_files(path: Path) -> BagFiles:
 
 def scans_of(path: Path) -> Iterator[FileScan]:
     """Yield a scan of each file of a bag, which must be whole; valid until the next one is asked for."""
-    bag = whole_files(path)
-    with bag.opened() as files:
-        for file, stored in zip(files, bag.files, strict=True):
-            if file != stored:
-                check_ends(file, path)
-            yield FileScan(file)
+    for scan in whole_files(path).scans():
+        check_ends(scan.file, path)
+        yield scan
 
 
 def read_messages(path: Path, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
@@ -215,3 +226,7 @@ def check_ends(file: Path, bag: Path) -> None:
             f"{file} was not closed: it has {size} bytes and no end, so the recorder was killed, the disk was"
             f" full or the file was cut; {recover_hint(bag)}"
         )
+
+
+def _report(progress: Progress, before: int, total: int, place: int) -> None:
+    progress(before + place, total)

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 
+from mcap.records import Schema
+
 from sms_handover.bag.attachments import PARAMETERS_FILE, ROBOT_FILE, SCHEDULE_FILE, parameters_from_json
 from sms_handover.bag.files import check_ends, damage_reported, files_of
 from sms_handover.bag.ledger import LEDGER_RECORD, Ledger
@@ -12,6 +14,7 @@ from sms_handover.bag.mcap.scan import Source
 from sms_handover.bag.mcap.summary import summarize
 from sms_handover.bag.metadata import counts_in_metadata
 from sms_handover.bag.provenance import PROVENANCE_RECORD
+from sms_handover.bag.schemas import SchemaTypes
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,11 @@ class TopicInfo:
     schema_text: str
     qos: str
     type_hash: str
+
+    @property
+    def types(self) -> SchemaTypes:
+        """Return the types of its messages; raises BagError if the schema is not understood."""
+        return SchemaTypes(Schema(0, self.schema_text.encode(), self.schema_encoding, self.type))
 
 
 @dataclass(frozen=True)
@@ -112,7 +120,9 @@ def read_info(path: Path) -> BagInfo:
             for source, count in summary.counts.items():
                 topic = _topic(source, count)
                 key = topic.name, topic.type, topic.encoding
-                channels[key] = _joined(channels[key], topic) if key in channels else topic
+                if key in channels:
+                    topic = replace(channels[key], message_count=channels[key].message_count + count)
+                channels[key] = topic
     found = sum(topic.message_count for topic in channels.values())
     if stated > found:
         missing.append(f"{stated - found} of {stated} messages are missing, as metadata.yaml counts them")
@@ -140,7 +150,6 @@ def read_info(path: Path) -> BagInfo:
 
 
 def _topic(source: Source, count: int) -> TopicInfo:
-    """Return a channel of a file as a topic with ``count`` messages."""
     return TopicInfo(
         name=source.topic,
         type=source.schema.name,
@@ -151,8 +160,3 @@ def _topic(source: Source, count: int) -> TopicInfo:
         qos=source.metadata.get("offered_qos_profiles", ""),
         type_hash=source.metadata.get("topic_type_hash", ""),
     )
-
-
-def _joined(first: TopicInfo, other: TopicInfo) -> TopicInfo:
-    """Return a topic with the messages of another channel of it added."""
-    return replace(first, message_count=first.message_count + other.message_count)

@@ -49,7 +49,6 @@ def source_revision(root: Path) -> tuple[str, str]:
 
 
 def _git(root: Path, arguments: Sequence[str]) -> str | None:
-    """Return the output of git, None if it fails."""
     try:
         result = subprocess.run(
             ["git", "-C", str(root), *arguments],

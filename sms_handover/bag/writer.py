@@ -273,7 +273,6 @@ class BagWriter:
             raise self._failure or BagError(f"the recording in {self.folder} is closed")
 
     def _rejection(self, topic: str) -> BagError:
-        """Return why a message cannot be written."""
         self._require_open()
         if topic not in self._topics:
             return BagError(f"topic {topic!r} was not added to the recording in {self.folder}")
@@ -281,7 +280,6 @@ class BagWriter:
 
     @contextmanager
     def _reported(self) -> Iterator[None]:
-        """Raise BagError for an error of the file system."""
         try:
             yield
         except OSError as error:
@@ -296,7 +294,6 @@ class BagWriter:
 
 
 def _create(folder: Path) -> int:
-    """Create and open the folder, which must not exist."""
     try:
         folder.mkdir()
         return os.open(folder, os.O_RDONLY)
@@ -316,7 +313,6 @@ def _span(file: BagFile) -> FileSpan:
 
 
 def _write_synced(folder: int, name: str, text: str) -> None:
-    """Write a text file into an open folder and sync it."""
     handle = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666, dir_fd=folder)
     with os.fdopen(handle, "w", encoding="utf-8") as stream:
         stream.write(text)

@@ -149,7 +149,6 @@ class _Cursor:
         return Shape(self._little_endian, names, tuple(blocks), self._place)
 
     def count(self) -> int:
-        """Read the length of a sequence or text."""
         begin, self._place = self._span(4, 4)
         return int(self._unsigned.unpack_from(self._data, begin)[0])
 
@@ -158,7 +157,6 @@ class _Cursor:
         return self._data[begin : self._place].rstrip(b"\0").decode(errors="replace")
 
     def doubles(self, count: int) -> Block:
-        """Step over numbers and return where they are."""
         if count == 0:
             return self._place, self._place
         begin, self._place = self._span(count * _DOUBLE, _DOUBLE)

@@ -38,15 +38,6 @@ class MessageTypes:
         self._roots = tuple(definition_roots() if roots is None else roots)
         self._store = get_typestore(Stores.ROS2_JAZZY)
 
-    def learn(self, type_name: str, text: str) -> None:
-        """Register a type and its nested types from the schema text of a bag; raises BagError."""
-        try:
-            definitions = get_types_from_msg(text, type_name)
-            known = self._store.fielddefs
-            self._register({name: value for name, value in definitions.items() if name not in known})
-        except TypesysError as error:
-            raise BagError(f"the schema of {type_name} is not readable: {_one_line(error)}") from error
-
     def schema(self, type_name: str) -> Schema:
         """Return the schema of a type; raises BagError without a readable definition."""
         self.require(type_name)
@@ -121,7 +112,6 @@ def definition_roots() -> tuple[Path, ...]:
 
 
 def _source_interfaces() -> Path:
-    """Return the folder of the interface package in the source tree."""
     return Path(__file__).resolve().parent.parent.parent / "interfaces"
 
 

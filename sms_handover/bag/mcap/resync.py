@@ -149,7 +149,6 @@ class FrameWalk:
         return self._chunked
 
     def _candidates(self, place: int) -> Iterator[int]:
-        """Yield the places from ``place`` on where a record or the final magic may begin."""
         start = place
         while place < self._size:
             block = self._bytes(place, _SEARCH_BLOCK + RECORD_HEAD.size)
@@ -161,7 +160,6 @@ class FrameWalk:
             yield self._size - len(MAGIC)
 
     def _chunk_begins(self, place: int) -> bool:
-        """Whether a chunk is at a place, judged by its first bytes."""
         opcode, length = self._head(place) or (0, 0)
         head = chunk_head(self._bytes(place + RECORD_HEAD.size, min(length, _HEAD_OF_CHUNK)))
         return opcode == Opcode.CHUNK and head is not None and head.begin + head.size <= length
@@ -178,7 +176,6 @@ class FrameWalk:
         return self._frame(place) is not None
 
     def _is_end(self, place: int) -> bool:
-        """Whether the final magic is at a place."""
         return place == self._size - len(MAGIC) and self._bytes(place, len(MAGIC)) == MAGIC
 
     def _head(self, place: int) -> tuple[int, int] | None:

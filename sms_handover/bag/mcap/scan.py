@@ -4,7 +4,7 @@ A reader that needs a whole bag stops at the first damage, a recovery resumes be
 """
 
 import zlib
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -75,9 +75,16 @@ class FileScan:
     ``private`` the records that only their writer understands.
     """
 
-    def __init__(self, file: Path, sources: Mapping[int, Source] | None = None) -> None:
-        """Take ``sources``, channels by number, that are known from the summary."""
+    def __init__(
+        self,
+        file: Path,
+        sources: Mapping[int, Source] | None = None,
+        report: Callable[[int], None] | None = None,
+    ) -> None:
+        """Know ``sources``, channels by number, from the summary; call ``report`` with each ``place``."""
         self.file = file
+        self.size = file.stat().st_size
+        self._report = report
         self.place = 0
         self.closed = False
         self.from_cut_chunk = 0
@@ -94,11 +101,13 @@ class FileScan:
 
     def __iter__(self) -> Iterator[Found]:
         """Yield channels, messages, other records and damage, in the order of the file."""
-        size = self.file.stat().st_size
+        size = self.size
         with self.file.open("rb") as stream:
             self._summary = read_summary_section(stream, size)
             for found in FrameWalk(stream, size):
                 self.place = found.end
+                if self._report is not None:
+                    self._report(self.place)
                 self._add_to_checksum(found)
                 if self._lost is not None:
                     if self._counts_lost(found):
@@ -157,7 +166,6 @@ class FileScan:
             yield from self._defined(record)
 
     def _chunk(self, frame: Frame) -> Iterator[Found]:
-        """Yield the messages of a chunk, or note that it is lost."""
         head = chunk_head(frame.body)
         if head is None:
             raise AssertionError("a frame is no chunk without its head")
@@ -221,7 +229,6 @@ class FileScan:
         return source
 
     def _source(self, channel: Channel) -> Source | None:
-        """Return a channel with its schema, None if that is lost."""
         schema = self._schemas.get(channel.schema_id) or self._summary.schemas.get(channel.schema_id)
         if schema is None:
             return None

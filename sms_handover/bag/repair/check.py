@@ -1,12 +1,10 @@
 """Check of a bag: whether it is complete, and what is missing."""
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
-from sms_handover.bag.files import BagFiles, damage_reported, files_of
+from sms_handover.bag.files import BagFiles, Progress, damage_reported, files_of
 from sms_handover.bag.mcap.damage import Damage
 from sms_handover.bag.mcap.scan import FileScan, ScannedMessage, Source
 from sms_handover.bag.metadata import counts_of, metadata_of
@@ -14,7 +12,6 @@ from sms_handover.bag.repair.check_content import ContentCheck
 from sms_handover.bag.repair.check_index import IndexCheck
 from sms_handover.bag.repair.findings import CheckResult, Findings
 from sms_handover.bag.repair.message_counts import MessageCounts
-from sms_handover.bag.repair.recover import Progress
 from sms_handover.errors import BagError
 
 _MOST = 20  # places of damage that are listed one by one
@@ -30,16 +27,9 @@ def check(path: Path, progress: Progress | None = None) -> CheckResult:
     bag = files_of(path)
     result = _Result(Findings(), ContentCheck(), MessageCounts(), Counter())
     findings, content = result.findings, result.content
-    before = 0
-    with damage_reported(path), bag.opened() as files:
-        sizes = [file.stat().st_size for file in files]
-        for file, size in zip(files, sizes, strict=True):
-            report = None if progress is None else partial(_report, progress, before, sum(sizes))
-            if size:
-                _check_file(FileScan(file), result, report)
-            else:
-                findings.damaged(f"{file.name} is empty")
-            before += size
+    for scan in bag.scans(progress):
+        with damage_reported(scan.file):
+            _check_file(scan, result)
     if not content.any_record:
         raise BagError(f"{path} is not a bag: no record of an MCAP file is in it")
     _check_metadata(bag, result)
@@ -58,8 +48,11 @@ class _Result:
     counts: Counter[str]
 
 
-def _check_file(scan: FileScan, result: _Result, report: Callable[[int], None] | None) -> None:
+def _check_file(scan: FileScan, result: _Result) -> None:
     findings, content = result.findings, result.content
+    if scan.size == 0:
+        findings.damaged(f"{scan.file.name} is empty")
+        return
     index = IndexCheck()
     damages: list[Damage] = []
     for found in scan:
@@ -75,8 +68,6 @@ def _check_file(scan: FileScan, result: _Result, report: Callable[[int], None] |
         else:
             index.record(found, scan)
             content.record(found.record)
-            if report is not None:
-                report(scan.place)
     for damage in damages[:_MOST]:
         findings.damaged(str(damage))
     if len(damages) > _MOST:
@@ -114,7 +105,3 @@ def _check_metadata(bag: BagFiles, result: _Result) -> None:
     result.stated.add("metadata.yaml", {**dict.fromkeys(result.counts, 0), **counts})
     if metadata.get("message_count") != sum(counts.values()):
         findings.damaged("metadata.yaml contradicts itself about the number of messages")
-
-
-def _report(progress: Progress, before: int, size: int, place: int) -> None:
-    progress(before + place, size)

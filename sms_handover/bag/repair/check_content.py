@@ -126,7 +126,6 @@ class ContentCheck:
                 findings.damaged(f"{kept.name}: the stamps are not those in the loss ledger")
 
     def _close_topic(self, topic: TopicLedger, findings: Findings) -> None:
-        """Report what one topic lacks."""
         if self._is_refused(topic.name):
             findings.note(f"{topic.name}: {topic.received} messages of other publishers than the topic's own")
             return

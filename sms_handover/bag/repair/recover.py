@@ -1,24 +1,20 @@
 """Recover a whole bag from what can be read of a truncated or damaged one."""
 
 import zlib
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from mcap.records import Attachment, Metadata, Statistics
 
-from sms_handover.bag.files import damage_reported, files_of
+from sms_handover.bag.files import Progress, damage_reported, files_of
 from sms_handover.bag.ledger import LEDGER_RECORD, PERIODS_RECORD, Ledger, has_ledger, periods_of
 from sms_handover.bag.mcap.damage import Damage, Hole
-from sms_handover.bag.mcap.resync import Frame, FrameWalk
 from sms_handover.bag.mcap.scan import FileScan, Located, ScannedMessage, Source
 from sms_handover.bag.metadata import ROSBAG2_RECORD, counts_in_metadata
 from sms_handover.bag.repair.ledger_rebuild import LedgerRebuild
 from sms_handover.bag.repair.recovery import RECOVERY_RECORD, Recovery, TopicRecovery
 from sms_handover.bag.writer import BagWriter
 from sms_handover.errors import BagError
-
-Progress = Callable[[int, int], None]  # bytes read, bytes in all
 
 _CHUNK_SIZE = 768 * 1024  # [byte] as in rosbag2
 _NEVER_NS = 2**63  # [ns] longer than any recording
@@ -33,27 +29,24 @@ def recover(source: Path, folder: Path, progress: Progress | None = None) -> Rec
     can be read, or if ``folder`` exists or cannot be written; then ``folder`` is deleted.
     """
     bag = files_of(source)
-    with damage_reported(source), bag.opened() as files:
-        _require_something(source, files)
-        sizes = [file.stat().st_size for file in files]
-        writer = BagWriter(folder, chunk_size=_CHUNK_SIZE, flush_period_ns=_NEVER_NS)
-        try:
-            salvage = _Salvage(writer)
-            salvage.expect(counts_in_metadata(source))
-            before = 0
-            for file, size in zip(files, sizes, strict=True):
-                report = partial(_report, progress, before, sum(sizes))
-                with damage_reported(file):
-                    salvage.take(FileScan(file), report)
-                before += size
-            result = salvage.result(source, sum(sizes), bag.missing)
-            if result.ledger is not None:
-                writer.record(LEDGER_RECORD, result.ledger.to_record())
-            writer.record(RECOVERY_RECORD, result.to_record())
-            writer.close()
-        except BaseException:
-            writer.abandon()
-            raise
+    writer = BagWriter(folder, chunk_size=_CHUNK_SIZE, flush_period_ns=_NEVER_NS)
+    try:
+        salvage = _Salvage(writer)
+        salvage.expect(counts_in_metadata(source))
+        for scan in bag.scans(progress):
+            with damage_reported(scan.file):
+                salvage.take(scan)
+        if not salvage.any_record:
+            what = "no record of an MCAP file is in it" if bag.size else "it is empty"
+            raise BagError(f"nothing can be recovered from {source}: {what}")
+        result = salvage.result(source, bag.missing)
+        if result.ledger is not None:
+            writer.record(LEDGER_RECORD, result.ledger.to_record())
+        writer.record(RECOVERY_RECORD, result.to_record())
+        writer.close()
+    except BaseException:
+        writer.abandon()
+        raise
     return result
 
 
@@ -70,11 +63,13 @@ class _Salvage:
         self._in_statistics: dict[str, int] = {}  # messages by topic, of all files
         self._span: tuple[int, int] | None = None  # [ns] of the recording, if known
         self._damages: list[Damage] = []
+        self.any_record = False
+        self._size = 0
         self._closed = True
         self._from_cut_chunk = self._private = 0
         self._hole = Hole()
 
-    def take(self, scan: FileScan, progress: Callable[[int], None]) -> None:
+    def take(self, scan: FileScan) -> None:
         for found in scan:
             if isinstance(found, ScannedMessage):
                 source = found.source
@@ -91,8 +86,8 @@ class _Salvage:
                     self._hole.damage(found)
             else:
                 self._take_record(found, scan)
-                progress(scan.place)
-        progress(scan.place)
+            self.any_record = self.any_record or not isinstance(found, Damage)
+        self._size += scan.size
         self._closed = self._closed and scan.closed
         self._from_cut_chunk += scan.from_cut_chunk
         self._private += scan.private
@@ -102,8 +97,8 @@ class _Salvage:
         for name, count in counts.items():
             self._recorded[name] = max(self._recorded.get(name, 0), count)
 
-    def result(self, source: Path, size: int, missing: Sequence[str]) -> Recovery:
-        """Return the result for a bag of ``size`` bytes."""
+    def result(self, source: Path, missing: Sequence[str]) -> Recovery:
+        """Return the result, for a bag that lacks the ``missing`` files."""
         recovered: dict[str, int] = {}
         for key, count in self._writer.message_counts.items():
             name = self._writer.topic_of(key)
@@ -114,7 +109,7 @@ class _Salvage:
         return Recovery(
             source=source,
             folder=self._writer.folder,
-            size=size,
+            size=self._size,
             closed=self._closed,
             damages=tuple(self._damages),
             topics=tuple(
@@ -164,7 +159,6 @@ class _Salvage:
             self._take_statistics(record, scan)
 
     def _take_statistics(self, statistics: Statistics, scan: FileScan) -> None:
-        """Take the counts and the span of a file."""
         for channel, count in statistics.channel_message_counts.items():
             name = scan.topic_of(channel)
             self._in_statistics[name] = self._in_statistics.get(name, 0) + count
@@ -179,19 +173,3 @@ class _Salvage:
             return False
         self._kept.add(same)
         return True
-
-
-def _report(progress: Progress | None, before: int, size: int, place: int) -> None:
-    if progress is not None:
-        progress(before + place, size)
-
-
-def _require_something(source: Path, files: Sequence[Path]) -> None:
-    """Raise BagError if no file holds a single record."""
-    for file in files:
-        with file.open("rb") as stream:
-            if any(isinstance(found, Frame) for found in FrameWalk(stream, file.stat().st_size)):
-                return
-    empty = all(file.stat().st_size == 0 for file in files)
-    what = "it is empty" if empty else "no record of an MCAP file is in it"
-    raise BagError(f"nothing can be recovered from {source}: {what}")

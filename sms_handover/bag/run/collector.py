@@ -11,7 +11,6 @@ from sms_handover.errors import BagError
 from sms_handover.graph import topics
 from sms_handover.graph.events import RunEvent
 from sms_handover.messages.layout import joint_state, odometry
-from sms_handover.messages.message_types import MessageTypes
 from sms_handover.messages.stamps import stamp_ns
 from sms_handover.messages.values import (
     energy_values,
@@ -38,7 +37,6 @@ class RunCollector:
         """Prepare for each topic of a run; ``prefix`` is the namespace, '' for the root."""
         self._info = info
         self._prefix = prefix
-        self._types = MessageTypes(roots=())
         self.arms = tuple(self._found_arms())
         self._check_types()
         self.joints = {
@@ -72,7 +70,7 @@ class RunCollector:
             **{name: collector.add for name, collector in self.joints.items()},
             topics.JOINT_STATES: self._take_state,
             topics.BASE_ODOMETRY: self.odometry.add,
-            **{name: self._decoded(name, take) for name, take in decoders.items()},
+            **{name: decoder(self._info, self.full_name(name), take) for name, take in decoders.items()},
         }
         by_name = {self.full_name(name): taker for name, taker in takers.items()}
         for message in read_messages(self._info.path, by_name):
@@ -93,25 +91,7 @@ class RunCollector:
         """Return the name of a topic of the run in the bag."""
         return f"{self._prefix}/{name}"
 
-    def _decoded(self, name: str, take: Callable[..., None]) -> Callable[[bytes], None]:
-        """Return a function that decodes a message by the schema in the bag and calls ``take``."""
-        topic = self._info.topics.get(self.full_name(name))
-        type_name = "" if topic is None else topic.type
-        if topic is not None:
-            self._types.learn(type_name, topic.schema_text)
-
-        def decode(data: bytes) -> None:
-            try:
-                take(self._types.deserialize(data, type_name))
-            except (AttributeError, IndexError) as error:
-                raise BagError(
-                    f"{self._info.path}: {name} is not as this version knows it: {error}"
-                ) from error
-
-        return decode
-
     def _check_types(self) -> None:
-        """Raise BagError if a topic has another type in the bag."""
         for topic in topics.graph_topics(self.arms):
             recorded = self._info.topics.get(self.full_name(topic.name))
             if recorded is not None and (recorded.type, recorded.encoding) != (topic.type, "cdr"):
@@ -121,9 +101,21 @@ class RunCollector:
                 )
 
     def _found_arms(self) -> Iterator[str]:
-        """Yield the names of the arms whose tool pose is in the bag."""
         head, tail = f"{self._prefix}/", topics.tool_pose("")
         for name in self._info.topics:
             arm = name.removeprefix(head).removesuffix(tail)
             if name == f"{head}{arm}{tail}" and "/" not in arm:
                 yield arm
+
+
+def decoder(info: BagInfo, name: str, take: Callable[[Any], None]) -> Callable[[bytes], None]:
+    """Return a function that decodes a message of a topic by its schema in the bag and calls ``take``."""
+    types = info.topics[name].types if name in info.topics else None
+
+    def decode(data: bytes) -> None:
+        try:
+            take(None if types is None else types.decode(data))
+        except (AttributeError, IndexError) as error:
+            raise BagError(f"{info.path}: {name} is not as this version knows it: {error}") from error
+
+    return decode

@@ -64,7 +64,6 @@ class BlockCollector:
         return Series(np.array(self._stamps, dtype=np.int64), values)
 
     def _group(self, data: bytes) -> _Group:
-        """Return the group of a message of another layout than the latest one."""
         layout = Layout(data, self._parse, self._wanted)
         new = _Group(layout, [bytearray() for _ in self._wanted])
         self._latest = group = self._groups.setdefault(layout.shape, new)

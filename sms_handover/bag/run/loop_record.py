@@ -8,11 +8,10 @@ import numpy as np
 
 from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import read_info
+from sms_handover.bag.run.collector import decoder
 from sms_handover.bag.run.reader import find_namespace
 from sms_handover.bag.run.series import RowCollector, Series
-from sms_handover.errors import BagError
 from sms_handover.graph import topics
-from sms_handover.messages.message_types import MessageTypes
 from sms_handover.messages.stamps import stamp_ns
 from sms_handover.run_data import Array, Stamps
 from sms_handover.units import NS_PER_S
@@ -55,10 +54,8 @@ def read_loop(path: Path, namespace: str | None = None) -> LoopRecord:
     info = read_info(path)
     prefix = find_namespace(info) if namespace is None else namespace.rstrip("/")
     states, reports = (f"{prefix}/{name}" for name in (topics.JOINT_STATES, topics.LOOP_TIMING))
-    types = MessageTypes(roots=())
-    if reports in info.topics:
-        types.learn(info.topics[reports].type, info.topics[reports].schema_text)
     collected = RowCollector(len(_REPORTED), _reported)
+    collect = decoder(info, reports, collected.add)
     stamps: list[int] = []
     walls: list[int] = []
     for message in read_messages(path, {states, reports}):
@@ -66,10 +63,7 @@ def read_loop(path: Path, namespace: str | None = None) -> LoopRecord:
             stamps.append(stamp_ns(message.data))
             walls.append(message.publish_time_ns)
         else:
-            try:
-                collected.add(types.deserialize(message.data, message.type))
-            except AttributeError as error:
-                raise BagError(f"{path}: {reports} is not as this version knows it: {error}") from error
+            collect(message.data)
     wall_ns = np.array(walls, dtype=np.int64)
     since = (wall_ns - wall_ns[:1]) / NS_PER_S
     arrived = Series(np.array(stamps, dtype=np.int64), since.reshape(-1, 1)).settled()
