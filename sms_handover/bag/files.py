@@ -2,9 +2,9 @@
 
 import shlex
 import struct
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -45,13 +45,14 @@ class BagFiles:
     """The files of a bag in their order; ``missing`` are names of files that ``metadata.yaml`` lists too.
 
     ``unlisted`` are MCAP files beside them that it does not list; those are not read unless their
-    names continue those of the bag.
+    names continue those of the bag. ``counts`` are the numbers of messages that it states, by topic.
     """
 
     path: Path
     files: tuple[Path, ...]
     missing: tuple[str, ...] = ()
     unlisted: tuple[str, ...] = ()
+    counts: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def size(self) -> int:
@@ -179,7 +180,7 @@ def _files_of(path: Path) -> BagFiles:
         continued = [file for file in others if _name_and_number(file)[0] in stems]
         files = (*listed.files, *continued)
         _reject_others(path, files)
-        return BagFiles(path, files, listed.missing, tuple(file.name for file in others))
+        return BagFiles(path, files, listed.missing, tuple(file.name for file in others), listed.counts)
     files = tuple(sorted(there, key=_name_and_number))
     if len({_name_and_number(file)[0] for file in files}) > 1:
         raise BagError(f"{path} holds several bags, choose one: {', '.join(file.name for file in files)}")
@@ -187,7 +188,7 @@ def _files_of(path: Path) -> BagFiles:
         _reject_others(path, sorted(path.iterdir()))
         raise BagError(f"{path} is not a bag: no .mcap file in it")
     renamed = len(files) >= len(listed.missing)
-    return BagFiles(path, files, () if renamed else listed.missing)
+    return BagFiles(path, files, () if renamed else listed.missing, counts=listed.counts)
 
 
 def _is_mcap(file: Path) -> bool:

@@ -12,7 +12,6 @@ from sms_handover.bag.files import check_ends, damage_reported, files_of
 from sms_handover.bag.ledger import LEDGER_RECORD, Ledger
 from sms_handover.bag.mcap.scan import Source
 from sms_handover.bag.mcap.summary import summarize
-from sms_handover.bag.metadata import counts_in_metadata
 from sms_handover.bag.provenance import PROVENANCE_RECORD
 from sms_handover.bag.schemas import SchemaTypes
 
@@ -104,7 +103,7 @@ def read_info(path: Path) -> BagInfo:
     """Return the content of the bag at ``path``, its folder or a file; raises BagError if it is unusable."""
     bag = files_of(path)
     missing = [f"{name} is not there, metadata.yaml lists it" for name in bag.missing]
-    stated = sum(counts_in_metadata(path).values())
+    stated = sum(bag.counts.values())
     notes = [f"{name} is there, metadata.yaml does not list it" for name in bag.unlisted]
     summaries = []
     channels: dict[tuple[str, str, str], TopicInfo] = {}

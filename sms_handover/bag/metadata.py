@@ -1,7 +1,7 @@
 """Metadata of a bag as rosbag2 keeps it in ``metadata.yaml`` and inside the file, version 9."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -87,10 +87,14 @@ def counts_of(metadata: Mapping[str, Any]) -> dict[str, int]:
 
 @dataclass(frozen=True)
 class FileList:
-    """The files that ``metadata.yaml`` lists, in its order, and the names of those that are not there."""
+    """The files that ``metadata.yaml`` lists, in its order, and the names of those that are not there.
+
+    ``counts`` are the numbers of messages that it states, by topic.
+    """
 
     files: tuple[Path, ...] = ()
     missing: tuple[str, ...] = ()
+    counts: Mapping[str, int] = field(default_factory=dict)
 
 
 def files_in_metadata(bag: Path) -> FileList:
@@ -101,6 +105,7 @@ def files_in_metadata(bag: Path) -> FileList:
     try:
         metadata = metadata_of(bag) or {}
         names = [str(name) for name in metadata.get("relative_file_paths") or ()]
+        counts = counts_of(metadata)
     except (BagError, TypeError):
         return FileList()
     mode, form = (str(metadata.get(f"compression_{key}") or "") for key in ("mode", "format"))
@@ -110,7 +115,7 @@ def files_in_metadata(bag: Path) -> FileList:
         )
     found = {name: _listed(bag, name) for name in dict.fromkeys(names)}
     missing = [Path(name).name for name, file in found.items() if file is None]
-    return FileList(tuple(file for file in found.values() if file), tuple(missing))
+    return FileList(tuple(file for file in found.values() if file), tuple(missing), counts)
 
 
 def _listed(bag: Path, name: str) -> Path | None:
@@ -119,14 +124,6 @@ def _listed(bag: Path, name: str) -> Path | None:
         if file.exists() and file.resolve().is_relative_to(bag.resolve()):
             return file
     return None
-
-
-def counts_in_metadata(bag: Path) -> dict[str, int]:
-    """Return the number of messages by topic as far as ``metadata.yaml`` states it."""
-    try:
-        return counts_of(metadata_of(bag) or {})
-    except BagError:
-        return {}
 
 
 def to_yaml(value: object) -> str:

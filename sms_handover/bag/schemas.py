@@ -22,7 +22,16 @@ _EVENT_TEXT = """service_msgs/ServiceEventInfo info
 {service}_Request[<=1] request
 {service}_Response[<=1] response
 """
-_ERRORS = (TypesysError, SerdeError, LookupError, ValueError, AssertionError, RecursionError)
+_ERRORS = (
+    TypesysError,
+    SerdeError,
+    LookupError,
+    ValueError,
+    TypeError,
+    SyntaxError,
+    AssertionError,
+    RecursionError,
+)
 
 
 class SchemaTypes:

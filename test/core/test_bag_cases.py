@@ -191,6 +191,11 @@ def one_chunk_less(records: Records) -> Records:
     return changed(Statistics, chunk_count=count)(rest)
 
 
+def renamed(records: Records) -> Records:
+    """Call the topic of the first channel otherwise."""
+    return [replace(r, topic="/other") if isinstance(r, Channel) and r.id == 1 else r for r in records]
+
+
 def without_schemas(records: Records) -> Records:
     """Leave the schemas out, with statistics that agree."""
     return changed(Statistics, schema_count=0)(without(Schema)(records))
@@ -290,6 +295,15 @@ def test_log_times_up_to_the_largest_keep_their_order(tmp_path: Path) -> None:
         assert (read_info(path).start_ns, read_info(path).end_ns) == (0, 2**64 - 1)
         assert times(path) == sorted(large) and not check(path).damaged
         assert times(path, TimeSpan(2**53 + 1, 2**63)) == [2**53 + 1, 2**63]
+
+
+def test_a_channel_that_the_summary_calls_otherwise_is_damage(tmp_path: Path) -> None:
+    file = tmp_path / "a.mcap"
+    file.write_bytes(with_summary(write_file(file), renamed))
+    with pytest.raises(BagError, match="channel 1 is /other, and again /text"):
+        times(file)
+    assert check(file).damaged
+    assert {m.topic for m in read_messages(recover(file, tmp_path / "new").folder)} == {"/text", "/joints"}
 
 
 def test_private_records_are_skipped_and_counted(tmp_path: Path) -> None:

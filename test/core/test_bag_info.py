@@ -84,6 +84,7 @@ def test_a_bag_of_rosbags_in_every_compression(tmp_path: Path, mode: Compression
     assert [message.data for message in messages_by_time(tmp_path / "bag")] == messages
     assert not [f for f in check(tmp_path / "bag").findings if f.severity is not Severity.NOTE]
     assert recover(tmp_path / "bag", tmp_path / "new").message_count == 20
+    assert [m.data for m in read_messages(info.files[0])] == messages
 
 
 def test_messages_of_chosen_topics_only(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import shutil
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import lz4.frame
 import zstandard
@@ -12,16 +13,17 @@ COMPRESSION_ERRORS = (zstandard.ZstdError, RuntimeError, EOFError, ValueError, M
 
 _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"  # CDR begins with a zero byte
 _LARGEST_MESSAGE = 2**31  # [byte]
+_BLOCK = 2**20  # [byte] read at once: a stated size may be wrong by any amount
 
 
 def inflate(compression: str, stored: bytes | memoryview, size: int) -> bytes:
     """Return the content of a chunk, of any number of frames; raises one of COMPRESSION_ERRORS."""
     if compression == "zstd":
         with zstandard.ZstdDecompressor().stream_reader(stored, read_across_frames=True) as stream:
-            return stream.read(size + 1)
+            return _read(stream, size + 1)
     if compression == "lz4":
         with lz4.frame.open(BytesIO(stored)) as stream:
-            return bytes(stream.read(size + 1))
+            return _read(stream, size + 1)
     if compression:
         raise ValueError(f"unknown compression {compression!r}")
     return bytes(stored)
@@ -48,3 +50,11 @@ def inflate_file(file: Path, folder: Path) -> Path:
     ):
         shutil.copyfileobj(stream, sink)
     return target
+
+
+def _read(stream: Any, size: int) -> bytes:
+    """Return up to ``size`` bytes of a decompressing stream."""
+    content = bytearray()
+    while part := stream.read(min(size - len(content), _BLOCK)):
+        content += part
+    return bytes(content)

@@ -210,15 +210,18 @@ class FileScan:
         data = inflate_message(source.encoding, records[begin + MESSAGE_HEAD.size : end])
         return ScannedMessage(source, data, log_time, publish_time, sequence)
 
-    def _defined(self, record: object) -> Iterator[Source]:
+    def _defined(self, record: object) -> Iterator[Source | Damage]:
         """Take a schema or channel, and yield the latter; the first one of a number counts."""
         if isinstance(record, Schema):
             self._schemas.setdefault(record.id, record)
-        elif isinstance(record, Channel) and record.id not in self._sources:
-            source = self._source(record)
-            if source is not None:
+        elif isinstance(record, Channel):
+            known, source = self._sources.get(record.id), self._source(record)
+            if known is None and source is not None:
                 self._sources[record.id] = source
                 yield source
+            elif known is not None and known.topic != record.topic:
+                reason = f"channel {record.id} is {known.topic}, and again {record.topic}"
+                yield Damage(self.file, self.place, self.place, reason, of_index=self._in_summary)
 
     def _source_in_summary(self, number: int) -> Source | None:
         """Return a channel that only the summary defines."""

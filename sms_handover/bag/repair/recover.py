@@ -10,7 +10,7 @@ from sms_handover.bag.files import Progress, damage_reported, files_of
 from sms_handover.bag.ledger import LEDGER_RECORD, PERIODS_RECORD, Ledger, has_ledger, periods_of
 from sms_handover.bag.mcap.damage import Damage, Hole
 from sms_handover.bag.mcap.scan import FileScan, Located, ScannedMessage, Source
-from sms_handover.bag.metadata import ROSBAG2_RECORD, counts_in_metadata
+from sms_handover.bag.metadata import ROSBAG2_RECORD
 from sms_handover.bag.repair.ledger_rebuild import LedgerRebuild
 from sms_handover.bag.repair.recovery import RECOVERY_RECORD, Recovery, TopicRecovery
 from sms_handover.bag.writer import BagWriter
@@ -32,7 +32,7 @@ def recover(source: Path, folder: Path, progress: Progress | None = None) -> Rec
     writer = BagWriter(folder, chunk_size=_CHUNK_SIZE, flush_period_ns=_NEVER_NS)
     try:
         salvage = _Salvage(writer)
-        salvage.expect(counts_in_metadata(source))
+        salvage.expect(bag.counts)
         for scan in bag.scans(progress):
             with damage_reported(scan.file):
                 salvage.take(scan)

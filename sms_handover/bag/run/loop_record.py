@@ -67,9 +67,10 @@ def read_loop(path: Path, namespace: str | None = None) -> LoopRecord:
     wall_ns = np.array(walls, dtype=np.int64)
     since = (wall_ns - wall_ns[:1]) / NS_PER_S
     arrived = Series(np.array(stamps, dtype=np.int64), since.reshape(-1, 1)).settled()
-    told = collected.series().settled()
+    reported = collected.series().settled()
     wall = arrived.values[:, 0] - arrived.values[:1, 0]
-    return LoopRecord(arrived.stamp_ns, wall, told.stamp_ns, *(np.array(column) for column in told.values.T))
+    columns = map(np.array, reported.values.T)
+    return LoopRecord(arrived.stamp_ns, wall, reported.stamp_ns, *columns)
 
 
 def _reported(message: Any) -> tuple[float, ...]:
