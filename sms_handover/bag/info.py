@@ -124,7 +124,8 @@ def read_info(path: Path) -> BagInfo:
                 channels[key] = topic
     found = sum(topic.message_count for topic in channels.values())
     if stated > found:
-        missing.append(f"{stated - found} of {stated} messages are missing, as metadata.yaml counts them")
+        text = f"{stated - found} of {stated} messages are missing, as metadata.yaml counts them"
+        (missing if bag.missing else notes).append(text)
     topics: dict[str, TopicInfo] = {}
     for topic in channels.values():
         topics.setdefault(topic.name, topic)

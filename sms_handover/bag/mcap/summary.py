@@ -32,10 +32,10 @@ _FREE = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.DATA_END)  # not i
 
 @dataclass
 class FileSummary:
-    """The content of a file but its messages: these are counted by channel.
+    """The content of a file but its messages, which are counted by channel.
 
-    Times are log times in ns, None without messages. ``chunks`` are by their number of messages, None
-    if the index cannot be used, for the reason in ``doubt``.
+    Times are log times in ns, None without messages. ``chunks`` are those of the index, None if that
+    is not used for the reason in ``doubt``; then ``damages`` are those in the file.
     """
 
     header: Header
