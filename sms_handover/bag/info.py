@@ -39,7 +39,8 @@ class TopicInfo:
 class BagInfo:
     """The content of a bag without its messages; times are log time, simulation time if recorded here.
 
-    ``channels`` has an entry per name and type, ``topics`` only the first type of each name.
+    ``channels`` has an entry for each type, encoding and definition of a topic, ``topics`` the first
+    of each name.
     ``missing`` says in words what is not read and why, ``notes`` what else is unusual.
     """
 
@@ -106,7 +107,7 @@ def read_info(path: Path) -> BagInfo:
     stated = sum(bag.counts.values())
     notes = [f"{name} is there, metadata.yaml does not list it" for name in bag.unlisted]
     summaries = []
-    channels: dict[tuple[str, str, str], TopicInfo] = {}
+    channels: dict[TopicInfo, TopicInfo] = {}
     with bag.opened() as files:
         for file in files:
             check_ends(file, path)
@@ -118,10 +119,10 @@ def read_info(path: Path) -> BagInfo:
             missing += map(str, summary.damages)
             for source, count in summary.counts.items():
                 topic = _topic(source, count)
-                key = topic.name, topic.type, topic.encoding
-                if key in channels:
-                    topic = replace(channels[key], message_count=channels[key].message_count + count)
-                channels[key] = topic
+                same = replace(topic, message_count=0, qos="")
+                first = channels.get(same, topic)
+                total = count if first is topic else first.message_count + count
+                channels[same] = replace(first, message_count=total)
     found = sum(topic.message_count for topic in channels.values())
     if stated > found:
         text = f"{stated - found} of {stated} messages are missing, as metadata.yaml counts them"

@@ -149,9 +149,8 @@ class ContentCheck:
         stamp = state.header.stamp
         how = "failed" if state.state == state.FAILED else "ended"
         findings.note(f"the run {how} at {stamp.sec + stamp.nanosec / NS_PER_S:g} s: {state.detail}")
-        silent = [
-            name for name in topics.LOOP_NODES if not any(node.endswith(name) for node in self._reporters)
-        ]
+        reporters = {node.rpartition("/")[2] for node in self._reporters}
+        silent = [name for name in topics.LOOP_NODES if name not in reporters]
         if silent:
             findings.missing(f"no published counts from {', '.join(silent)}")
 

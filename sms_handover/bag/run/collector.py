@@ -104,7 +104,7 @@ class RunCollector:
         head, tail = f"{self._prefix}/", topics.tool_pose("")
         for name in self._info.topics:
             arm = name.removeprefix(head).removesuffix(tail)
-            if name == f"{head}{arm}{tail}" and "/" not in arm:
+            if f"{head}{arm}{tail}" == name and "/" not in arm:  # else it is of another namespace
                 yield arm
 
 
