@@ -1,4 +1,4 @@
-"""Decoded messages as the values of the core; used for the topics that are not worth a fast path."""
+"""Values of the core from decoded messages, for the topics outside the hot path."""
 
 from dataclasses import replace
 from typing import Any
@@ -41,7 +41,7 @@ def time_ns(message: Any) -> int:
 
 
 def task_phase(message: Any) -> TaskPhase:
-    """Return a TaskPhase message as its value."""
+    """Return the value of a TaskPhase."""
     commands = tuple(grasp_command(command) for command in message.commands)
     phase = TaskPhase(header_ns(message), int(message.index), message.name, commands)
     if not hasattr(message, "state"):
@@ -57,7 +57,7 @@ def grasp_command(message: Any) -> GraspCommand:
 
 
 def grasp_event(message: Any) -> GraspEvent:
-    """Return a GraspEvent message as its value."""
+    """Return the value of a GraspEvent."""
     return GraspEvent(
         stamp_ns=header_ns(message),
         command=grasp_command(message.command),
@@ -70,7 +70,7 @@ def grasp_event(message: Any) -> GraspEvent:
 
 
 def run_event(message: Any) -> RunEvent:
-    """Return a RunEvent message as its value."""
+    """Return the value of a RunEvent."""
     return RunEvent(
         stamp_ns=header_ns(message),
         node=message.node,

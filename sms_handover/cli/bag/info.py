@@ -2,13 +2,13 @@
 
 import json
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from sms_handover.bag.info import BagInfo, TopicInfo, read_info
 from sms_handover.bag.ledger import ledger_table
 from sms_handover.bag.overview import overview
-from sms_handover.cli.exit_codes import EXIT_OK
+from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
 from sms_handover.launcher.run_folder import bag_of
 from sms_handover.units import NS_PER_S
 
@@ -32,7 +32,7 @@ def command(options: Namespace) -> int:
     """Run the command; return the exit code."""
     info = read_info(bag_of(options.bag))
     print(json.dumps(overview(info), indent=2) if options.json else _text(info))
-    return EXIT_OK
+    return EXIT_LOSS if info.missing else EXIT_OK
 
 
 def _text(info: BagInfo) -> str:
@@ -48,7 +48,8 @@ def _text(info: BagInfo) -> str:
         "End": _seconds(info.end_ns),
         "Messages": str(info.message_count),
     }
-    lines = [*_table(head), "", *_topics(list(info.topics.values()))]
+    lines = [*_table(head), "", *_topics(info.channels)]
+    lines += [f"MISSING  {text}" for text in info.missing] + [f"note     {text}" for text in info.notes]
     for title, part in (("Run", values["run"]), ("Made by", values["provenance"])):
         if isinstance(part, Mapping) and part:
             lines += ["", f"{title}:", *_table({f"  {name}": str(value) for name, value in part.items()})]
@@ -64,7 +65,7 @@ def _text(info: BagInfo) -> str:
     return "\n".join(lines)
 
 
-def _topics(topics: list[TopicInfo]) -> list[str]:
+def _topics(topics: Sequence[TopicInfo]) -> list[str]:
     """Return a line per topic."""
     rows = [("topic", "type", "messages", "serialization"), *map(_cells, topics)]
     widths = [max(len(row[column]) for row in rows) for column in range(3)]

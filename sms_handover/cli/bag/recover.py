@@ -69,6 +69,9 @@ def _text(result: Recovery) -> str:
         for topic in result.topics
         if topic.lost
     ]
+    lines += [f"{name} is not there, metadata.yaml lists it" for name in result.missing]
+    if result.private:
+        lines.append(f"{result.private} private records are not kept")
     if result.from_cut_chunk:
         lines.append(f"{result.from_cut_chunk} messages are out of a chunk that the end of the file cuts off")
     if result.largest_loss_ns:

@@ -19,7 +19,7 @@ from sms_handover.graph.topics import (
     SAMPLED_JOINT_STATES,
     tool_pose,
 )
-from sms_handover.messages.template import head
+from sms_handover.messages.layout import head
 from sms_handover.model.poses import pose_row
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant

@@ -7,9 +7,9 @@ from rclpy.serialization import serialize_message
 from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
 
 from sms_handover.errors import MessageError, Reason
+from sms_handover.messages.layout import head
 from sms_handover.messages.message_types import MessageTypes
 from sms_handover.messages.stamps import stamp_ns
-from sms_handover.messages.template import head
 from sms_handover.messages.values import task_phase
 from sms_handover.ros.codecs.convert import phase_message
 from sms_handover.ros.codecs.events import read_value
