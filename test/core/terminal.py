@@ -20,6 +20,11 @@ _CODE = re.compile(r"\x1b\[([0-9;?]*)([A-Za-z])|(.)", re.DOTALL)
 _TAKE_TERMINAL = "import fcntl, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0)\n"
 
 
+def _inherited() -> dict[str, str]:
+    """Return the environment without what would tell a program of another terminal's size."""
+    return {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "LINES")}
+
+
 class Terminal:
     """A new terminal, which is that of the program alone."""
 
@@ -36,7 +41,7 @@ class Terminal:
             stdout=slave,
             stderr=slave,
             start_new_session=True,
-            env={**os.environ, **environment},
+            env={**_inherited(), **environment},
         )
         self.text, self._closed = "", False
 
