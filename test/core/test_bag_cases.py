@@ -226,6 +226,15 @@ def outside() -> bytes:
     return bytes(builder.end())
 
 
+_CONTRADICTIONS = (
+    "a chunk at byte",
+    "log time",
+    "count other messages",
+    "contradict",
+    "is not as its index says",
+)
+
+
 @pytest.mark.parametrize(
     ("change", "insert", "doubt"),
     [
@@ -242,7 +251,11 @@ def outside() -> bytes:
         (changed(Statistics, message_count=1), b"", "contradict"),
         (changed(ChunkIndex, message_start_time=30), b"", "is not as its index says"),
         (changed(ChunkIndex, message_index_offsets={}), b"", "other message indexes"),
-        (lambda records: records, outside(), "a message at byte"),
+        (
+            changed(Statistics, channel_message_counts={1: 61, 2: 60}, message_count=121),
+            outside(),
+            "a message at byte",
+        ),
     ],
 )
 def test_a_summary_is_used_only_if_it_agrees_with_the_file(
@@ -257,6 +270,7 @@ def test_a_summary_is_used_only_if_it_agrees_with_the_file(
     assert len(found) == info.message_count and found == sorted(found)
     assert len(times(file, TimeSpan(0, 20))) == 5 + bool(insert)
     assert doubt in " ".join(info.notes) and bool(doubt) == bool(info.notes)
+    assert check(file).complete is (doubt not in _CONTRADICTIONS), check(file).findings
 
 
 @pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4])
