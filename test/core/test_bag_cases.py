@@ -171,6 +171,20 @@ def test_files_that_the_metadata_does_not_list_are_named(tmp_path: Path) -> None
         read_info(bag)
 
 
+def test_files_compressed_as_a_whole_are_read(tmp_path: Path) -> None:
+    """Under the listed name or with .zstd behind it, with metadata, without, and given alone; also if cut."""
+    stored = zstandard.compress((CASES / "statistics_begin_late.mcap").read_bytes())
+    (tmp_path / "b_0.mcap.zstd").write_bytes(stored)
+    assert len(times(tmp_path)) == len(times(tmp_path / "b_0.mcap.zstd")) == 12
+    text = (CASES / "message_compression" / "metadata.yaml").read_text().replace("MESSAGE", "FILE")
+    for listed in ("b_0.mcap", "b_0.mcap.zstd"):
+        (tmp_path / "metadata.yaml").write_text(text.replace("b_0.mcap", listed))
+        assert len(times(tmp_path)) == 12
+    (tmp_path / "b_0.mcap.zstd").write_bytes(stored[: len(stored) // 2])
+    with pytest.raises(BagError):
+        times(tmp_path)
+
+
 Records = list[McapRecord]
 
 
@@ -194,6 +208,12 @@ def one_chunk_less(records: Records) -> Records:
 def renamed(records: Records) -> Records:
     """Call the topic of the first channel otherwise."""
     return [replace(r, topic="/other") if isinstance(r, Channel) and r.id == 1 else r for r in records]
+
+
+def one_chunk_twice(records: Records) -> Records:
+    """Name a chunk twice in the index, with statistics that agree."""
+    chunks = [record for record in records if isinstance(record, ChunkIndex)]
+    return [*changed(Statistics, chunk_count=len(chunks) + 1)(records), chunks[0]]
 
 
 def without_schemas(records: Records) -> Records:
@@ -227,6 +247,7 @@ def outside() -> bytes:
 
 
 _CONTRADICTIONS = (
+    "names places",
     "a chunk at byte",
     "log time",
     "count other messages",
@@ -249,6 +270,7 @@ _CONTRADICTIONS = (
         (changed(Statistics, channel_message_counts={1: 60, 2: 59}), b"", "count other messages"),
         (changed(Statistics, channel_message_counts={2: 120}), b"", "count other messages"),
         (changed(Statistics, message_count=1), b"", "contradict"),
+        (one_chunk_twice, b"", "names places"),
         (changed(ChunkIndex, message_start_time=30), b"", "is not as its index says"),
         (changed(ChunkIndex, message_index_offsets={}), b"", "other message indexes"),
         (

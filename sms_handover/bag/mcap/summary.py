@@ -137,7 +137,7 @@ class _Agreement:
             elif opcode not in _FREE and opcode < PRIVATE:
                 raise _DoubtError(f"a {Opcode(opcode).name.lower()} at byte {place} is not in its index")
             place = end
-        if place != section.begin or found != len(chunks) + len(files) or header is None:
+        if place != section.begin or found != len(section.chunks) + len(section.files) or header is None:
             raise _DoubtError("its index names places where nothing is")
         return header
 
