@@ -185,6 +185,8 @@ class _Agreement:
     def _check_statistics(self) -> tuple[int | None, int | None]:
         """Check the statistics against the message indexes; return the first and last log time."""
         statistics = self._section.statistics
+        if self._section.chunks and not self._counts:
+            raise _DoubtError("it has no message indexes")
         if statistics is None or +Counter(statistics.channel_message_counts) != +self._counts:
             raise _DoubtError("its statistics count other messages than its message indexes")
         if statistics.message_count != self._counts.total():
