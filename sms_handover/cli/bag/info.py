@@ -20,8 +20,8 @@ def add_parser(parser: ArgumentParser) -> None:
     parser.formatter_class = RawDescriptionHelpFormatter
     parser.description = (
         "Print what 'ros2 bag info' prints, and what bags of sms-handover hold besides: controller,\n"
-        "schedule, versions, seed and loss ledger. No messages are read unless the summary of a file is wrong:\n"
-        "'bag check' reads everything."
+        "schedule, versions, seed and loss ledger. No messages are read unless the summary of a file is\n"
+        "wrong: 'bag check' reads everything."
     )
     parser.epilog = "exit codes: 0 ok; 3 files or messages are missing or damaged; 1 the bag cannot be read"
     parser.add_argument("bag", type=Path, metavar="BAG", help="run folder, bag folder or .mcap file")
