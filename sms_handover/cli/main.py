@@ -1,4 +1,4 @@
-"""The command line ``sms-handover``."""
+"""The main program of the command line ``sms-handover``."""
 
 import os
 import sys
@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from sms_handover import __version__
+from sms_handover.cli.exit_codes import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_USAGE
 from sms_handover.errors import ConfigurationError, SmsHandoverError
 from sms_handover.ros.process.shared_memory_check import avoid_full_shared_memory, require_shared_memory
 
@@ -17,17 +18,16 @@ _COMMANDS = {
     "figures": "draw the paper's figures from recorded runs",
     "report": "write an HTML page on recorded runs: figures, plots, claims, provenance, 3D",
     "view": "show recorded runs, or a running graph, in 3D in a browser",
-    "bag": "look into a bag, check it, recover it, take tables out of it",
+    "bag": "inspect, check, recover or export a bag",
     "reproduce": "run a bag's scenario again in one process and compare bit by bit",
     "play": "publish the messages of any MCAP bag again, with keys to control it",
     "record": "record any topics of any graph to an MCAP bag",
 }
 _WITH_ROS = ("run", "play", "record")
-_EXIT_FAILED, _EXIT_USAGE, _EXIT_INTERRUPTED = 1, 2, 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Carry out one command; return the exit code. Errors of ours are one line on standard error.
+    """Run one command; return the exit code. Errors of ours are one line on standard error.
 
     Only the module of that command is imported, so that those without ROS need no ROS.
     """
@@ -35,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = ArgumentParser(
         prog="sms-handover",
         description="A free-floating spacecraft with two arms hands a CubeSat from one arm to the other.",
-        epilog=f"commands:\n{listed}\n\n'sms-handover COMMAND --help' tells more of each.",
+        epilog=f"commands:\n{listed}\n\nSee 'sms-handover COMMAND --help'.",
         formatter_class=RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"sms-handover {__version__}")
@@ -43,30 +43,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("arguments", nargs=REMAINDER, metavar="...", help="options of the command")
     chosen = parser.parse_args(arguments)
     try:
-        return _carry_out(chosen.command, chosen.arguments)
-    except ConfigurationError as error:
-        print(f"sms-handover {chosen.command}: error: {error}", file=sys.stderr)
-        return _EXIT_USAGE
+        return _run_command(chosen.command, chosen.arguments)
     except SmsHandoverError as error:
         print(f"sms-handover {chosen.command}: error: {error}", file=sys.stderr)
-        return _EXIT_FAILED
-    except BrokenPipeError:  # whoever reads the output has seen enough, as head(1) does
+        return EXIT_USAGE if isinstance(error, ConfigurationError) else EXIT_FAILED
+    except BrokenPipeError:  # the reader of the output has ended, as head(1) does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return _EXIT_FAILED
-    except (OSError, MemoryError) as error:  # what the system refuses: files, processes, memory
+        return EXIT_FAILED
+    except (OSError, MemoryError) as error:  # of the system: files, processes, memory
         print(f"sms-handover {chosen.command}: error: {error or 'no memory left'}", file=sys.stderr)
-        return _EXIT_FAILED
+        return EXIT_FAILED
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
-        return _EXIT_INTERRUPTED
+        return EXIT_INTERRUPTED
 
 
-def _carry_out(name: str, arguments: Sequence[str]) -> int:
-    """Import the module of one command and carry it out; return the exit code."""
+def _run_command(name: str, arguments: Sequence[str]) -> int:
     if name in _WITH_ROS:
         require_shared_memory()
-        if told := avoid_full_shared_memory():
-            print(f"sms-handover {name}: {told}", file=sys.stderr)
+        if warning := avoid_full_shared_memory():
+            print(f"sms-handover {name}: {warning}", file=sys.stderr)
     module = import_module(f"sms_handover.cli.{name}")
     parser = ArgumentParser(prog=f"sms-handover {name}")
     module.add_parser(parser)

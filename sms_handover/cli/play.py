@@ -3,9 +3,9 @@
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from pathlib import Path
 
-from sms_handover.cli.closed_loop import closed_loop
 from sms_handover.cli.node_options import add_graph_options, add_topic_options, given, run_in_process
 from sms_handover.errors import ConfigurationError
+from sms_handover.launcher.closed_loop import closed_loop
 from sms_handover.launcher.run_folder import bag_of
 from sms_handover.nodes.player import KEYS
 from sms_handover.nodes.player import main as run_player
@@ -102,7 +102,7 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     options.bag = bag_of(options.bag)
     if options.closed_loop:
         of_player = given(options, {name: name for name in vars(options)}).keys() - _OF_CLOSED_LOOP

@@ -38,7 +38,7 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     if bool(options.topics or options.regex) == options.all:
         raise ConfigurationError("give either --all or some of --topics and --regex")
     return run_in_process(run_recorder, options, given(options, _PARAMETERS))

@@ -23,7 +23,7 @@ from sms_handover.ros.codecs.convert import time_message
 from sms_handover.ros.parameters import declare, reject_unknown
 from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, RunnableNode, Stop, run_node
 from sms_handover.terminal.keyboard import Key, Keyboard
-from sms_handover.terminal.status_line import StatusLine
+from sms_handover.terminal.progress import Progress
 from sms_handover.units import NS_PER_S
 
 KEYS = "space: pause or go on   right: next message   up, down: faster, slower by 10 %"
@@ -67,7 +67,7 @@ class PlayerNode(RunnableNode):
         self._clock_outlet = self.create_publisher(Clock, CLOCK, _CLOCK_DEPTH) if options.clock else None
         if self._clock_outlet:
             self.create_timer(1.0 / options.clock, self._publish_clock)
-        self._line = StatusLine()
+        self._progress = Progress()
         self._refused_since = 0.0
         self._ended = False
         offer_services(self, self._schedule, self._stop)
@@ -81,7 +81,7 @@ class PlayerNode(RunnableNode):
             try:
                 self._play(executor, stop, keyboard)
             finally:
-                self._line.stay()
+                self._progress.stay()
             print(closing_line(self._schedule, monotonic_ns()))
             missing = self._unconfirmed(stop)
         if missing:
@@ -140,14 +140,14 @@ class PlayerNode(RunnableNode):
             executor.spin_once(timeout_sec=self._idle_s())
             for key in keyboard.pressed():
                 self._on_key(key)
-            if self._line.due:
+            if self._progress.due:
                 self._show()
         self._publish_clock()
         self._show()
 
     def _show(self) -> None:
         """Show how far the playback is."""
-        self._line.show(progress_line(self._schedule, self._source.span, monotonic_ns()))
+        self._progress.show(progress_line(self._schedule, self._source.span, monotonic_ns()))
 
     def _send(self) -> None:
         """Publish what is due, for a while at most."""
@@ -172,8 +172,7 @@ class PlayerNode(RunnableNode):
             self._refused_since = now
         elif now - self._refused_since > _STUCK_S:
             self._refused_since = now
-            self._line.stay()
-            print(f"a subscriber of {topic} takes nothing; waiting for it", file=sys.stderr)
+            self._progress.print(f"a subscriber of {topic} takes nothing; waiting for it")
 
     def _idle_s(self) -> float:
         """Read ahead if there is time, and return how long to wait for events."""

@@ -18,7 +18,7 @@ from sms_handover.ros.parameters import declare, reject_unknown
 from sms_handover.ros.process.main import EXIT_FAILED, EXIT_OK, RunnableNode, Stop, run_node
 from sms_handover.ros.qos import stored, weakest
 from sms_handover.ros.transport.direct import DirectInputs
-from sms_handover.terminal.status_line import StatusLine
+from sms_handover.terminal.progress import Progress
 
 _POLL_S = 0.005  # [s] of wall time between two batches
 _LOOK_S = 0.1  # [s] of wall time between two looks for new topics
@@ -48,7 +48,7 @@ class TopicRecorderNode(RunnableNode):
             raise ConfigurationError(str(error)) from error
         self._seen: set[str] = set()
         self._inputs = DirectInputs(self)
-        self._line = StatusLine()
+        self._progress = Progress()
         self.create_timer(_LOOK_S, self.look_for_topics)
 
     @property
@@ -69,7 +69,7 @@ class TopicRecorderNode(RunnableNode):
         finally:
             self._writer.close()
             self._inputs.destroy()
-            self._line.stay()
+            self._progress.stay()
         for topic, count in self.recorded.items():
             print(f"{count:10d}  {topic}")
         print(f"{sum(self.recorded.values()):10d}  messages in {self._writer.folder}")
@@ -89,8 +89,7 @@ class TopicRecorderNode(RunnableNode):
                 kind = message_class(type_names[0])
                 self._writer.add_topic(name, type_names[0], list(dict.fromkeys(map(stored, offers))))
             except SmsHandoverError as error:
-                self._line.stay()
-                print(f"not recorded: {name}: {error}", file=sys.stderr)
+                self._progress.print(f"not recorded: {name}: {error}")
                 continue
             self._inputs.subscribe(kind, name, weakest(offers), partial(self._receive, name))
 
@@ -101,9 +100,9 @@ class TopicRecorderNode(RunnableNode):
     def _take(self) -> int:
         """Take every message that has come, and show how many there are; return how many came."""
         taken = self._inputs.poll()
-        if self._line.due:
+        if self._progress.due:
             counts = self.recorded
-            self._line.show(f"{sum(counts.values())} messages of {len(counts)} topics")
+            self._progress.show(f"{sum(counts.values())} messages of {len(counts)} topics")
         return taken
 
     def _take_the_rest(self, executor: Executor) -> None:

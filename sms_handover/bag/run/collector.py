@@ -115,7 +115,7 @@ def decoder(info: BagInfo, name: str, take: Callable[[Any], None]) -> Callable[[
     def decode(data: bytes) -> None:
         try:
             take(None if types is None else types.decode(data))
-        except (AttributeError, IndexError) as error:
+        except (AttributeError, KeyError) as error:
             raise BagError(f"{info.path}: {name} is not as this version knows it: {error}") from error
 
     return decode

@@ -9,7 +9,7 @@ from sms_handover.cli.exit_codes import EXIT_OK
 from sms_handover.export.export import CSV, FORMATS, export
 from sms_handover.export.selection import Selection
 from sms_handover.launcher.run_folder import bag_of
-from sms_handover.terminal.progress import ProgressLine
+from sms_handover.terminal.progress import byte_progress
 
 
 def add_parser(parser: ArgumentParser) -> None:
@@ -36,10 +36,10 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     choice = TopicChoice(tuple(options.topics), options.regex, tuple(options.exclude_topics))
     selection = Selection(choice, options.start, options.end)
-    with ProgressLine("exporting") as progress:
+    with byte_progress("exporting") as progress:
         result = export(
             bag_of(options.bag),
             options.output,

@@ -29,7 +29,7 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     info = read_info(bag_of(options.bag))
     print(json.dumps(overview(info), indent=2) if options.json else _text(info))
     return EXIT_LOSS if info.missing else EXIT_OK

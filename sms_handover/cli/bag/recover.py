@@ -9,7 +9,7 @@ from sms_handover.bag.repair.recover import recover
 from sms_handover.bag.repair.recovery import Recovery
 from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
 from sms_handover.launcher.run_folder import bag_of
-from sms_handover.terminal.progress import ProgressLine
+from sms_handover.terminal.progress import byte_progress
 from sms_handover.units import NS_PER_S
 
 _MOST = 20  # places of damage that are listed
@@ -33,10 +33,10 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     path = bag_of(options.bag)
     output = options.output or _beside(path)
-    with ProgressLine("recovering") as progress:
+    with byte_progress("recovering") as progress:
         result = recover(path, output, progress)
     print(json.dumps(_values(result), indent=2) if options.json else _text(result))
     return EXIT_OK if result.clean else EXIT_LOSS
