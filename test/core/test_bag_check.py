@@ -223,8 +223,8 @@ def bomb(key: str) -> str:
     ("text", "told"),
     [
         ("#" * (LARGEST_METADATA + 1), f"more than {LARGEST_METADATA} bytes"),
-        (bomb("relative_file_paths"), "written out it is too large"),
-        ("a: " + "[" * 100_000, "more than 32 levels"),
+        (bomb("relative_file_paths"), "too large with its aliases expanded"),
+        ("a: " + "[" * 100_000, "more than 32 nested"),
     ],
     ids=["too much", "a bomb of aliases", "levels"],
 )
