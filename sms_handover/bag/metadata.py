@@ -119,8 +119,8 @@ def files_in_metadata(bag: Path) -> FileList:
 
 
 def _listed(bag: Path, name: str) -> Path | None:
-    """Return a listed file: by its path in the bag, or as of old rosbag2 versions beside the metadata."""
-    for file in (bag / name, bag / Path(name).name):
+    """Return a listed file: by its path in the bag, as of old rosbag2 versions beside it, or compressed."""
+    for file in (bag / name, bag / Path(name).name, bag / f"{Path(name).name}.zstd"):
         if file.exists() and file.resolve().is_relative_to(bag.resolve()):
             return file
     return None

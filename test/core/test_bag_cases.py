@@ -171,6 +171,20 @@ def test_files_that_the_metadata_does_not_list_are_named(tmp_path: Path) -> None
         read_info(bag)
 
 
+def test_files_compressed_as_a_whole_are_read(tmp_path: Path) -> None:
+    """Under the listed name or with .zstd behind it, with metadata, without, and given alone; also if cut."""
+    stored = zstandard.compress((CASES / "statistics_begin_late.mcap").read_bytes())
+    (tmp_path / "b_0.mcap.zstd").write_bytes(stored)
+    assert len(times(tmp_path)) == len(times(tmp_path / "b_0.mcap.zstd")) == 12
+    text = (CASES / "message_compression" / "metadata.yaml").read_text().replace("MESSAGE", "FILE")
+    for listed in ("b_0.mcap", "b_0.mcap.zstd"):
+        (tmp_path / "metadata.yaml").write_text(text.replace("b_0.mcap", listed))
+        assert len(times(tmp_path)) == 12
+    (tmp_path / "b_0.mcap.zstd").write_bytes(stored[: len(stored) // 2])
+    with pytest.raises(BagError):
+        times(tmp_path)
+
+
 Records = list[McapRecord]
 
 
@@ -194,6 +208,12 @@ def one_chunk_less(records: Records) -> Records:
 def renamed(records: Records) -> Records:
     """Call the topic of the first channel otherwise."""
     return [replace(r, topic="/other") if isinstance(r, Channel) and r.id == 1 else r for r in records]
+
+
+def one_chunk_twice(records: Records) -> Records:
+    """Name a chunk twice in the index, with statistics that agree."""
+    chunks = [record for record in records if isinstance(record, ChunkIndex)]
+    return [*changed(Statistics, chunk_count=len(chunks) + 1)(records), chunks[0]]
 
 
 def without_schemas(records: Records) -> Records:
@@ -226,6 +246,16 @@ def outside() -> bytes:
     return bytes(builder.end())
 
 
+_CONTRADICTIONS = (
+    "names places",
+    "a chunk at byte",
+    "log time",
+    "count other messages",
+    "contradict",
+    "is not as its index says",
+)
+
+
 @pytest.mark.parametrize(
     ("change", "insert", "doubt"),
     [
@@ -240,9 +270,14 @@ def outside() -> bytes:
         (changed(Statistics, channel_message_counts={1: 60, 2: 59}), b"", "count other messages"),
         (changed(Statistics, channel_message_counts={2: 120}), b"", "count other messages"),
         (changed(Statistics, message_count=1), b"", "contradict"),
+        (one_chunk_twice, b"", "names places"),
         (changed(ChunkIndex, message_start_time=30), b"", "is not as its index says"),
         (changed(ChunkIndex, message_index_offsets={}), b"", "other message indexes"),
-        (lambda records: records, outside(), "a message at byte"),
+        (
+            changed(Statistics, channel_message_counts={1: 61, 2: 60}, message_count=121),
+            outside(),
+            "a message at byte",
+        ),
     ],
 )
 def test_a_summary_is_used_only_if_it_agrees_with_the_file(
@@ -257,6 +292,7 @@ def test_a_summary_is_used_only_if_it_agrees_with_the_file(
     assert len(found) == info.message_count and found == sorted(found)
     assert len(times(file, TimeSpan(0, 20))) == 5 + bool(insert)
     assert doubt in " ".join(info.notes) and bool(doubt) == bool(info.notes)
+    assert check(file).complete is (doubt not in _CONTRADICTIONS), check(file).findings
 
 
 @pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4])

@@ -137,7 +137,7 @@ class _Agreement:
             elif opcode not in _FREE and opcode < PRIVATE:
                 raise _DoubtError(f"a {Opcode(opcode).name.lower()} at byte {place} is not in its index")
             place = end
-        if place != section.begin or found != len(chunks) + len(files) or header is None:
+        if place != section.begin or found != len(section.chunks) + len(section.files) or header is None:
             raise _DoubtError("its index names places where nothing is")
         return header
 
@@ -185,6 +185,8 @@ class _Agreement:
     def _check_statistics(self) -> tuple[int | None, int | None]:
         """Check the statistics against the message indexes; return the first and last log time."""
         statistics = self._section.statistics
+        if self._section.chunks and not self._counts:
+            raise _DoubtError("it has no message indexes")
         if statistics is None or +Counter(statistics.channel_message_counts) != +self._counts:
             raise _DoubtError("its statistics count other messages than its message indexes")
         if statistics.message_count != self._counts.total():

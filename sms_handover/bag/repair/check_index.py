@@ -30,6 +30,8 @@ class IndexCheck:
 
     def message(self, message: ScannedMessage) -> None:
         """Take a message."""
+        if self._indexed:  # it is outside of chunks
+            self._end_chunk()
         topic, time_ns = message.source.topic, message.log_time_ns
         self._counts[topic] += 1
         self._in_chunk[topic, time_ns] += 1
@@ -91,6 +93,8 @@ class IndexCheck:
         for channel, count in statistics.channel_message_counts.items():
             counts[scan.topic_of(channel)] += count
         stated.add("statistics", counts)
+        if statistics.message_count != counts.total():
+            findings.damaged(f"{scan.file.name}: its statistics contradict themselves")
         span = (statistics.message_start_time, statistics.message_end_time)
         if self._first_ns is not None and counts == self._counts and span != (self._first_ns, self._last_ns):
             findings.damaged(f"{scan.file.name}: its statistics have another first or last log time")

@@ -20,10 +20,10 @@ def add_parser(parser: ArgumentParser) -> None:
     parser.formatter_class = RawDescriptionHelpFormatter
     parser.description = (
         "Print what 'ros2 bag info' prints, and what bags of sms-handover hold besides: controller,\n"
-        "schedule, versions, seed and loss ledger. Only the ends of the files are read:\n"
-        "'bag check' looks at the rest."
+        "schedule, versions, seed and loss ledger. No messages are read unless the summary of a file is\n"
+        "wrong: 'bag check' reads everything."
     )
-    parser.epilog = "exit codes: 0 ok; 1 the bag cannot be read"
+    parser.epilog = "exit codes: 0 ok; 3 files or messages are missing or damaged; 1 the bag cannot be read"
     parser.add_argument("bag", type=Path, metavar="BAG", help="run folder, bag folder or .mcap file")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
@@ -49,7 +49,8 @@ def _text(info: BagInfo) -> str:
         "Messages": str(info.message_count),
     }
     lines = [*_table(head), "", *_topics(info.channels)]
-    lines += [f"MISSING  {text}" for text in info.missing] + [f"note     {text}" for text in info.notes]
+    found = [*(f"MISSING  {text}" for text in info.missing), *(f"note     {text}" for text in info.notes)]
+    lines += ["", *found] if found else []
     for title, part in (("Run", values["run"]), ("Made by", values["provenance"])):
         if isinstance(part, Mapping) and part:
             lines += ["", f"{title}:", *_table({f"  {name}": str(value) for name, value in part.items()})]
