@@ -1,4 +1,4 @@
-"""The command line ``sms-handover``."""
+"""Main program: the command line ``sms-handover``."""
 
 import os
 import sys
@@ -15,27 +15,27 @@ _COMMANDS = {
     "simulate": "run it in one process, without ROS",
     "compare": "print recorded runs side by side, with the paper's claims",
     "figures": "draw the paper's figures from recorded runs",
-    "report": "write an HTML page on recorded runs: figures, plots, claims, provenance, 3D",
+    "report": "write an HTML page about recorded runs: figures, plots, claims, provenance, 3D",
     "view": "show recorded runs, or a running graph, in 3D in a browser",
-    "bag": "look into a bag, check it, recover it, take tables out of it",
+    "bag": "inspect, check, recover or export a bag",
     "reproduce": "run a bag's scenario again in one process and compare bit by bit",
-    "play": "publish the messages of any MCAP bag again, with keys to control it",
-    "record": "record any topics of any graph to an MCAP bag",
+    "play": "publish the messages of any MCAP bag, with keys to control it",
+    "record": "record topics of any graph to an MCAP bag",
 }
 _WITH_ROS = ("run", "play", "record")
 _EXIT_FAILED, _EXIT_USAGE, _EXIT_INTERRUPTED = 1, 2, 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Carry out one command; return the exit code. Errors of ours are one line on standard error.
+    """Run one command; return the exit code. Our errors are one line on standard error.
 
-    Only the module of that command is imported, so that those without ROS need no ROS.
+    Only the module of that command is imported, so that commands without ROS need no ROS.
     """
     listed = "\n".join(f"  {name:<10} {text}" for name, text in _COMMANDS.items())
     parser = ArgumentParser(
         prog="sms-handover",
         description="A free-floating spacecraft with two arms hands a CubeSat from one arm to the other.",
-        epilog=f"commands:\n{listed}\n\n'sms-handover COMMAND --help' tells more of each.",
+        epilog=f"commands:\n{listed}\n\n'sms-handover COMMAND --help' describes each.",
         formatter_class=RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"sms-handover {__version__}")
@@ -43,30 +43,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("arguments", nargs=REMAINDER, metavar="...", help="options of the command")
     chosen = parser.parse_args(arguments)
     try:
-        return _carry_out(chosen.command, chosen.arguments)
-    except ConfigurationError as error:
-        print(f"sms-handover {chosen.command}: error: {error}", file=sys.stderr)
-        return _EXIT_USAGE
-    except SmsHandoverError as error:
-        print(f"sms-handover {chosen.command}: error: {error}", file=sys.stderr)
-        return _EXIT_FAILED
-    except BrokenPipeError:  # whoever reads the output has seen enough, as head(1) does
+        return _run(chosen.command, chosen.arguments)
+    except BrokenPipeError:  # the reader has closed the pipe, as head(1) does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return _EXIT_FAILED
-    except (OSError, MemoryError) as error:  # what the system refuses: files, processes, memory
-        print(f"sms-handover {chosen.command}: error: {error or 'no memory left'}", file=sys.stderr)
-        return _EXIT_FAILED
+    except (SmsHandoverError, OSError, MemoryError) as error:
+        print(f"sms-handover {chosen.command}: error: {error or 'out of memory'}", file=sys.stderr)
+        return _EXIT_USAGE if isinstance(error, ConfigurationError) else _EXIT_FAILED
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return _EXIT_INTERRUPTED
 
 
-def _carry_out(name: str, arguments: Sequence[str]) -> int:
-    """Import the module of one command and carry it out; return the exit code."""
+def _run(name: str, arguments: Sequence[str]) -> int:
+    """Import the module of one command and run it; return the exit code."""
     if name in _WITH_ROS:
         require_shared_memory()
-        if told := avoid_full_shared_memory():
-            print(f"sms-handover {name}: {told}", file=sys.stderr)
+        if warning := avoid_full_shared_memory():
+            print(f"sms-handover {name}: {warning}", file=sys.stderr)
     module = import_module(f"sms_handover.cli.{name}")
     parser = ArgumentParser(prog=f"sms-handover {name}")
     module.add_parser(parser)
@@ -76,7 +70,7 @@ def _carry_out(name: str, arguments: Sequence[str]) -> int:
 
 
 def run_main() -> int:
-    """Carry out ``sms-handover run``, for ``ros2 run sms_handover handover``."""
+    """Run ``sms-handover run``, for ``ros2 run sms_handover handover``."""
     return main(["run", *sys.argv[1:]])
 
 

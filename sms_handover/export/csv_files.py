@@ -1,4 +1,4 @@
-"""Tables as CSV (RFC 4180), every number with as many digits as it takes to read the same bits again."""
+"""CSV files (RFC 4180); numbers have enough digits to read back bit for bit."""
 
 import base64
 import csv
@@ -9,7 +9,7 @@ from typing import Any
 
 from sms_handover.export.table import Column, Format, Kind, ListOf, StructOf, TableFile
 
-_PLAIN = {"string", "float32", "float64"}  # written as they are; csv writes the shortest exact float
+_PLAIN = {"string", "float32", "float64"}  # written as is; csv writes the shortest exact float
 
 
 class CsvFormat(Format):
@@ -21,7 +21,7 @@ class CsvFormat(Format):
         self._folder = folder
 
     def open(self, stem: str, columns: Sequence[Column]) -> TableFile:
-        """Create the file of a table, with the names of the columns in its first line."""
+        """Create the file of a table, with the column names in its first line."""
         return _CsvFile(self._folder / f"{stem}{self.suffix}", columns)
 
 
@@ -55,7 +55,7 @@ class _CsvFile(TableFile):
 
 
 def _cell(value: Any, kind: Kind) -> str:
-    """Return a value that is no number or text as a cell: lists and structs as JSON, bytes as base64."""
+    """Return a list or struct as JSON, bytes as base64, a bool as true or false."""
     if isinstance(kind, ListOf | StructOf):
         return json.dumps(_plain(value), ensure_ascii=False)
     if kind == "binary":
@@ -64,7 +64,7 @@ def _cell(value: Any, kind: Kind) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value with bytes as base64 in it."""
+    """Return a value with its bytes as base64."""
     if isinstance(value, bytes):
         return base64.b64encode(value).decode("ascii")
     if isinstance(value, list):

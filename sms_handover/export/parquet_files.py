@@ -1,6 +1,6 @@
-"""Tables as Parquet, with the unit of each column in its metadata; needs pyarrow."""
+"""Parquet files, with the unit of each column in its metadata; needs pyarrow."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -10,22 +10,22 @@ from sms_handover.export.table import Column, Format, Kind, ListOf, StructOf, Ta
 
 
 class ParquetFormat(Format):
-    """Parquet files in a folder; ``metadata`` goes into each of them."""
+    """Parquet files in a folder, with the name of the bag in their metadata."""
 
     suffix = ".parquet"
 
-    def __init__(self, folder: Path, metadata: Mapping[str, str]) -> None:
+    def __init__(self, folder: Path, bag: str) -> None:
         """Write to ``folder``; raises ConfigurationError if pyarrow is not installed."""
         try:
             self._arrow: Any = import_module("pyarrow")
             self._parquet: Any = import_module("pyarrow.parquet")
         except ImportError as error:
             raise ConfigurationError(
-                "Parquet files need pyarrow, which is not installed: pip install 'sms_handover[parquet]', "
+                "Parquet needs pyarrow, which is not installed: pip install 'sms_handover[parquet]', "
                 "or export with --format csv"
             ) from error
         self._folder = folder
-        self._metadata = dict(metadata)
+        self._metadata = {"bag": bag}
 
     def open(self, stem: str, columns: Sequence[Column]) -> TableFile:
         """Create the file of a table."""
@@ -41,7 +41,7 @@ class ParquetFormat(Format):
         return _ParquetFile(arrow, self._parquet.ParquetWriter(path, schema, compression="zstd"), schema)
 
     def _type(self, kind: Kind) -> Any:
-        """Return a kind as a type of Arrow."""
+        """Return the Arrow type of a kind."""
         arrow = self._arrow
         if isinstance(kind, ListOf):
             return arrow.list_(self._type(kind.item))

@@ -1,4 +1,4 @@
-"""The node that records any topics, of any graph."""
+"""Topic recorder node: records topics of any graph."""
 
 import sys
 from collections.abc import Sequence
@@ -20,21 +20,21 @@ from sms_handover.ros.qos import stored, weakest
 from sms_handover.ros.transport.direct import DirectInputs
 from sms_handover.terminal.status_line import StatusLine
 
-_POLL_S = 0.005  # [s] of wall time between two batches
-_LOOK_S = 0.1  # [s] of wall time between two looks for new topics
-_QUIET_S = 0.2  # [s] of wall time without a message after which nothing is on the way any more
-_REST_S = 5.0  # [s] of wall time at most to wait for that
+_POLL_S = 0.005  # [s] of wall time between polls for messages
+_DISCOVERY_S = 0.1  # [s] of wall time between polls for new topics
+_QUIET_S = 0.2  # [s] of wall time without a message after which none is on the way
+_DRAIN_S = 5.0  # [s] of wall time to wait for that at most
 
 
 class TopicRecorderNode(RunnableNode):
-    """Writes the messages of any topics, as they come, to a rosbag2 MCAP bag.
+    """Writes messages as they arrive to a rosbag2 MCAP bag.
 
-    The log time of a message is the wall time at which it was sent, so that topics keep their order
-    among each other, whichever is taken from the middleware first.
+    The log time of a message is the wall time at which it was sent, so that the order across topics does
+    not depend on which is taken from the middleware first.
     """
 
     def __init__(self) -> None:
-        """Create the bag; raises ConfigurationError if it cannot, or on a bad parameter."""
+        """Create the bag; raises ConfigurationError if it cannot be, or on a bad parameter."""
         super().__init__(TOPIC_RECORDER, automatically_declare_parameters_from_overrides=True)
         self.parameters: TopicRecorderParameters = declare(
             self, TopicRecorderParameters, "topic_recorder.yaml", TOPIC_RECORDER
@@ -49,23 +49,23 @@ class TopicRecorderNode(RunnableNode):
         self._seen: set[str] = set()
         self._inputs = DirectInputs(self)
         self._line = StatusLine()
-        self.create_timer(_LOOK_S, self.look_for_topics)
+        self.create_timer(_DISCOVERY_S, self.discover_topics)
 
     @property
     def recorded(self) -> dict[str, int]:
-        """Return how many messages have been recorded, by topic."""
+        """Return the number of messages recorded by topic."""
         return self._writer.message_counts
 
     def run(self, executor: Executor, stop: Stop) -> int:
-        """Record until asked to stop, or for the time asked for; close the bag."""
+        """Record until stopped or for the given duration, and close the bag."""
         begin = monotonic()
         duration_s = self.parameters.duration
-        print(f"recording to {self._writer.folder}; interrupt to end", file=sys.stderr)
+        print(f"recording to {self._writer.folder}; Ctrl-C to stop", file=sys.stderr)
         try:
             while not stop.asked and not (duration_s and monotonic() - begin > duration_s):
                 executor.spin_once(timeout_sec=_POLL_S)
-                self._take()
-            self._take_the_rest(executor)
+                self._poll()
+            self._drain(executor)
         finally:
             self._writer.close()
             self._inputs.destroy()
@@ -75,8 +75,8 @@ class TopicRecorderNode(RunnableNode):
         print(f"{sum(self.recorded.values()):10d}  messages in {self._writer.folder}")
         return EXIT_OK if self.recorded else EXIT_FAILED
 
-    def look_for_topics(self) -> None:
-        """Record the chosen topics that have appeared, with the quality of service that is offered."""
+    def discover_topics(self) -> None:
+        """Subscribe to the chosen topics that have appeared, with the QoS they are offered with."""
         for name, type_names in self.get_topic_names_and_types():
             if name in self._seen or not self._choice.wants(name):
                 continue
@@ -92,25 +92,25 @@ class TopicRecorderNode(RunnableNode):
                 self._line.stay()
                 print(f"not recorded: {name}: {error}", file=sys.stderr)
                 continue
-            self._inputs.subscribe(kind, name, weakest(offers), partial(self._receive, name))
+            self._inputs.subscribe(kind, name, weakest(offers), partial(self._on_message, name))
 
-    def _receive(self, name: str, data: bytes, sent_ns: int, publisher: bytes) -> None:
-        """Record one message that was sent at a wall-clock time."""
+    def _on_message(self, name: str, data: bytes, sent_ns: int, publisher: bytes) -> None:
+        """Record one message."""
         self._writer.write(name, data, sent_ns, sent_ns)
 
-    def _take(self) -> int:
-        """Take every message that has come, and show how many there are; return how many came."""
+    def _poll(self) -> int:
+        """Take the messages that have arrived and show the progress; return their number."""
         taken = self._inputs.poll()
         if self._line.due:
             counts = self.recorded
             self._line.show(f"{sum(counts.values())} messages of {len(counts)} topics")
         return taken
 
-    def _take_the_rest(self, executor: Executor) -> None:
-        """Take what is on the way; a graph that goes on is left alone."""
+    def _drain(self, executor: Executor) -> None:
+        """Take the messages that are on the way."""
         begin = last = monotonic()
-        while monotonic() - last < _QUIET_S and monotonic() - begin < _REST_S:
-            if self._take():
+        while monotonic() - last < _QUIET_S and monotonic() - begin < _DRAIN_S:
+            if self._poll():
                 last = monotonic()
             executor.spin_once(timeout_sec=_POLL_S)
 

@@ -146,7 +146,7 @@ def test_a_range_of_time_has_both_its_ends(tmp_path: Path) -> None:
     chosen = Selection(TopicChoice(("joint_states",)), 0.02, 0.04)
     result = export(bag, tmp_path / "b", CSV, chosen)
     assert result.rows == {"joint_states": 21}
-    with pytest.raises(ConfigurationError, match="the range from 2 s to 1 s holds nothing"):
+    with pytest.raises(ConfigurationError, match="the range from 2 s to 1 s is empty"):
         Selection(start=2.0, end=1.0)
 
 
@@ -306,11 +306,11 @@ def test_a_damaged_bag_is_refused_and_leaves_nothing(tmp_path: Path, damage: str
 def test_wrong_use_is_told(tmp_path: Path) -> None:
     write_file(tmp_path / "a.mcap")
     (tmp_path / "out").mkdir()
-    with pytest.raises(ConfigurationError, match="exists already"):
+    with pytest.raises(ConfigurationError, match="exists, choose another"):
         export(tmp_path / "a.mcap", tmp_path / "out", CSV, EVERYTHING)
     with pytest.raises(ConfigurationError, match="has no topic /absent; it has /text, /joints, /none"):
         export(tmp_path / "a.mcap", tmp_path / "new", CSV, Selection(TopicChoice(("absent",))))
-    with pytest.raises(ConfigurationError, match="cannot be made: No such file"):
+    with pytest.raises(ConfigurationError, match=r"cannot create .*: No such file"):
         export(tmp_path / "a.mcap", tmp_path / "no" / "new", CSV, EVERYTHING)
 
 

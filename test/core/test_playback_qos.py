@@ -102,9 +102,9 @@ def test_a_text_that_is_no_profile_is_as_good_as_none(text: str) -> None:
     ("policies", "told"),
     [
         ({"history": "keep_some"}, "unknown value 'keep_some'.*keep_last"),
-        ({"depth": -1}, "depth is -1, expected a whole number of at least 0"),
-        ({"deadline": 5}, "deadline is 5, expected a mapping with sec and nsec"),
-        ({"deadline": {"sec": 1, "nsec": 0.5}}, "nsec is 0.5, expected a whole number"),
+        ({"depth": -1}, "depth is -1, must be an integer >= 0"),
+        ({"deadline": 5}, "deadline is 5, must be a mapping with sec and nsec"),
+        ({"deadline": {"sec": 1, "nsec": 0.5}}, "nsec is 0.5, must be an integer"),
         ({"colour": "red"}, "there: unknown policy 'colour'"),
     ],
 )

@@ -66,7 +66,7 @@ def test_the_span_is_what_was_asked_for(bag: Path) -> None:
     assert span_of(info, 2.5, 3.0) == TimeSpan(7.5 * S, 10.5 * S)
     assert span_of(info, 2.5, 99.0) == TimeSpan(7.5 * S, 15 * S)
     assert span_of(info, 10.0, 0.0) == TimeSpan(15 * S, 15 * S)
-    with pytest.raises(ConfigurationError, match=r"start offset is 10\.1 s, allowed is up to 10 s"):
+    with pytest.raises(ConfigurationError, match=r"start offset is 10\.1 s, must be <= 10 s"):
         span_of(info, 10.1, 0.0)
 
 

@@ -1,4 +1,4 @@
-"""``sms-handover bag info``: what a bag holds."""
+"""``sms-handover bag info``: show the contents of a bag."""
 
 import json
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
@@ -16,27 +16,26 @@ _BYTES_PER_MIB = 2**20
 
 
 def add_parser(parser: ArgumentParser) -> None:
-    """Describe the command."""
+    """Add the options."""
     parser.formatter_class = RawDescriptionHelpFormatter
     parser.description = (
-        "Print what 'ros2 bag info' prints, and what bags of sms-handover hold besides: controller,\n"
-        "schedule, versions, seed and loss ledger. Only the ends of the files are read:\n"
-        "'bag check' looks at the rest."
+        "Print what 'ros2 bag info' prints, and controller, schedule, versions, seed and loss ledger of a\n"
+        "bag of sms-handover. Only the summaries of the files are read; 'bag check' reads all of it."
     )
-    parser.epilog = "exit codes: 0 ok; 1 the bag cannot be read"
+    parser.epilog = "exit codes: 0 ok; 1 unreadable bag"
     parser.add_argument("bag", type=Path, metavar="BAG", help="run folder, bag folder or .mcap file")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     info = read_info(bag_of(options.bag))
     print(json.dumps(overview(info), indent=2) if options.json else _text(info))
     return EXIT_OK
 
 
 def _text(info: BagInfo) -> str:
-    """Return what a bag holds as lines of text."""
+    """Return the contents of a bag as text."""
     values = overview(info)
     head = {
         "Files": ", ".join(file.name for file in info.files),
@@ -57,7 +56,7 @@ def _text(info: BagInfo) -> str:
         lines += ["", f"Attachments: {files}"]
     lines += ["", f"Records: {', '.join(info.records) or 'none'}"]
     if info.ledger is None:
-        lines += ["", "Loss ledger: none, the bag was not recorded by sms-handover"]
+        lines += ["", "Loss ledger: none, not recorded by sms-handover"]
     else:
         verdict = "complete" if info.ledger.complete else "NOT complete"
         lines += ["", f"Loss ledger, {verdict}:", ledger_table(info.ledger)]
@@ -66,7 +65,8 @@ def _text(info: BagInfo) -> str:
 
 def _topics(topics: list[TopicInfo]) -> list[str]:
     """Return a line per topic."""
-    rows = [("topic", "type", "messages", "serialization"), *map(_cells, topics)]
+    cells = [(topic.name, topic.type or "-", str(topic.message_count), topic.encoding) for topic in topics]
+    rows = [("topic", "type", "messages", "serialization"), *cells]
     widths = [max(len(row[column]) for row in rows) for column in range(3)]
     return [
         f"{name:<{widths[0]}}  {kind:<{widths[1]}}  {count:>{widths[2]}}  {encoding}".rstrip()
@@ -74,13 +74,8 @@ def _topics(topics: list[TopicInfo]) -> list[str]:
     ]
 
 
-def _cells(topic: TopicInfo) -> tuple[str, str, str, str]:
-    """Return the cells of a topic."""
-    return topic.name, topic.type or "-", str(topic.message_count), topic.encoding
-
-
 def _seconds(time_ns: int) -> str:
-    """Return a time in s with every nanosecond, which a float would not hold of a wall clock."""
+    """Return a time in s with all nanoseconds, which a float of wall time would not hold."""
     return f"{time_ns // NS_PER_S}.{time_ns % NS_PER_S:09d} s"
 
 

@@ -1,7 +1,6 @@
-"""Publishers for the topics of a bag: with the recorded quality of service, and never dropping a message."""
+"""Publishers for the topics of a bag: with the recorded QoS, and without dropping messages."""
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from rclpy.duration import Duration, Infinite
@@ -26,34 +25,26 @@ from sms_handover.ros.qos import serves
 
 _RclError = rclpy_implementation.RCLError
 
-_LATCHED_DEPTH = 100  # [messages] kept at most where the bag does not tell how many the publisher kept
-_ACK_POLL = Duration(seconds=0.02)  # of wall time to wait for room before services and keys are served
-
-
-@dataclass(frozen=True)
-class Skipped:
-    """A topic that cannot be played, and why."""
-
-    topic: str
-    reason: str
+_LATCHED_DEPTH = 100  # [messages] kept at most if the bag does not tell the depth
+_ACK_POLL = Duration(seconds=0.02)  # of wall time between services and keys
 
 
 class BagPublisher:
-    """The publisher of one topic of a bag; ``in_force`` messages of it reach a subscriber that comes late."""
+    """Publisher of one topic of a bag; a late subscriber receives ``kept`` messages of it."""
 
     def __init__(self, node: Node, topic: TopicInfo, offer: Offer) -> None:
         """Advertise the topic; raises GraphError if its type is not installed."""
         self.name = topic.name
         self.profile = profile_for(offer, topic.message_count)
         self._depth = self.profile.depth if offer.latched else 0
-        self.in_force = (self._depth or topic.message_count) if offer.latched else 0
+        self.kept = (self._depth or topic.message_count) if offer.latched else 0
         self._reliable = offer.reliability is Reliability.RELIABLE
         self._publisher = node.create_publisher(message_class(topic.type), topic.name, self.profile)
-        self._unconfirmed = 0
+        self._unacknowledged = 0
 
     @property
     def topic_name(self) -> str:
-        """Return the name on the graph, remapped."""
+        """Return the name on the graph, after remapping."""
         return str(self._publisher.topic_name)
 
     @property
@@ -62,42 +53,42 @@ class BagPublisher:
         return int(self._publisher.get_subscription_count())
 
     def publish(self, data: bytes) -> bool:
-        """Publish CDR bytes; tells False, with nothing published, while a subscriber is too far behind.
+        """Publish CDR bytes; return False, with nothing published, while a subscriber is too far behind.
 
-        A volatile topic has KEEP_ALL history, whose full queue refuses the message. A latched one keeps
-        the last few, so before it would replace one that somebody has not got it waits for all.
+        A volatile topic has KEEP_ALL history, whose full queue rejects the message. A latched one keeps
+        the latest few, so it waits for all acknowledgements before it would replace one of them.
         """
-        if self._depth and self._reliable and self._unconfirmed >= self._depth:
-            if not self.confirmed(_ACK_POLL):
+        if self._depth and self._reliable and self._unacknowledged >= self._depth:
+            if not self.acknowledged(_ACK_POLL):
                 return False
-            self._unconfirmed = 0
+            self._unacknowledged = 0
         try:
             self._publisher.publish(data)
         except _RclError:
             return False
-        self._unconfirmed += 1
+        self._unacknowledged += 1
         return True
 
-    def confirmed(self, patience: Duration) -> bool:
-        """Wait until every matched subscriber has confirmed all; tells False when the patience is over."""
-        return bool(self._publisher.wait_for_all_acked(patience))
+    def acknowledged(self, timeout: Duration) -> bool:
+        """Wait for all acknowledgements; return False after the timeout."""
+        return bool(self._publisher.wait_for_all_acked(timeout))
 
     def waits_for_match(self, node: Node) -> bool:
-        """Whether a subscription is known that can match and has not yet."""
-        asked = node.get_subscriptions_info_by_topic(self.topic_name)
-        return self.subscription_count < sum(serves(self.profile, item.qos_profile) for item in asked)
+        """Whether a compatible subscription is known that has not matched yet."""
+        known = node.get_subscriptions_info_by_topic(self.topic_name)
+        return self.subscription_count < sum(serves(self.profile, item.qos_profile) for item in known)
 
 
 def make_publishers(
     node: Node, topics: Iterable[TopicInfo], overrides: Mapping[str, Mapping[str, Any]]
-) -> tuple[dict[str, BagPublisher], list[Skipped]]:
-    """Return a publisher for each topic that can be played, by recorded name, and the others with reasons.
+) -> tuple[dict[str, BagPublisher], dict[str, str]]:
+    """Return the publishers by recorded topic, and the reasons by topic that cannot be played.
 
-    ``overrides`` are policies by topic that replace the recorded ones.
+    ``overrides`` are QoS policies by topic that replace the recorded ones.
     """
     types = MessageTypes()
     publishers: dict[str, BagPublisher] = {}
-    skipped = []
+    skipped: dict[str, str] = {}
     for topic in topics:
         try:
             _check(topic, types)
@@ -105,12 +96,12 @@ def make_publishers(
             offer = with_policies(read_offer(topic.qos), overrides.get(topic.name, {}), where)
             publishers[topic.name] = BagPublisher(node, topic, offer)
         except GraphError as error:
-            skipped.append(Skipped(topic.name, str(error)))
+            skipped[topic.name] = str(error)
     return publishers, skipped
 
 
 def profile_for(offer: Offer, message_count: int) -> QoSProfile:
-    """Return the profile to publish with: the recorded one, with a history in which nothing is dropped."""
+    """Return the recorded profile with a history that drops nothing."""
     history, depth = QoSHistoryPolicy.KEEP_ALL, 0
     if offer.latched and offer.history is not History.KEEP_ALL:
         known = offer.history is History.KEEP_LAST and offer.depth > 0
@@ -129,17 +120,17 @@ def profile_for(offer: Offer, message_count: int) -> QoSProfile:
 
 
 def without_subscriber(publishers: Collection[BagPublisher]) -> list[str]:
-    """Return the topics that nobody listens to."""
+    """Return the topics without a subscriber."""
     return [publisher.topic_name for publisher in publishers if publisher.subscription_count == 0]
 
 
 def _check(topic: TopicInfo, types: MessageTypes) -> None:
-    """Raise GraphError if the messages of a topic are not what its type means here."""
+    """Raise GraphError if a topic cannot be published with the installed definition of its type."""
     if topic.encoding != "cdr":
-        raise GraphError(f"its messages are encoded as {topic.encoding!r}, only 'cdr' can be published")
+        raise GraphError(f"its messages are encoded as {topic.encoding!r}, must be 'cdr'")
     message_class(topic.type)
     if not same_definition(topic, types):
-        raise GraphError(f"the bag was made with another definition of {topic.type} than the one installed")
+        raise GraphError(f"it was recorded with another definition of {topic.type} than the installed one")
 
 
 def _duration(time_ns: int | None) -> Duration:
