@@ -1,7 +1,7 @@
 """What a bag says of itself: topics, times, loss ledger, provenance and the files attached to it."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -32,7 +32,10 @@ class TopicInfo:
 
 @dataclass(frozen=True)
 class BagInfo:
-    """What a bag holds, without its messages; times are log time, which is simulation time in our bags."""
+    """What a bag holds, without its messages; times are log time, which is simulation time in our bags.
+
+    ``channels`` has an entry for each type, encoding and definition of a topic, ``topics`` the first of each.
+    """
 
     path: Path
     files: tuple[Path, ...]
@@ -41,6 +44,7 @@ class BagInfo:
     library: str
     start_ns: int
     end_ns: int
+    channels: tuple[TopicInfo, ...]
     topics: Mapping[str, TopicInfo]
     records: Mapping[str, Mapping[str, str]]
     attachments: Mapping[str, bytes]
@@ -48,7 +52,7 @@ class BagInfo:
     @property
     def message_count(self) -> int:
         """Return the number of messages of all topics."""
-        return sum(topic.message_count for topic in self.topics.values())
+        return sum(topic.message_count for topic in self.channels)
 
     @property
     def duration_ns(self) -> int:
@@ -92,7 +96,7 @@ def read_info(path: Path) -> BagInfo:
     """Return what the bag at ``path`` (its folder or a file) holds; raises BagError if it is unusable."""
     files = bag_files(path)
     headers, spans = [], []
-    topics: dict[str, TopicInfo] = {}
+    channels: dict[TopicInfo, TopicInfo] = {}
     records: dict[str, Mapping[str, str]] = {}
     attachments: dict[str, bytes] = {}
     for file in files:
@@ -103,7 +107,8 @@ def read_info(path: Path) -> BagInfo:
             if statistics.message_count:
                 spans.append((statistics.message_start_time, statistics.message_end_time))
             for topic in _topics(summary, statistics):
-                topics[topic.name] = _joined(topics.get(topic.name), topic)
+                same = replace(topic, message_count=0, qos="")
+                channels[same] = _joined(channels.get(same), topic)
             records.update((item.name, MappingProxyType(item.metadata)) for item in reader.iter_metadata())
             attachments.update((item.name, item.data) for item in reader.iter_attachments())
     return BagInfo(
@@ -114,7 +119,8 @@ def read_info(path: Path) -> BagInfo:
         library=headers[0].library,
         start_ns=min((start for start, _ in spans), default=0),
         end_ns=max((end for _, end in spans), default=0),
-        topics=MappingProxyType(topics),
+        channels=tuple(channels.values()),
+        topics=MappingProxyType(_first_by_name(channels.values())),
         records=MappingProxyType(records),
         attachments=MappingProxyType(attachments),
     )
@@ -142,8 +148,15 @@ def _topics(summary: Summary, statistics: Statistics) -> list[TopicInfo]:
 
 
 def _joined(before: TopicInfo | None, topic: TopicInfo) -> TopicInfo:
-    """Return a topic that has a channel already with the messages of another channel added."""
+    """Return a topic that has a channel already, with the messages of another channel added."""
     if before is None:
         return topic
-    values = {**vars(before), "message_count": before.message_count + topic.message_count}
-    return TopicInfo(**values)
+    return replace(before, message_count=before.message_count + topic.message_count)
+
+
+def _first_by_name(channels: Iterable[TopicInfo]) -> dict[str, TopicInfo]:
+    """Return the first channel of each topic."""
+    topics: dict[str, TopicInfo] = {}
+    for channel in channels:
+        topics.setdefault(channel.name, channel)
+    return topics

@@ -22,7 +22,7 @@ def overview(info: BagInfo) -> dict[str, object]:
         "message_count": info.message_count,
         "topics": [
             {"name": topic.name, "type": topic.type, "message_count": topic.message_count}
-            for topic in info.topics.values()
+            for topic in info.channels
         ],
         "run": _run(info),
         "provenance": dict(info.provenance),

@@ -1,5 +1,6 @@
 """``sms-handover play``: publish the messages of a bag."""
 
+import re
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from dataclasses import fields
 from pathlib import Path
@@ -29,8 +30,8 @@ def add_parser(parser: ArgumentParser) -> None:
     parser.epilog = (
         "services of the node /player: pause resume toggle_paused play_next stop set_rate seek\n"
         "exit codes: 0 complete; 1 damaged bag, or no subscriber in time; 2 wrong input, nothing played;\n"
-        "3 not all messages were acknowledged; 130 interrupted. With --closed-loop: 0 bit-identical; 1 the\n"
-        "states differ, or the plant exited"
+        "3 messages were not acknowledged or not played; 130 interrupted. With --closed-loop: 0\n"
+        "bit-identical; 1 the states differ, or the plant exited"
     )
     parser.set_defaults(loop=None, start_paused=None, keyboard=None)  # not given: as the parameter files say
     parser.add_argument("bag", type=Path, metavar="BAG", help="bag folder, .mcap file or run folder")
@@ -105,5 +106,12 @@ def command(options: Namespace) -> int:
     for rule in options.remap:
         if rule.count(":=") != 1 or not all(rule.split(":=")):
             raise ConfigurationError(f"remapping {rule!r} is not of the form OLD:=NEW")
+    options.rename = [rule for rule in options.remap if not _ros_permits(rule.split(":=")[0])]
     values = given(options, [field.name for field in fields(PlayerParameters)])
-    return run_in_process(run_player, options, values, options.remap)
+    rules = [rule for rule in options.remap if rule not in options.rename]
+    return run_in_process(run_player, options, values, rules)
+
+
+def _ros_permits(name: str) -> bool:
+    """Whether ROS takes a name in a remapping rule."""
+    return re.fullmatch(r"(\w+:)?[~/]?\w+(/\w+)*", name, re.ASCII) is not None

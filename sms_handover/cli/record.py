@@ -18,7 +18,8 @@ def add_parser(parser: ArgumentParser) -> None:
         "'sms-handover run' records its own graph, with every message accounted for."
     )
     parser.epilog = (
-        "exit codes: 0 complete; 1 no topic was found, or the disk failed; 2 wrong input, nothing recorded"
+        "exit codes: 0 complete; 1 no topic was found, or the disk failed; 2 wrong input, nothing recorded; "
+        "3 a topic could not be recorded"
     )
     parser.add_argument("-a", "--all", action="store_true", help="record every topic")
     parser.add_argument(

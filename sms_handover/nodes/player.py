@@ -11,6 +11,7 @@ from rclpy.executors import Executor
 from rosgraph_msgs.msg import Clock
 
 from sms_handover.bag.info import read_info
+from sms_handover.bag.topic_choice import absolute
 from sms_handover.errors import BagError, ConfigurationError, GraphError
 from sms_handover.graph.topics import CLOCK, PLAYER
 from sms_handover.nodes.parts.bag_publishers import BagPublisher, make_publishers, without_subscriber
@@ -19,12 +20,13 @@ from sms_handover.playback.parameters import PlayerParameters
 from sms_handover.playback.qos import read_overrides
 from sms_handover.playback.report import closing_line, progress_line
 from sms_handover.playback.schedule import PlaybackOptions, PlaybackSchedule
-from sms_handover.playback.source import PlaybackSource, span_of
+from sms_handover.playback.source import PlaybackSource, TopicKey, span_of
 from sms_handover.ros.codecs.convert import time_message
 from sms_handover.ros.parameters import declare, reject_unknown
 from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, RunnableNode, Stop, run_node
 from sms_handover.terminal.keyboard import Key, Keyboard
 from sms_handover.terminal.status_line import StatusLine
+from sms_handover.terminal.streams import printable
 from sms_handover.units import NS_PER_S
 
 KEYS = "space: pause, resume   right: next message   up, down: 10 % faster, slower"
@@ -58,8 +60,8 @@ class PlayerNode(RunnableNode):
         self._bag_publishers = self._advertise()
         self._source = PlaybackSource(
             path=self._info.path,
-            topics=frozenset(self._bag_publishers),
-            latched={name: item.kept for name, item in self._bag_publishers.items() if item.kept},
+            topics=self._bag_publishers.keys(),
+            latched={key: item.kept for key, item in self._bag_publishers.items() if item.kept},
             bag_start_ns=self._info.start_ns,
             span=span_of(self._info, options.start_offset, options.duration),
         )
@@ -79,6 +81,7 @@ class PlayerNode(RunnableNode):
             if keyboard.usable:
                 print(KEYS, file=sys.stderr)
             self._wait_for_subscribers(executor, stop)
+            self._leave_out_conflicts()
             try:
                 self._play(executor, stop, keyboard)
             finally:
@@ -87,15 +90,17 @@ class PlayerNode(RunnableNode):
             missing = self._unacknowledged(stop)
         if missing:
             print(f"not acknowledged by a subscriber of: {', '.join(missing)}", file=sys.stderr)
+        if self._left_out:
+            print(f"{self._left_out} messages of the bag were not played, see above", file=sys.stderr)
         if stop.asked:
             return EXIT_STOPPED
-        return EXIT_LOSS if missing else EXIT_OK
+        return EXIT_LOSS if missing or self._left_out else EXIT_OK
 
-    def _advertise(self) -> dict[str, BagPublisher]:
+    def _advertise(self) -> dict[TopicKey, BagPublisher]:
         """Return the publishers of the topics to play; report those that cannot be played."""
         options, info = self.parameters, self._info
         choice = options.choice
-        chosen = [topic for topic in info.topics.values() if choice.wants(topic.name)]
+        chosen = [topic for topic in info.channels if choice.wants(topic.name)]
         absent = choice.absent(info.topics)
         known = f"it has {', '.join(sorted(info.topics)) or 'none'}"
         if absent:
@@ -103,9 +108,11 @@ class PlayerNode(RunnableNode):
         if not chosen:
             raise ConfigurationError(f"no topic of {info.path} is chosen; {known}")
         overrides = read_overrides(Path(options.qos_overrides)) if options.qos_overrides else {}
-        publishers, skipped = make_publishers(self, chosen, overrides)
-        for topic, reason in skipped.items():
-            print(f"not played: {topic}: {reason}", file=sys.stderr)
+        renamed = {absolute(old): new for old, new in (rule.split(":=") for rule in options.rename)}
+        publishers, skipped = make_publishers(self, chosen, overrides, renamed)
+        for (topic, _), reason in skipped.items():
+            _report_left_out(topic, reason)
+        self._left_out = sum(item.message_count for item in chosen if (item.name, item.type) in skipped)
         if not publishers:
             raise ConfigurationError(f"no topic of {info.path} can be played")
         return publishers
@@ -123,9 +130,19 @@ class PlayerNode(RunnableNode):
             unmatched = without_subscriber(publishers) if timeout_s else []
             if unmatched and now - begin > timeout_s:
                 raise GraphError(f"no subscriber of {', '.join(unmatched)} after {timeout_s:g} s")
-            quiet = now - changed > _QUIET_S and not any(item.waits_for_match(self) for item in publishers)
+            quiet = now - changed > _QUIET_S and not any(item.waits_for_match() for item in publishers)
             if not unmatched and (quiet or now - begin > max(timeout_s, _DISCOVERY_S)):
                 return
+
+    def _leave_out_conflicts(self) -> None:
+        """Leave out topics that other nodes publish with another type; raises GraphError on all."""
+        for key, publisher in list(self._bag_publishers.items()):
+            if reason := publisher.conflict():
+                _report_left_out(publisher.name, reason)
+                self._left_out += publisher.message_count
+                self._bag_publishers.pop(key).destroy()
+        if not self._bag_publishers:
+            raise GraphError(f"no topic of {self._info.path} can be played")
 
     def _play(self, executor: Executor, stop: Stop, keyboard: Keyboard) -> None:
         """Send every message when its time comes, to the end or until stopped."""
@@ -156,7 +173,7 @@ class PlayerNode(RunnableNode):
             message = schedule.due(now_ns)
             if message is None:
                 return
-            if not self._bag_publishers[message.topic].publish(message.data):
+            if not self._bag_publishers[message.topic, message.type].publish(message.data):
                 self._report_blocked(message.topic)
                 return
             self._blocked_since = 0.0
@@ -207,6 +224,11 @@ class PlayerNode(RunnableNode):
         else:
             factor = _FASTER if key is Key.UP else 1.0 / _FASTER
             schedule.set_rate(schedule.clock.rate * factor, now_ns)
+
+
+def _report_left_out(topic: str, reason: str) -> None:
+    """Report a topic that is not played."""
+    print(f"not played: {printable(topic)}: {reason}", file=sys.stderr)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -22,6 +22,8 @@ def same_definition(topic: TopicInfo, types: MessageTypes) -> bool:
 
 def _hash_of(topic: TopicInfo) -> str:
     """Return the type hash of a recorded schema, '' if it cannot be computed."""
+    if not topic.schema_text.strip():
+        return ""
     store = get_typestore(Stores.EMPTY)
     try:
         store.register(get_types_from_msg(topic.schema_text, topic.type))

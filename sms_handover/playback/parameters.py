@@ -21,6 +21,7 @@ class PlayerParameters:
     regex: str = parameter("regular expression; matching topics are played too")
     exclude_topics: tuple[str, ...] = parameter("topics not to play")
     exclude_regex: str = parameter("regular expression; matching topics are not played")
+    rename: tuple[str, ...] = parameter("new names, OLD:=NEW, of topics whose recorded names ROS forbids")
     clock: float = parameter(
         "rate of a generated /clock that replaces the recorded one; 0: play the recorded one",
         unit="Hz",
@@ -41,6 +42,9 @@ class PlayerParameters:
         """Reject a rate that is not positive and an empty path."""
         if self.rate <= 0.0:
             raise ConfigurationError(f"parameter 'rate' is {self.rate:g}, must be > 0")
+        for rule in self.rename:
+            if rule.count(":=") != 1:
+                raise ConfigurationError(f"parameter 'rename' has {rule!r}, must be OLD:=NEW")
         if not self.bag:
             raise ConfigurationError("parameter 'bag' is empty, must be the path of a bag")
 

@@ -1,7 +1,7 @@
 """Playback source: the topics and times of a bag to play, and their messages."""
 
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -12,29 +12,37 @@ from sms_handover.bag.time_order import TimeSpan, messages_by_time
 from sms_handover.errors import ConfigurationError
 from sms_handover.units import ns_to_seconds, seconds_to_ns
 
+TopicKey = tuple[str, str]  # name and type of a topic
+
 
 @dataclass(frozen=True)
 class PlaybackSource:
     """Topics of a bag within a time span; ``latched`` is the number of messages kept by latched topic."""
 
     path: Path
-    topics: frozenset[str]
-    latched: Mapping[str, int]
+    topics: Collection[TopicKey]
+    latched: Mapping[TopicKey, int]
     bag_start_ns: int
     span: TimeSpan
 
     def read(self, from_ns: int) -> Iterator[RawMessage]:
         """Yield the messages from a bag time on, after the latched ones that a subscriber would have then."""
-        messages = messages_by_time(self.path, self.topics, TimeSpan(from_ns, self.span.end_ns))
-        return chain(self._latched_at(from_ns), messages)
+        later = self._messages(self.topics, TimeSpan(from_ns, self.span.end_ns))
+        return chain(self._latched_at(from_ns), later)
+
+    def _messages(self, topics: Collection[TopicKey], span: TimeSpan) -> Iterator[RawMessage]:
+        """Return the messages of some topics."""
+        messages = messages_by_time(self.path, {name for name, _ in topics}, span)
+        return (message for message in messages if (message.topic, message.type) in topics)
 
     def _latched_at(self, from_ns: int) -> Iterator[RawMessage]:
         """Yield the latched messages that a subscriber joining at that time would have received."""
         if from_ns <= self.bag_start_ns or not self.latched:
             return
-        kept = {topic: deque[RawMessage](maxlen=depth) for topic, depth in self.latched.items()}
-        for message in messages_by_time(self.path, kept, TimeSpan(self.bag_start_ns, from_ns - 1)):
-            kept[message.topic].append(message)
+        kept = {key: deque[RawMessage](maxlen=depth) for key, depth in self.latched.items()}
+        for message in self._messages(kept, TimeSpan(self.bag_start_ns, from_ns - 1)):
+            if (message.topic, message.type) in self.topics:
+                kept[message.topic, message.type].append(message)
         yield from sorted(chain.from_iterable(kept.values()), key=lambda message: message.log_time_ns)
 
 

@@ -39,7 +39,9 @@ def contents(bag: Path, from_s: float, latched: dict[str, int], end_s: float = 1
     """Return what is read from a time on."""
     info = read_info(bag)
     span = TimeSpan(info.start_ns, round(end_s * S))
-    source = PlaybackSource(bag, frozenset(info.topics), latched, info.start_ns, span)
+    kept = {(topic, info.topics[topic].type): depth for topic, depth in latched.items()}
+    topics = {(topic.name, topic.type) for topic in info.channels}
+    source = PlaybackSource(bag, topics, kept, info.start_ns, span)
     return [TYPES.deserialize(m.data, m.type).data for m in source.read(round(from_s * S))]
 
 

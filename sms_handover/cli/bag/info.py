@@ -2,7 +2,7 @@
 
 import json
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from sms_handover.bag.info import BagInfo, TopicInfo, read_info
@@ -47,7 +47,7 @@ def _text(info: BagInfo) -> str:
         "End": _seconds(info.end_ns),
         "Messages": str(info.message_count),
     }
-    lines = [*_table(head), "", *_topics(list(info.topics.values()))]
+    lines = [*_table(head), "", *_topics(info.channels)]
     for title, part in (("Run", values["run"]), ("Made by", values["provenance"])):
         if isinstance(part, Mapping) and part:
             lines += ["", f"{title}:", *_table({f"  {name}": str(value) for name, value in part.items()})]
@@ -63,7 +63,7 @@ def _text(info: BagInfo) -> str:
     return "\n".join(lines)
 
 
-def _topics(topics: list[TopicInfo]) -> list[str]:
+def _topics(topics: Iterable[TopicInfo]) -> list[str]:
     """Return a line per topic."""
     cells = [(topic.name, topic.type or "-", str(topic.message_count), topic.encoding) for topic in topics]
     rows = [("topic", "type", "messages", "serialization"), *cells]

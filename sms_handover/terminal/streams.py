@@ -1,0 +1,30 @@
+"""Standard streams of a process: open, and able to take any text."""
+
+import os
+import sys
+from contextlib import suppress
+
+_STREAMS = (("stdin", "r"), ("stdout", "w"), ("stderr", "w"))  # by file descriptor
+
+
+def make_streams_safe() -> None:
+    """Open what is closed of the standard streams to nowhere, and let output escape what it cannot encode.
+
+    The next file that is opened would otherwise take the place of a closed stream, and whatever is printed
+    would go into it.
+    """
+    for number, (name, mode) in enumerate(_STREAMS):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # the lowest free number, which is this one
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(number, mode, closefd=False))
+        if mode == "w":
+            with suppress(AttributeError, ValueError):  # what a test or a caller has put in its place
+                getattr(sys, name).reconfigure(errors="backslashreplace")
+
+
+def printable(text: str) -> str:
+    """Return a text of others, with escapes if it holds what does not belong in one line."""
+    return text if text.isprintable() else ascii(text)
