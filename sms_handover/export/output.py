@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,11 +13,16 @@ TABLES_FILE = "tables.json"  # names, kinds and units of all columns
 
 
 class Tables:
-    """The tables of an export: rows by table, and the reasons by topic that was left out."""
+    """The tables of an export.
+
+    ``rows`` are counts by table; of a topic that was not exported, or not wholly, ``skipped`` is the reason
+    and ``left_out`` the number of messages.
+    """
 
     def __init__(self, folder: Path, file_format: Format) -> None:
         self.rows: dict[str, int] = {}
         self.skipped: dict[str, str] = {}
+        self.left_out: Counter[str] = Counter()
         self.folder, self._format = folder, file_format
         self._columns: dict[str, Sequence[Column]] = {}
         self._topics: dict[str, str] = {}
@@ -46,4 +52,4 @@ class Tables:
         }
         content = {"bag": info.path.name, "tables": tables, "skipped": self.skipped}
         text = json.dumps(content, indent=1, ensure_ascii=False)
-        (self.folder / TABLES_FILE).write_text(text + "\n", encoding="utf-8")
+        (self.folder / TABLES_FILE).write_text(text + "\n", encoding="utf-8", errors="backslashreplace")

@@ -25,7 +25,7 @@ class ParquetFormat(Format):
                 "or export with --format csv"
             ) from error
         self._folder = folder
-        self._metadata = {"bag": bag}
+        self._metadata = {"bag": bag.encode(errors="backslashreplace")}
 
     def open(self, stem: str, columns: Sequence[Column]) -> TableFile:
         """Create the file of a table."""

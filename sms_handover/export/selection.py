@@ -14,7 +14,7 @@ from sms_handover.units import NS_PER_S
 Mask = npt.NDArray[np.bool_]
 Wanted = Callable[[Stamps], Mask]  # the stamps within a time range
 
-_LAST_NS = 2**63 - 1  # [ns]
+_LAST_NS = 2**64 - 1  # [ns]
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ Progress = Callable[[int, int], None]  # bytes done, bytes in all
 
 _BATCH = 5000  # rows written at once
 _MOST_PENDING = 32 * 2**20  # [byte] of messages held in memory at most, over all tables
-_TIMES = (Column("log_time_ns", "int64", "ns"), Column("publish_time_ns", "int64", "ns"))
+_TIMES = (Column("log_time_ns", "uint64", "ns"), Column("publish_time_ns", "uint64", "ns"))
 
 
 def export_topics(info: BagInfo, tables: Tables, selection: Selection, progress: Progress | None) -> None:
@@ -44,7 +44,7 @@ class _TopicTable:
 
     def __init__(self, tables: Tables, source: Source) -> None:
         """Open the table; raises BagError on a type that has no columns."""
-        self._tables, self._topic = tables, source.topic
+        self._tables = tables
         self._types = types_of(source)
         self._flattener = Flattener(self._types)
         columns = [*_TIMES, *self._flattener.columns]
@@ -53,10 +53,7 @@ class _TopicTable:
 
     def add(self, message: ScannedMessage) -> None:
         """Add one message; raises BagError if it cannot be decoded."""
-        try:
-            values = self._flattener.row(self._types.decode(message.data))
-        except BagError as error:
-            raise BagError(f"{self._topic}: {error}; leave it out with --exclude-topics") from error
+        values = self._flattener.row(self._types.decode(message.data))
         self._pending.append([message.log_time_ns, message.publish_time_ns, *values])
         if len(self._pending) >= _BATCH:
             self.flush()
@@ -92,11 +89,17 @@ class _TopicTables:
         return self._opened[key]
 
     def add(self, message: ScannedMessage) -> None:
-        """Add a message to the table of its topic."""
-        table = self.of(message.source)
+        """Add a message to the table of its topic, or count it as left out."""
+        table, topic = self.of(message.source), message.source.topic
         if table is None:
+            self._tables.left_out[topic] += topic in self._tables.skipped
             return
-        table.add(message)
+        try:
+            table.add(message)
+        except BagError as error:
+            self._tables.skipped.setdefault(topic, str(error))
+            self._tables.left_out[topic] += 1
+            return
         self._pending_bytes += len(message.data)
         if self._pending_bytes > _MOST_PENDING:
             self._pending_bytes = 0

@@ -5,11 +5,12 @@ from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from pathlib import Path
 
 from sms_handover.bag.topic_choice import TopicChoice
-from sms_handover.cli.exit_codes import EXIT_OK
+from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
 from sms_handover.export.export import CSV, FORMATS, export
 from sms_handover.export.selection import Selection
 from sms_handover.launcher.run_folder import bag_of
 from sms_handover.terminal.progress import ProgressLine
+from sms_handover.terminal.streams import printable
 
 
 def add_parser(parser: ArgumentParser) -> None:
@@ -21,7 +22,7 @@ def add_parser(parser: ArgumentParser) -> None:
         "phase), 'grasp_events' and 'run_events'. Any other bag gives a table per topic with flattened\n"
         "fields. tables.json has the unit of every column. Numbers read back bit for bit."
     )
-    parser.epilog = "exit codes: 0 complete; 1 damaged bag, or nothing to export; 2 wrong input"
+    parser.epilog = "exit codes: 0 complete; 1 damaged bag, or nothing to export; 2 wrong input; 3 incomplete"
     parser.add_argument("bag", type=Path, metavar="BAG", help="run folder, bag folder or .mcap file")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="FOLDER", help="new folder")
     parser.add_argument("--format", choices=FORMATS, default=CSV, help="file format (default: csv)")
@@ -48,8 +49,9 @@ def command(options: Namespace) -> int:
             progress=progress,
         )
     for topic, reason in result.skipped.items():
-        print(f"{topic} not exported: {reason}", file=sys.stderr)
+        count = result.left_out[topic]
+        print(f"not exported: {printable(topic)}: {count} messages: {reason}", file=sys.stderr)
     for name, rows in result.rows.items():
         print(f"{name}: {rows} rows")
     print(f"{len(result.rows)} tables in {result.folder}")
-    return EXIT_OK
+    return EXIT_LOSS if result.left_out.total() else EXIT_OK
