@@ -1,11 +1,10 @@
-"""Which columns of a joint array belong to an arm."""
+"""Joints of an arm: their columns in a joint array."""
 
 from collections.abc import Sequence
 
-from sms_handover.frames import joint_name
+from sms_handover.frames import arm_of_joint
 
 
 def joints_of(joint_names: Sequence[str], arm: str) -> list[int]:
-    """Return the places of an arm's joints, known by their names."""
-    prefix = joint_name(arm, 1).removesuffix("1")
-    return [place for place, name in enumerate(joint_names) if name.startswith(prefix)]
+    """Return the columns of an arm's joints, known by their names."""
+    return [place for place, name in enumerate(joint_names) if arm_of_joint(name) == arm]

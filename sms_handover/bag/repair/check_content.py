@@ -148,7 +148,8 @@ class ContentCheck:
         stamp = state.header.stamp
         how = "failed" if state.state == state.FAILED else "ended"
         findings.note(f"the run {how} at {stamp.sec + stamp.nanosec / NS_PER_S:g} s: {state.detail}")
-        silent = [name for name in topics.LOOP_NODES if not any(node.endswith(name) for node in self._told)]
+        told = {node.rpartition("/")[2] for node in self._told}
+        silent = [name for name in topics.LOOP_NODES if name not in told]
         if silent:
             findings.missing(f"how many messages were published is not told by {', '.join(silent)}")
 

@@ -125,5 +125,6 @@ class RunCollector:
         """Yield the names of the arms whose tool pose is in the bag."""
         head, tail = f"{self._prefix}/", topics.tool_pose("")
         for name in self._info.topics:
-            if name.startswith(head) and name.endswith(tail):
-                yield name[len(head) : -len(tail)]
+            arm = name.removeprefix(head).removesuffix(tail)
+            if f"{head}{arm}{tail}" == name and "/" not in arm:  # else it is of another namespace
+                yield arm

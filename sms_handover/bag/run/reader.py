@@ -10,6 +10,7 @@ from sms_handover.bag.ledger import is_of_ours
 from sms_handover.bag.run.collector import BASE_POSE, BASE_TWIST, EFFORT, POSITION, VELOCITY, RunCollector
 from sms_handover.bag.run.series import Series
 from sms_handover.errors import BagError
+from sms_handover.frames import arm_of_joint
 from sms_handover.graph import topics
 from sms_handover.run_data import Array, RunData, Stamps
 from sms_handover.types import TaskPhase
@@ -119,7 +120,7 @@ def _listed(names: Sequence[str]) -> str:
 
 def _first_joint(arm: str, joint_names: Sequence[str]) -> int:
     """Return the place of an arm's first joint, behind all others if it has none."""
-    places = [place for place, name in enumerate(joint_names) if name.startswith(f"{arm}_")]
+    places = [place for place, name in enumerate(joint_names) if arm_of_joint(name) == arm]
     return min(places, default=len(joint_names))
 
 
