@@ -8,7 +8,14 @@ from importlib import import_module
 
 from sms_handover import __version__
 from sms_handover.errors import ConfigurationError, SmsHandoverError
+from sms_handover.ros.process.environment import (
+    draw_to_files,
+    drop_current_folder,
+    prepare_environment,
+    require_utf8,
+)
 from sms_handover.ros.process.shared_memory_check import avoid_full_shared_memory, require_shared_memory
+from sms_handover.terminal.streams import let_go_of_failed_output, make_streams_safe
 
 _COMMANDS = {
     "run": "run the handover as a graph of ROS 2 nodes and record it",
@@ -31,6 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Only the module of that command is imported, so that commands without ROS need no ROS.
     """
+    make_streams_safe()
     listed = "\n".join(f"  {name:<10} {text}" for name, text in _COMMANDS.items())
     parser = ArgumentParser(
         prog="sms-handover",
@@ -45,28 +53,50 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(chosen.command, chosen.arguments)
     except BrokenPipeError:  # the reader has closed the pipe, as head(1) does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return _EXIT_FAILED
+    except UnicodeEncodeError as error:
+        reason = f"{error.object!a} is not UTF-8: rename it, or give a symbolic link to it"
+        print(f"sms-handover {chosen.command}: error: {reason}", file=sys.stderr)
+        return _EXIT_USAGE
     except (SmsHandoverError, OSError, MemoryError) as error:
         print(f"sms-handover {chosen.command}: error: {error or 'out of memory'}", file=sys.stderr)
         return _EXIT_USAGE if isinstance(error, ConfigurationError) else _EXIT_FAILED
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return _EXIT_INTERRUPTED
+    finally:
+        let_go_of_failed_output()
 
 
 def _run(name: str, arguments: Sequence[str]) -> int:
     """Import the module of one command and run it; return the exit code."""
-    if name in _WITH_ROS:
-        require_shared_memory()
-        if warning := avoid_full_shared_memory():
-            print(f"sms-handover {name}: {warning}", file=sys.stderr)
+    drop_current_folder(sys.path)
+    draw_to_files()
+    if name in _WITH_ROS or (name == "view" and "--live" in arguments):
+        _prepare_ros(name, arguments)
     module = import_module(f"sms_handover.cli.{name}")
     parser = ArgumentParser(prog=f"sms-handover {name}")
     module.add_parser(parser)
     code = int(module.command(parser.parse_args(arguments)))
     sys.stdout.flush()
     return code
+
+
+def _prepare_ros(name: str, arguments: Sequence[str]) -> None:
+    """Check what ROS needs before it is imported, and report what was changed for it."""
+    private = name == "run"
+    require_utf8([*arguments, os.getcwd()] if private else arguments)
+    require_shared_memory()
+    for change in (*prepare_environment(private=private), avoid_full_shared_memory()):
+        if change:
+            print(f"sms-handover {name}: {change}", file=sys.stderr)
+    try:
+        import_module("rclpy")
+    except ImportError as error:
+        raise ConfigurationError(
+            f"ROS cannot be imported: {' '.join(str(error).split())}; install the package with its wheels, "
+            "and unset PYTHONPATH and LD_LIBRARY_PATH if another ROS is sourced"
+        ) from error
 
 
 def run_main() -> int:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from sms_handover.errors import ConfigurationError
 from sms_handover.export.table import Column, Format, Kind, ListOf, StructOf, TableFile
@@ -38,7 +38,8 @@ class ParquetFormat(Format):
         ]
         schema = arrow.schema(fields, metadata=self._metadata)
         path = self._folder / f"{stem}{self.suffix}"
-        return _ParquetFile(arrow, self._parquet.ParquetWriter(path, schema, compression="zstd"), schema)
+        stream = path.open("xb")  # Arrow opens no path that is not UTF-8
+        return _ParquetFile(arrow, self._parquet.ParquetWriter(stream, schema, compression="zstd"), stream)
 
     def _type(self, kind: Kind) -> Any:
         """Return the Arrow type of a kind."""
@@ -54,8 +55,8 @@ class ParquetFormat(Format):
 class _ParquetFile(TableFile):
     """One Parquet file; each batch of rows becomes a row group."""
 
-    def __init__(self, arrow: Any, writer: Any, schema: Any) -> None:
-        self._arrow, self._writer, self._schema = arrow, writer, schema
+    def __init__(self, arrow: Any, writer: Any, stream: BinaryIO) -> None:
+        self._arrow, self._writer, self._schema, self._stream = arrow, writer, writer.schema, stream
 
     def write(self, rows: Sequence[Sequence[Any]]) -> None:
         """Append rows."""
@@ -68,4 +69,5 @@ class _ParquetFile(TableFile):
 
     def close(self) -> None:
         """Complete the file."""
-        self._writer.close()
+        with self._stream:
+            self._writer.close()

@@ -15,6 +15,10 @@ from sms_handover.launcher.node_log import NodeLog
 from sms_handover.ros.process.launcher_process import LAUNCHER_PID
 
 _GRACE_S = 20.0  # [s] of wall time a process gets to end when asked to, before it is killed
+_WITHOUT_FOLDER = (  # python -P is new in 3.11
+    "import sys; del sys.path[0]; from runpy import run_module; "
+    "run_module(sys.argv.pop(1), run_name='__main__', alter_sys=True)"
+)
 
 
 @dataclass(frozen=True)
@@ -70,12 +74,8 @@ class NodeProcesses:
         GraphError if the log cannot be written.
         """
         foreign = ("sms_handover.ros.process.launcher_process", *program)
-        command = [
-            sys.executable,
-            "-m",
-            *(foreign if program else (f"sms_handover.nodes.{node}",)),
-            *arguments,
-        ]
+        module, *words = foreign if program else (f"sms_handover.nodes.{node}",)
+        command = [*as_program(module), *words, *arguments]
         log = self._logs[node] = NodeLog(self._folder / f"{node}.log")
         self._processes[node] = subprocess.Popen(
             command,
@@ -131,6 +131,13 @@ class NodeProcesses:
     def _alive(self) -> dict[str, "subprocess.Popen[bytes]"]:
         """Return the processes that have not ended."""
         return {name: process for name, process in self._processes.items() if process.poll() is None}
+
+
+def as_program(module: str) -> tuple[str, ...]:
+    """Return the command that runs a module, with no module from the folder the user stands in."""
+    if sys.version_info >= (3, 11):
+        return sys.executable, "-P", "-m", module
+    return sys.executable, "-c", _WITHOUT_FOLDER, module
 
 
 def _is_stopped(pid: int) -> bool:

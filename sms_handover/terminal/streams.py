@@ -25,6 +25,16 @@ def make_streams_safe() -> None:
                 getattr(sys, name).reconfigure(errors="backslashreplace")
 
 
+def let_go_of_failed_output() -> None:
+    """Write out what was printed; what cannot be, as on a full disk or into a closed pipe, goes nowhere."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            with suppress(OSError, ValueError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
 def printable(text: str) -> str:
     """Return a text of others, with escapes if it holds what does not belong in one line."""
     return text if text.isprintable() else ascii(text)
