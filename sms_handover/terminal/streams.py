@@ -3,8 +3,24 @@
 import os
 import sys
 from contextlib import suppress
+from io import TextIOWrapper
 
 _STREAMS = (("stdin", "r"), ("stdout", "w"), ("stderr", "w"))  # by file descriptor
+
+
+class _Forgiving(TextIOWrapper):
+    """Standard error that ends no work because nobody can be told of it, as on a full disk."""
+
+    def write(self, text: str) -> int:
+        """Write what can be written."""
+        with suppress(OSError):
+            return super().write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """Write out what can be written."""
+        with suppress(OSError):
+            super().flush()
 
 
 def make_streams_safe() -> None:
@@ -23,6 +39,10 @@ def make_streams_safe() -> None:
         if mode == "w":
             with suppress(AttributeError, ValueError):  # what a test or a caller has put in its place
                 getattr(sys, name).reconfigure(errors="backslashreplace")
+    if sys.stderr is sys.__stderr__:
+        encoding = getattr(sys.stderr, "encoding", "utf-8")
+        raw = os.fdopen(2, "wb", buffering=0, closefd=False)
+        sys.stderr = _Forgiving(raw, encoding, "backslashreplace", line_buffering=True)
 
 
 def let_go_of_failed_output() -> None:

@@ -92,18 +92,14 @@ def test_what_is_not_utf8_is_named() -> None:
 BAG = CASES / "nan_in_arrays.mcap"
 
 
-@pytest.mark.parametrize(
-    ("redirect", "code"), [(">&- 2>&- <&-", 0), (">/dev/full", 1), ("2>/dev/full | head -c 1", 1)]
-)
+@pytest.mark.parametrize(("redirect", "code"), [(">&- 2>&- <&-", 0), (">/dev/full", 1), ("2>/dev/full", 0)])
 def test_streams_that_take_nothing(tmp_path: Path, redirect: str, code: int) -> None:
     """In a folder with a name that is not UTF-8, with a yaml.py, ASCII output and a notebook's MPLBACKEND."""
     place = tmp_path / os.fsdecode(b"l\xe4tin")
     place.mkdir()
     (place / "b.mcap").write_bytes(BAG.read_bytes())
     (place / "yaml.py").write_text("raise RuntimeError", encoding="ascii")
-    program = (
-        f"{Path(sys.executable).parent}/sms-handover bag info $PWD/b.mcap {redirect}; exit ${{PIPESTATUS[0]}}"
-    )
+    program = f"{Path(sys.executable).parent}/sms-handover bag info $PWD/b.mcap {redirect}"
     environment = {
         **os.environ,
         "PYTHONIOENCODING": "ascii",
