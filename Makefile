@@ -1,12 +1,16 @@
 # Everything runs in one environment, $(VENV), that these targets make; nothing else on the machine changes.
 PYTHON ?= $(shell python3.11 -c 'import sys; print(sys.executable)' 2>/dev/null || echo python3)
 VENV ?= .venv
+LOWEST := $(VENV)-lowest
 RUNS ?= runs
 FIGURES ?= figures
 REPORT ?= report
 FUZZ_SECONDS ?= 600
 TEST_SECONDS ?= 600
+TEST_WORKERS ?= 2
 MEASURED := build/verification
+CORE := first_edition.py save.py yaml_reader.py robot_model.py reduced_dynamics.py ik.py bag_reader.py bag_writer.py \
+        export.py cli_figures.py 'compiled_dynamics.py::test_a_step_is_that_of_pinocchio[shipped-rk4]'
 SITE := build/docs/html
 
 BIN := $(VENV)/bin
@@ -17,7 +21,7 @@ MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evi
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover figures report simulate test verify measure bench docs screenshots faults cycles fuzz hostile soak reference lint install colcon clean
+.PHONY: help handover figures report simulate test verify measure bench docs screenshots faults lowest cycles fuzz hostile soak reference lint install colcon clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -36,8 +40,8 @@ report: install  ## write an HTML page on the runs of `make handover`
 simulate: install  ## the same handover in one process, without DDS or a recording
 	$(BIN)/sms-handover simulate
 
-test: lint  ## check style and types, then run every test but those of verify, none longer than TEST_SECONDS
-	$(BIN)/python -m pytest --timeout $(TEST_SECONDS) --durations 20
+test: lint  ## check style and types, then run every test but those of verify in TEST_WORKERS processes
+	$(BIN)/python -m pytest --numprocesses $(TEST_WORKERS) --dist loadfile --timeout $(TEST_SECONDS) --durations 20
 
 verify: $(VENV)/.verify  ## measure against independent answers, break every law on purpose, write docs/verification.md
 	@mkdir -p $(MEASURED)
@@ -62,6 +66,9 @@ docs: $(VENV)/.docs  ## build the documentation as a site, every warning an erro
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -d build/docs/doctrees docs $(SITE)
 	$(BIN)/python -m pytest test/site --site $(SITE)
 	@echo "The site begins at $(SITE)/index.html"
+
+lowest: $(LOWEST)/.lowest  ## test the core with the lowest versions of other packages that setup.py allows
+	$(LOWEST)/bin/python -m pytest -p no:cacheprovider -W ignore::DeprecationWarning $(addprefix test/core/test_,$(CORE))
 
 cycles: $(VENV)/.test  ## start and stop the graph 100 times: no orphan, nothing left in shared memory, no growth
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.cycles
@@ -92,7 +99,7 @@ colcon:  ## build the package as a ROS workspace does, with colcon, and list its
 	PYTHON="$(PYTHON)" .ci/colcon
 
 clean:  ## remove the environment and everything built; recordings stay
-	rm -rf $(VENV) build dist docs/api *.egg-info interfaces/build interfaces/*.egg-info .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) $(LOWEST) build dist docs/api *.egg-info interfaces/build interfaces/*.egg-info .mypy_cache .pytest_cache .ruff_cache
 
 # Stamps: each holds until a file it depends on changes.
 INTERFACES := $(wildcard interfaces/*.txt interfaces/*.xml interfaces/*.py interfaces/*.toml) \
@@ -103,6 +110,11 @@ $(VENV)/.environment:
 	@command -v c++ >/dev/null || command -v g++ >/dev/null || command -v clang++ >/dev/null || \
 	  { echo "sms_handover: no C++ compiler found: install one (Debian, Ubuntu: apt install g++), then run make again"; exit 1; } >&2
 	$(PYTHON) -m venv $(VENV)
+	@touch $@
+
+$(LOWEST)/.lowest: .ci/lowest.txt
+	$(PYTHON) -m venv $(LOWEST)
+	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check --requirement .ci/lowest.txt
 	@touch $@
 
 $(VENV)/.interfaces: $(VENV)/.environment $(INTERFACES) .ci/constraints.txt

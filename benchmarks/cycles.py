@@ -1,4 +1,4 @@
-"""Starts and stops the graph many times in one process: what is left behind, and does the launcher grow?
+"""Start and stop cycles of the graph: what they leave behind, and whether the launcher grows.
 
 Run as ``python -m benchmarks.cycles``. Every other cycle is cut short by SIGINT at a random moment, from
 the start of the nodes on; the others run to their end. After each, no node may be left, nothing in shared

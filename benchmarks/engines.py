@@ -1,4 +1,4 @@
-"""How fast the handover runs against other engines, and how precise each is for the work."""
+"""Engines compared: how fast each runs the handover, and how precise it is for the work."""
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""The task that every engine gets: track the recorded joint references of the handover under NMPC.
+"""The handover task for every engine: track the recorded joint references under NMPC.
 
 References, gains and tick are the same for all; so is the law, u = H*(q_d'' - A1 e - A2 e') + c*. Each
 engine works out H and c itself, as its users would.

@@ -1,4 +1,4 @@
-"""How fast lock step is over DDS, beside the bare exchange of the same messages."""
+"""Speed of lock step over DDS, compared with the bare exchange of the same messages."""
 
 import os
 import re

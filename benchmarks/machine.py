@@ -1,4 +1,4 @@
-"""What figures were measured on."""
+"""The machine and the software of a measurement."""
 
 import os
 import platform

@@ -1,4 +1,4 @@
-"""The robot in MuJoCo: its model written from the same description, its state in our coordinates."""
+"""The robot in MuJoCo: a model from the same description, its state in our coordinates."""
 
 from collections.abc import Iterable
 from xml.etree import ElementTree as ET

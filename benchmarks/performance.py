@@ -1,4 +1,4 @@
-"""Run every benchmark and render docs/performance.md from what they find."""
+"""Run every benchmark and write docs/performance.md from the results."""
 
 import subprocess
 import sys

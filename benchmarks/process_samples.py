@@ -1,4 +1,4 @@
-"""What the processes of a run hold on to: memory, file descriptors, threads, shared memory."""
+"""Samples of the resources of processes: memory, file descriptors, threads, shared memory."""
 
 from collections.abc import Sequence
 from contextlib import suppress

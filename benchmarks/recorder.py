@@ -1,4 +1,4 @@
-"""What recording costs per message, beside the writer of mcap alone."""
+"""Cost of recording per message, compared with the writer of mcap alone."""
 
 from collections.abc import Callable
 from functools import partial
@@ -28,10 +28,10 @@ _TYPE = "sensor_msgs/msg/JointState"
 
 def messages() -> list[bytes]:
     """Return the joint states of a run in which every joint moves."""
-    wire, random = JointStateCodec(NAMES, ("position", "velocity", "effort")), np.random.default_rng(1)
+    codec, random = JointStateCodec(NAMES, ("position", "velocity", "effort")), np.random.default_rng(1)
     blocks = random.normal(size=(3, COUNT, len(NAMES)))
     return [
-        wire.pack(k * _TICK_NS, position=blocks[0, k], velocity=blocks[1, k], effort=blocks[2, k])
+        codec.pack(k * _TICK_NS, position=blocks[0, k], velocity=blocks[1, k], effort=blocks[2, k])
         for k in range(COUNT)
     ]
 

@@ -1,8 +1,8 @@
-"""How much of a run is lost if its recorder is killed (SIGKILL) at a random moment?
+"""How much of a run is lost if its recorder is killed (SIGKILL) at a random moment.
 
-Each run of the graph is watched by a witness of its own, which hears the states that the plant
-publishes. The recorder is killed, the bag recovered, and the newest state in it held against the
-newest that had been published when the recorder was dead.
+A separate witness subscribes to the states that the plant publishes. The recorder is killed, the bag is
+recovered, and the latest state in it is compared with the latest that had been published when the recorder
+had exited.
 """
 
 import os

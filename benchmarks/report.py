@@ -1,4 +1,4 @@
-"""How long a report of two recorded handovers of 60 s takes, what of it, and how heavy the page is."""
+"""Time and size of a report on two recorded handovers of 60 s."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""What a benchmark found: tables with a question above them, on the screen, as JSON and as Markdown."""
+"""Results of a benchmark: tables under a question, on the screen, as JSON and as Markdown."""
 
 import json
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""The machine's own noise: a process that does nothing but wake at absolute deadlines, as cyclictest does.
+"""The noise of the machine: a process that only wakes at absolute deadlines, as cyclictest does.
 
 Run as a module, it prints how far its periods were off, as JSON: the 99th percentile and the largest, in us.
 """

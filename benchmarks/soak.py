@@ -1,4 +1,4 @@
-"""Does anything grow when a run goes on for long, and is anything lost?
+"""Soak test: whether anything grows or is lost during a long run.
 
 Runs the graph in lock step over many minutes of simulated time, records it into files of a minute, looks at
 its processes all the while, and holds the bag against what the nodes say they have published. Writes

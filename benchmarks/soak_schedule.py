@@ -1,4 +1,4 @@
-"""A schedule as long as one likes: after the shipped handover the deputy goes on changing hands."""
+"""A schedule of any length: after the shipped handover the deputy keeps changing hands."""
 
 from pathlib import Path
 from typing import Any

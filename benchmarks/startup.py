@@ -1,4 +1,4 @@
-"""How long until the program answers: imports, help, and the first tick in one process and over DDS."""
+"""Startup times: imports, help, and the first tick in one process and over DDS."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Timing that stays fair on a machine that others use too: contestants take turns, round by round."""
+"""Fair timing on a shared machine: contestants take turns, round by round."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """The page of all commands, from their parsers.
 
-What argparse prints differs between versions of Python and with the width of the terminal, so only what it
-holds is taken.
+The output of argparse differs between versions of Python and with the width of the terminal, so the page is
+made from the parsers themselves.
 """
 
 from argparse import (
@@ -20,8 +20,8 @@ from docs.tables import WRITTEN_BY, plain, table
 from sms_handover.cli.main import _COMMANDS
 
 _EXIT_CODES = [
-    ("0", "done, and nothing is wrong"),
-    ("1", "failed, or what was looked for is not so: runs differ, a bag is damaged, a node died"),
+    ("0", "success"),
+    ("1", "failed, or a check failed: runs differ, a bag is damaged, a node died"),
     ("2", "wrong input; nothing was started or written"),
     ("3", "done, but messages of the recording are missing"),
     ("4", "done, but a grasp missed"),
@@ -36,9 +36,9 @@ def commands_page() -> str:
         WRITTEN_BY,
         """\
 After `make handover` the command is `.venv/bin/sms-handover`; in a ROS workspace it is on the path. `--help`
-behind any command prints what stands here. Errors are one line on standard error that names the value, its
-unit and what is allowed.""",
-        table(("Exit code", "Means"), _EXIT_CODES),
+of any command prints the text of this page. An error is one line on standard error with the value, its unit
+and what is allowed.""",
+        table(("Exit code", "Meaning"), _EXIT_CODES),
         table(
             ("Command", "Does"), [(f"[`{name}`](#sms-handover-{name})", t) for name, t in _COMMANDS.items()]
         ),
@@ -65,7 +65,7 @@ def _command(parser: ArgumentParser, level: str) -> Iterator[str]:
     if not subs:
         words = [parser.prog, *(_positional(a) for a in taken if not a.option_strings)]
         yield f"```text\n{' '.join(words)} [options]\n```"
-        yield table(("Argument", "Means"), _rows(taken))
+        yield table(("Argument", "Meaning"), _rows(taken))
     yield from _text(parser.epilog or "", parser)
     for sub in subs:
         yield from _command(sub, level + "#")

@@ -10,18 +10,18 @@ _INTERFACES = Path(__file__).resolve().parent.parent / "interfaces"
 def messages_page() -> str:
     """Return the page."""
     parts = [
-        "# Messages and services of our own",
+        "# Our messages and services",
         WRITTEN_BY,
         """\
-The package `sms_handover_interfaces` holds what no standard type fits. Everything else speaks
+The package `sms_handover_interfaces` has the types for which there is no standard one. Everything else uses
 `sensor_msgs`, `nav_msgs`, `geometry_msgs`, `std_msgs`, `diagnostic_msgs`, `visualization_msgs` and
-`rosgraph_msgs`. Which topic has which type is in [topics.md](topics.md); frames, signs and stamps are in
+`rosgraph_msgs`. [topics.md](topics.md) lists the type of each topic; frames, signs and stamps are in
 [conventions.md](conventions.md). A time stamp is simulation time unless its comment says otherwise.""",
     ]
     for folder, title in (("msg", "Messages"), ("srv", "Services")):
         files = sorted((_INTERFACES / folder).glob(f"*.{folder}"))
         rows = [(f"[`{file.stem}`](#{file.stem.lower()})", _first_sentence(file)) for file in files]
-        parts += [f"## {title}", table(("Type", "Is"), rows)]
+        parts += [f"## {title}", table(("Type", "Meaning"), rows)]
         for file in files:
             text = file.read_text(encoding="utf-8").rstrip()
             parts += [

@@ -1,4 +1,4 @@
-"""Write the pages of parameters, topics, commands and messages from what the package is made from."""
+"""Generate the reference pages: parameters, topics, commands and messages."""
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -29,17 +29,18 @@ def parameters_page() -> str:
         "# Parameters",
         WRITTEN_BY,
         """\
-Every node reads its defaults from the files in [`config/`](../config), ROS 2 parameter files that give
-the reason for each number. On top of them come `--params-file FILE`, then `-p NAME:=VALUE` of the node, or
-`-p NODE.NAME:=VALUE` of `sms-handover run`. A node takes parameters at its start only: they are read-only,
-checked one by one and then together, and a wrong or unknown one ends it in one line with exit code 2.
-`ros2 param describe NODE NAME` tells the same of a running node.
+Every node reads its defaults from the files in [`config/`](../config), ROS 2 parameter files with the
+reason for each number. `--params-file FILE` overrides them, then `-p NAME:=VALUE` of the node, or
+`-p NODE.NAME:=VALUE` of `sms-handover run`. Parameters are set at the start of a node only: they are
+read-only, checked one by one and then together, and a wrong or unknown one ends the node with one line and
+exit code 2.
+`ros2 param describe NODE NAME` prints the same for a running node.
 
-Empty text is `''`; a path is relative to the folder where the node starts.""",
+Empty text is `''`; a path is relative to the folder in which the node starts.""",
         *_group("Every node of the graph", COMMON_GROUP),
     ]
     for node, group in OWN_GROUPS.items():
-        parts += _group(f"`{node}`" + ("" if node in NODES else " (stands outside the graph)"), group)
+        parts += _group(f"`{node}`" + ("" if node in NODES else " (outside the graph)"), group)
     return "\n\n".join(parts) + "\n"
 
 
@@ -64,18 +65,18 @@ def topics_page() -> str:
         "# Topics and services",
         WRITTEN_BY,
         f"""\
-Names without a leading `/` are relative: a namespace moves them. `{ANY_ARM}` stands for the name of each arm
-of the robot, as shipped `arm_a` and `arm_b`. The recorder subscribes to every topic. Frames, signs and stamps
-are in [conventions.md](conventions.md), our own types in [messages.md](messages.md).
+Names without a leading `/` are relative: a namespace precedes them. `{ANY_ARM}` stands for the name of each
+arm of the robot, as shipped `arm_a` and `arm_b`. The recorder subscribes to every topic. Frames, signs and
+stamps are in [conventions.md](conventions.md), our own types in [messages.md](messages.md).
 
-A subscription of yours may ask for less than is offered, say best effort; a reliable one that keeps up loses
-nothing. A reliable subscriber that does not keep up holds the loop back: to look at the state at 50 Hz, take
+Your subscription may request less than is offered, such as best effort; a reliable one that keeps up loses
+nothing. A reliable subscriber that is too slow blocks the loop: for the state at 50 Hz, use
 the sampled topics.""",
         "## Topics",
-        table(("Topic", "Type", "When", "Quality of service", "From", "Needed by", "Carries"), topics),
+        table(("Topic", "Type", "Rate", "Quality of service", "From", "Needed by", "Content"), topics),
         "The recorder adds `/tf` to the bag, one message each reference period.",
         "## Services",
-        table(("Service", "Type", "Offered by", "Called by", "Does"), services),
+        table(("Service", "Type", "Offered by", "Called by", "Effect"), services),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -100,7 +101,7 @@ def _group(title: str, group: ParameterGroup) -> Iterator[str]:
     yield f"Defaults: [`config/{group.file}`](../config/{group.file})."
     yield table(("Parameter", "Type", "Default", "Unit", "Allowed", "Meaning"), rows)
     if group is OWN_GROUPS[CONTROLLER]:
-        yield "The schedule may change the gains from phase to phase."
+        yield "The schedule may change the gains per phase."
 
 
 def _nodes(names: Iterable[str]) -> str:

@@ -1,4 +1,4 @@
-"""A control law of one's own in one process, without ROS, scored beside NMPC."""
+"""A custom control law in one process, without ROS, compared with NMPC."""
 
 import numpy as np
 
@@ -12,17 +12,17 @@ from sms_handover.types import BASE_NQ, BASE_NV, Array
 
 
 class JointPd:
-    """u = -m (w^2 e + 2 w q_m'): a critically damped spring per joint, m the inertia that it feels."""
+    """u = -m (w^2 e + 2 w q_m'): a critically damped spring per joint, m its effective inertia."""
 
     def __init__(self, robot: RobotModel, frequency: float = 1.0) -> None:
         """Set up the law for a robot, with the frequency w in rad/s."""
         self._robot, self._frequency = robot, frequency
 
     def reset(self) -> None:
-        """Do nothing: the law has no memory."""
+        """Do nothing: the law has no state."""
 
     def guide(self, guidance: Guidance) -> None:
-        """Take the desired joint angles (n,) rad."""
+        """Set the desired joint angles (n,) rad."""
         self._desired = guidance.reference.position
 
     def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
@@ -33,7 +33,7 @@ class JointPd:
 
 
 def main() -> None:
-    """Run the shipped handover under both laws and print what came of it, side by side."""
+    """Run the shipped handover under both laws and print the results side by side."""
     scenario = load_scenario()
     runs = {
         "joint_pd": simulate(scenario, controller=JointPd(scenario.robot)),

@@ -5,8 +5,6 @@ With a recorder it ends when the bag is complete. A node that fails ends it with
 node starts, and shows progress.
 """
 
-import os
-
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
 from launch.events.process import ProcessExited
@@ -15,7 +13,7 @@ from launch_ros.actions import Node
 from sms_handover.errors import GraphError
 from sms_handover.graph.topics import CONTAINER
 from sms_handover.ros.launching.launch_arguments import ARGUMENTS, launch_processes
-from sms_handover.ros.process.launcher_process import LAUNCHER_PID
+from sms_handover.ros.process.launcher_process import launcher_environment
 
 PACKAGE = "sms_handover"
 OWN_ARGUMENTS = (
@@ -66,7 +64,7 @@ def start(context: LaunchContext) -> list[Node]:
             additional_env={
                 "OPENBLAS_NUM_THREADS": "1",
                 "PYTHONUNBUFFERED": "1",
-                LAUNCHER_PID: str(os.getpid()),  # the nodes end when this process is gone
+                **launcher_environment(),  # the nodes end with this process
             },
             on_exit=end,
         )

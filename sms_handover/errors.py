@@ -1,4 +1,4 @@
-"""The errors that misuse raises; expected outcomes are values with a status instead."""
+"""Errors raised on misuse; expected outcomes are values with a status instead."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -6,7 +6,7 @@ from enum import Enum
 
 
 class SmsHandoverError(Exception):
-    """Root of every error this package raises on purpose; its text is one line for the user."""
+    """Base of all errors of this package; its text is one line for the user."""
 
 
 class ConfigurationError(SmsHandoverError, ValueError):
@@ -14,7 +14,7 @@ class ConfigurationError(SmsHandoverError, ValueError):
 
 
 class UnknownNameError(ConfigurationError):
-    """A name is not among the known ones; the message lists them and the nearest one."""
+    """A name is unknown; the message lists the known ones and the nearest."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str], where: str = "") -> None:
         """Compose the message, e.g. ``unknown controller 'pdi': known are 'nmpc', 'pid'``."""
@@ -41,7 +41,7 @@ class UnstableLoopError(ConfigurationError):
 
 
 class ControllerError(SmsHandoverError):
-    """A controller from outside the package gave efforts that are none."""
+    """A controller from outside the package returned invalid efforts."""
 
 
 class BagError(SmsHandoverError):
@@ -53,7 +53,7 @@ class GraphError(SmsHandoverError):
 
 
 class Reason(Enum):
-    """Why a message is refused at the door of a node; the value is what a user reads."""
+    """Why a message is rejected by the filter of a node; the value is what a user reads."""
 
     MALFORMED = "malformed"  # truncated, oversized, not of its type
     NOT_FINITE = "not finite"
@@ -68,10 +68,9 @@ class Reason(Enum):
 
 
 class MessageError(GraphError):
-    """A message cannot be used; whoever takes it counts it by its reason and goes on without it."""
+    """A message cannot be used; its subscriber counts it by its reason and continues."""
 
     def __init__(self, reason: Reason, text: str) -> None:
-        """Keep the reason beside the words."""
         self.reason = reason
         super().__init__(text)
 

@@ -1,4 +1,4 @@
-"""Frame names and the orders of components that the whole project keeps.
+"""Frame names and the order of components.
 
 Quaternions are stored x, y, z, w (as ROS messages and Pinocchio do). A twist is linear part
 first, then angular. ``a_in_b`` is the pose of frame ``a`` expressed in frame ``b``: it maps
@@ -16,7 +16,7 @@ def tool_frame(arm: str) -> str:
 
 
 def mount_frame(arm: str) -> str:
-    """Return the name of the frame on the spacecraft where an arm is bolted on."""
+    """Return the name of the frame on the spacecraft where an arm is mounted."""
     return f"{arm}_mount"
 
 

@@ -1,4 +1,4 @@
-"""The record of one run as arrays, the same whether it came from a simulation or from a bag."""
+"""Run data: one run as arrays, from a simulation or a bag alike."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -54,7 +54,6 @@ class RunData:
     run_events: tuple[RunEvent, ...] = ()
 
     def __post_init__(self) -> None:
-        """Make every array read-only and the mappings immutable."""
         for item in fields(self):
             value = getattr(self, item.name)
             if isinstance(value, np.ndarray):

@@ -1,8 +1,8 @@
-"""The values that cross the boundaries between core modules; every array in them is read-only.
+"""Types of the values that core modules exchange; every array in them is read-only.
 
 All are in SI units and radians. Joint arrays have one entry per joint, in the order of
-``RobotModel.joint_names``. Poses keep position and quaternion as they are in a message, so a
-value that went over DDS and one that did not are equal bit for bit.
+``RobotModel.joint_names``. Poses keep position and quaternion as in a message, so that values
+sent over DDS stay equal bit for bit.
 """
 
 from collections.abc import Mapping
@@ -23,9 +23,9 @@ _FLOAT64 = np.dtype(np.float64)
 
 
 def read_only(values: npt.ArrayLike) -> Array:
-    """Return ``values`` as a float64 array that cannot be written to, copied unless it is one already.
+    """Return ``values`` as a read-only float64 array, copied unless nobody can write to its memory.
 
-    It is one if nobody can write to its memory, neither through it nor through the array it is a view of.
+    That is the memory of the array itself and of the array it is a view of.
     """
     if type(values) is np.ndarray and values.dtype == _FLOAT64 and not values.flags.writeable:
         base = values.base
@@ -37,9 +37,15 @@ def read_only(values: npt.ArrayLike) -> Array:
 
 
 def frozen(array: Array) -> Array:
-    """Make an array that nobody else holds read-only, so that it can be passed on without a copy."""
+    """Return an array that nobody else holds, made read-only without a copy."""
     array.setflags(write=False)
     return array
+
+
+def freeze(value: object, *names: str) -> None:
+    """Make fields of a frozen dataclass read-only arrays."""
+    for name in names:
+        object.__setattr__(value, name, read_only(getattr(value, name)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +56,7 @@ class Pose:
     quaternion_xyzw: Array
 
     def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only."""
-        object.__setattr__(self, "position", read_only(self.position))
-        object.__setattr__(self, "quaternion_xyzw", read_only(self.quaternion_xyzw))
+        freeze(self, "position", "quaternion_xyzw")
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,14 +67,12 @@ class Twist:
     angular: Array
 
     def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only."""
-        object.__setattr__(self, "linear", read_only(self.linear))
-        object.__setattr__(self, "angular", read_only(self.angular))
+        freeze(self, "linear", "angular")
 
 
 @dataclass(frozen=True, eq=False)
 class RobotState:
-    """The whole state of the robot at one tick.
+    """The state of the robot at one tick.
 
     ``q`` (7 + n,) is position and quaternion x y z w of ``base_link`` in ``world``, then the joint
     angles; ``v`` (6 + n,) is the twist of ``base_link`` in its own axes, then the joint rates.
@@ -83,25 +85,7 @@ class RobotState:
     joint_effort: Array
 
     def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only."""
-        object.__setattr__(self, "q", read_only(self.q))
-        object.__setattr__(self, "v", read_only(self.v))
-        object.__setattr__(self, "joint_effort", read_only(self.joint_effort))
-
-    @classmethod
-    def of(
-        cls,
-        stamp_ns: int,
-        base_in_world: Pose,
-        twist_base_in_base: Twist,
-        joint_position: Array,
-        joint_velocity: Array,
-        joint_effort: Array,
-    ) -> "RobotState":
-        """Return the state that is given part by part."""
-        q = np.concatenate([base_in_world.position, base_in_world.quaternion_xyzw, joint_position])
-        v = np.concatenate([twist_base_in_base.linear, twist_base_in_base.angular, joint_velocity])
-        return cls(stamp_ns, q, v, joint_effort)
+        freeze(self, "q", "v", "joint_effort")
 
     @cached_property
     def base_in_world(self) -> Pose:
@@ -133,21 +117,18 @@ class JointReference:
     velocity: Array
 
     def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only."""
-        object.__setattr__(self, "position", read_only(self.position))
-        object.__setattr__(self, "velocity", read_only(self.velocity))
+        freeze(self, "position", "velocity")
 
 
 @dataclass(frozen=True, eq=False)
 class JointCommand:
-    """Joint efforts (n,) N m that answer the state of the same stamp."""
+    """Joint efforts (n,) N m for the state of the same stamp."""
 
     stamp_ns: int
     effort: Array
 
     def __post_init__(self) -> None:
-        """Copy the array and make it read-only."""
-        object.__setattr__(self, "effort", read_only(self.effort))
+        freeze(self, "effort")
 
 
 class IkStatus(Enum):
@@ -170,14 +151,13 @@ class IkRequest:
     tool_in_world: Mapping[str, Pose]
 
     def __post_init__(self) -> None:
-        """Copy seed and targets and make them read-only."""
-        object.__setattr__(self, "seed", read_only(self.seed))
+        freeze(self, "seed")
         object.__setattr__(self, "tool_in_world", MappingProxyType(dict(self.tool_in_world)))
 
 
 @dataclass(frozen=True, eq=False)
 class IkResult:
-    """The configuration found and how good it is, whatever the status.
+    """The configuration found and its quality, whatever the status.
 
     ``position_error`` m and ``orientation_error`` rad are the largest over the arms asked for;
     ``limit_margin`` rad is the smallest distance of any joint of the robot to its nearer limit;
@@ -195,13 +175,11 @@ class IkResult:
     seed_distance: float
 
     def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only."""
-        object.__setattr__(self, "joint_position", read_only(self.joint_position))
-        object.__setattr__(self, "manipulability", read_only(self.manipulability))
+        freeze(self, "joint_position", "manipulability")
 
 
 class GraspAction(Enum):
-    """What a grasp command asks of the plant."""
+    """The kinds of grasp command."""
 
     GRASP = "grasp"
     RELEASE = "release"
@@ -210,10 +188,10 @@ class GraspAction(Enum):
 
 @dataclass(frozen=True)
 class GraspCommand:
-    """One act on the deputy: ``arm`` acts; a grasp names the deputy's grasp frame it closes on.
+    """A command to ``arm``; a grasp names the grasp frame of the deputy.
 
-    A transfer is a release by ``from_arm`` and a grasp by ``arm`` in the same instant, so no
-    closed kinematic chain forms; if the grasp misses, ``from_arm`` keeps its hold.
+    A transfer is a release by ``from_arm`` and a grasp by ``arm`` at the same instant, so no
+    closed kinematic chain forms; if the grasp misses, ``from_arm`` keeps holding.
     """
 
     action: GraspAction
@@ -223,7 +201,7 @@ class GraspCommand:
 
 
 class GraspStatus(Enum):
-    """How the plant answered a grasp command."""
+    """The outcome of a grasp command."""
 
     SUCCEEDED = "succeeded"
     MISSED = "missed"
@@ -232,7 +210,7 @@ class GraspStatus(Enum):
 
 @dataclass(frozen=True)
 class GraspEvent:
-    """What happened on a grasp command: errors of the tool against the grasp frame at that instant.
+    """The outcome of a grasp command with the errors of the tool against the grasp frame.
 
     ``position_error`` m, ``angle_error`` rad, ``relative_speed`` m/s; NaN where they do not apply.
     """
@@ -247,7 +225,7 @@ class GraspEvent:
 
 
 class PhaseState(Enum):
-    """Whether a phase is carried out, or given up with the joints held where they were."""
+    """Whether a phase is active, or has failed and the joints are held."""
 
     ACTIVE = "active"
     FAILED = "failed"
@@ -255,10 +233,10 @@ class PhaseState(Enum):
 
 @dataclass(frozen=True)
 class TaskPhase:
-    """The phase of the schedule in force at ``stamp_ns`` and the grasp commands due at that instant.
+    """The current phase of the schedule and the grasp commands due at ``stamp_ns``.
 
-    ``attempt`` is 1 the first time, and one more whenever the phase is done again. ``end_ns`` is when
-    the task ends if nothing else happens; 0 where that is not told.
+    ``attempt`` counts the repetitions of the phase from 1. ``end_ns`` is the expected end of the task,
+    0 if unknown.
     """
 
     stamp_ns: int
@@ -267,22 +245,22 @@ class TaskPhase:
     commands: tuple[GraspCommand, ...] = ()
     state: PhaseState = PhaseState.ACTIVE
     attempt: int = 1
-    end_ns: int = field(default=0, repr=False)  # recordings of older versions do not tell it
+    end_ns: int = field(default=0, repr=False)  # not in recordings of older versions
 
     @property
     def failed(self) -> bool:
-        """Whether the phase has been given up."""
+        """Whether the phase has failed."""
         return self.state is PhaseState.FAILED
 
     @property
     def entry(self) -> tuple[int, int, PhaseState]:
-        """Return what differs from the period before where a phase begins, begins again or is given up."""
+        """What changes when a phase begins, is repeated or fails."""
         return self.index, self.attempt, self.state
 
 
 @dataclass(frozen=True, eq=False)
 class DeputyState:
-    """Where the deputy is and who holds it: ``holder`` is an arm name, or '' while it floats."""
+    """Pose and twist of the deputy; ``holder`` is an arm name, or '' while it floats."""
 
     deputy_in_world: Pose
     twist_deputy_in_world: Twist

@@ -1,4 +1,4 @@
-"""Conversions between units; the only place where seconds become integer nanoseconds."""
+"""Units and their conversions; seconds become integer nanoseconds here alone."""
 
 NS_PER_S = 1_000_000_000  # [ns/s]
 DEG_PER_RAD = 57.29577951308232  # [deg/rad]

@@ -57,7 +57,7 @@ def digests_of(run: RunData) -> dict[str, str]:
     return found
 
 
-def rows_of(run: RunData) -> dict[str, np.ndarray]:
+def rows_of(run: RunData) -> dict[str, Any]:
     """Return a row a second of the arrays that a run is made of."""
     return {name: getattr(run, name)[::step] for name, step in ROWS.items()}
 
@@ -101,7 +101,7 @@ def _store(law: str) -> None:
     run = run_of(law)
     text: dict[str, Any] = {"machine": machine(), "digests": digests_of(run)}
     (FOLDER / f"{law}.json").write_text(json.dumps(text, indent=2) + "\n", encoding="utf-8")
-    np.savez_compressed(FOLDER / f"{law}.npz", allow_pickle=False, **rows_of(run))
+    np.savez_compressed(FOLDER / f"{law}.npz", **rows_of(run))
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from .workspace import ROOT, entry_points
 # rosdep/python.yaml and jazzy/distribution.yaml of ros/rosdistro. A module without a key of its own names one
 # that brings it.
 KEYS = {
+    "coal": "coal",
     "eigenpy": "pinocchio",
     "jinja2": "python3-jinja2",
     "launch": "launch",
@@ -30,6 +31,7 @@ KEYS = {
     "mpl_toolkits": "python3-matplotlib",
     "numpy": "python3-numpy",
     "pinocchio": "pinocchio",
+    "rich": "python3-rich",
     "rosbags": "python3-rosbags-pip",
     "yaml": "python3-yaml",
     "zstandard": "mcap-ros2-support",
@@ -91,3 +93,29 @@ def test_what_is_imported_is_declared_to_rosdep(module: str) -> None:
 def test_a_reference_page_is_up_to_date(path: Path) -> None:
     """After a change of parameters, topics or services: ``make reference``."""
     assert path.read_text(encoding="utf-8") == PAGES[path], "run: make reference"
+
+
+def requirements() -> dict[str, list[str]]:
+    """Return what setup.py requires, by extra; '' is what is always installed."""
+    tree = ast.parse((ROOT / "setup.py").read_text(encoding="utf-8"))
+    call = next(node for node in ast.walk(tree) if isinstance(node, ast.Call) and node.keywords)
+    given = {keyword.arg: keyword.value for keyword in call.keywords}
+    extras: dict[str, list[str]] = ast.literal_eval(given["extras_require"])
+    return {"": ast.literal_eval(given["install_requires"]), **extras}
+
+
+def test_the_lowest_versions_are_those_that_are_declared() -> None:
+    """`make lowest` installs the lower bound of all that a user installs, but for the packages of ROS."""
+    bounds = {
+        extra: dict(re.split(">=|,", item)[:2] for item in items if ">=" in item and "ros-" not in item)
+        for extra, items in requirements().items()
+    }
+    lines = (ROOT / ".ci" / "lowest.txt").read_text(encoding="utf-8").splitlines()
+    lowest = dict(line.split("==") for line in lines if not line.startswith("#"))
+    users = {
+        name: bound
+        for extra in ("", "analysis", "compiled", "parquet")
+        for name, bound in bounds[extra].items()
+    }
+    assert users.keys() <= lowest.keys()
+    assert lowest == {name: {**bounds["test"], **users}[name] for name in lowest}

@@ -60,6 +60,7 @@ IN_ROSDEP = set(
         "python3-matplotlib",
         "python3-numpy",
         "python3-pytest",
+        "python3-rich",
         "python3-rosbags-pip",
         "python3-yaml",
     ]
@@ -68,6 +69,7 @@ IN_JAZZY = set(
     [
         "ament_cmake",
         "builtin_interfaces",
+        "coal",
         "diagnostic_msgs",
         "eigenpy",
         "geometry_msgs",

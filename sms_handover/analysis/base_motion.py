@@ -1,4 +1,4 @@
-"""How the free base moved: over a whole phase, and after the tools had settled."""
+"""Motion of the free base over a whole phase, and after the tools have settled."""
 
 from dataclasses import dataclass
 from math import isnan, nan
@@ -16,10 +16,10 @@ class BaseMotion:
     """Motion of ``base_link`` over a window that begins ``begin`` s after the start of a phase.
 
     ``position_change`` m and ``attitude_change`` rad are between the first and the last state;
-    ``position_rate`` m/s and ``attitude_rate`` rad/s are these changes over ``duration`` s: the
-    slope of the drift, to which a swing about a fixed place adds nothing. ``mean_speed`` m/s and
-    ``mean_turn_rate`` rad/s average the size of the velocity, to which it does. NaN where the
-    window holds fewer than two states.
+    ``position_rate`` m/s and ``attitude_rate`` rad/s are these changes divided by ``duration`` s, the
+    net drift: an oscillation about a fixed pose does not contribute. ``mean_speed`` m/s and
+    ``mean_turn_rate`` rad/s average the norm of the velocity, to which it does. NaN where the window
+    has fewer than two states.
     """
 
     begin: float
@@ -36,9 +36,9 @@ UNKNOWN_MOTION = BaseMotion(nan, nan, nan, nan, nan, nan, nan, nan)
 
 
 def base_motion(run: RunData, phase: PhaseSpan, begin: float = 0.0) -> BaseMotion:
-    """Return how the base moved from ``begin`` s after the start of a phase to the phase's end.
+    """Return the motion of the base from ``begin`` s after the start of a phase to the end of the phase.
 
-    A ``begin`` that is NaN, as the settling time of a tool that never settles, gives NaN throughout.
+    If ``begin`` is NaN, as the settling time of a tool that never settles, every figure is NaN.
     """
     if isnan(begin):
         return UNKNOWN_MOTION

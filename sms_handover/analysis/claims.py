@@ -1,4 +1,4 @@
-"""What the paper claims about its two control laws, each with the figures that it is judged by."""
+"""Claims of the paper about its two control laws, each with the figures that decide it."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -14,10 +14,10 @@ from sms_handover.types import GraspAction
 from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
 
 GRASP_BY = 20.0  # [s] the paper: "at t = 20 s, manipulator A, having just grasped the deputy"
-HANDOVER_AT = 40.0  # [s] the last third of the paper's 60 s
-HANDOVER_WITHIN = 0.1  # [s] about HANDOVER_AT
-FINAL_ANGLE = 2.0 / DEG_PER_RAD  # [rad] off the final pose; the distance must be in the settling band
-LATE_PART = 0.75  # [-] of a phase, from where a drift that fades away would be gone
+HANDOVER_AT = 40.0  # [s] start of the last third of the paper's 60 s
+HANDOVER_WITHIN = 0.1  # [s] tolerance about HANDOVER_AT
+FINAL_ANGLE = 2.0 / DEG_PER_RAD  # [rad] from the final pose; the distance must be in the settling band
+LATE_PART = 0.75  # [-] of a phase, after which a transient has decayed
 DRIFT_RATIO = 10.0  # [-] our reading of "drift" against "this issue is not present"
 PEAK_TORQUE = (1.2, 2.6)  # [N m] our reading of "around 2.0"
 FINAL_ERROR = 1e-3  # [m] our reading of "can achieve the desired pose"
@@ -27,7 +27,7 @@ _MICRO = 1e6
 
 @dataclass(frozen=True)
 class Finding:
-    """One figure behind a verdict, for both laws; NaN where it is not defined."""
+    """One figure that decides a claim, for both laws; NaN where it is not defined."""
 
     label: str
     unit: str
@@ -37,7 +37,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Claim:
-    """One claim: what is compared, the paper's words, the figures, and whether it holds."""
+    """One claim: what is compared, the quotation from the paper, the figures, and the verdict."""
 
     name: str
     text: str
@@ -47,7 +47,7 @@ class Claim:
 
 
 def judge(nmpc: RunMetrics, pid: RunMetrics) -> tuple[Claim, ...]:
-    """Return the verdicts on the paper's claims for a run under each law."""
+    """Return the paper's claims, judged on one run under each law."""
     return (
         _completion(nmpc, pid),
         _overshoot(nmpc, pid),
@@ -59,7 +59,6 @@ def judge(nmpc: RunMetrics, pid: RunMetrics) -> tuple[Claim, ...]:
 
 
 def _completion(nmpc: RunMetrics, pid: RunMetrics) -> Claim:
-    """Judge whether both laws carry the task out."""
     outcomes = (_outcome(nmpc), _outcome(pid))
     rows = (
         ("A holds the deputy from", "s"),
@@ -83,7 +82,7 @@ def _completion(nmpc: RunMetrics, pid: RunMetrics) -> Claim:
 
 @dataclass(frozen=True)
 class _Outcome:
-    """Grasp time s, handover time s, final distance mm and angle deg of arm B; and the verdict."""
+    """Grasp time s, handover time s, final distance mm and angle deg of arm B, and the verdict."""
 
     values: tuple[float, float, float, float]
     complete: bool
@@ -124,7 +123,6 @@ def _time_of(changes: Iterable[Hold], wanted: Callable[[Hold], bool]) -> float:
 
 
 def _overshoot(nmpc: RunMetrics, pid: RunMetrics) -> Claim:
-    """Judge whether PID overshoots more, in every motion of a tool."""
     findings = _per_motion(nmpc, pid, "mm", lambda tool: tool.overshoot * MM_PER_M)
     return Claim(
         "overshoot",
@@ -136,22 +134,21 @@ def _overshoot(nmpc: RunMetrics, pid: RunMetrics) -> Claim:
 
 
 def _settling(nmpc: RunMetrics, pid: RunMetrics) -> Claim:
-    """Judge whether PID settles later, in every motion of a tool."""
     findings = _per_motion(nmpc, pid, "s", lambda tool: tool.settling_time)
     return Claim(
         "settling",
         "In every motion of a tool, PID settles later than NMPC.",
         "[PID] exhibited [...] longer settling times than NMPC",
         findings,
-        _all_larger([_never_as_infinite(finding) for finding in findings]),
+        _all_larger(findings, undefined=inf),
     )
 
 
 def _drift(nmpc: RunMetrics, pid: RunMetrics) -> Claim:
-    """Judge whether the base drifts under PID and not under NMPC, once the tools are where they shall be.
+    """Judge whether the base drifts under PID but not under NMPC, once the tools have settled.
 
-    Per phase the window is the same for both laws: from when every tool has settled under either
-    law to the end of the phase. The rate is the net change over all windows by their total length.
+    The window of a phase is the same for both laws: from when every tool has settled under both to the
+    end of the phase. The rate is the net change over all windows divided by their total length.
     """
     begins = {name: common_settling((nmpc, pid), name) for name in _common_phases(nmpc, pid)}
     settled = _drift_pairs(nmpc, pid, begins)
@@ -184,13 +181,13 @@ _Pair = tuple[BaseMotion, BaseMotion]
 
 
 def _drift_pairs(nmpc: RunMetrics, pid: RunMetrics, begins: Mapping[str, float]) -> dict[str, _Pair]:
-    """Return the motions of the base under both laws, for the phases in which both have settled."""
+    """Return the motions of the base under both laws, for the phases in which both settle."""
     pairs = {name: (nmpc.drift(name, begin), pid.drift(name, begin)) for name, begin in begins.items()}
     return {name: pair for name, pair in pairs.items() if not any(isnan(m.duration) for m in pair)}
 
 
 def _drift_rate(label: str, unit: str, pairs: Iterable[_Pair], change: str) -> Finding:
-    """Return the sum of the net changes by the sum of the durations, under both laws, in 1e-6 of SI."""
+    """Return the sum of the net changes divided by the sum of the durations, in 1e-6 of SI units."""
     rates = []
     for motions in zip(*pairs, strict=True):
         total = sum(getattr(motion, change) for motion in motions)
@@ -199,13 +196,12 @@ def _drift_rate(label: str, unit: str, pairs: Iterable[_Pair], change: str) -> F
 
 
 def _duration(metrics: RunMetrics, name: str) -> float:
-    """Return the length in s of a phase, NaN if the run has none of that name."""
+    """Return the duration in s of a phase, NaN if the run has none of that name."""
     found = metrics.phase(name)
     return found.phase.duration if found is not None else nan
 
 
 def _peak_torque(nmpc: RunMetrics, pid: RunMetrics) -> Claim:
-    """Judge whether the largest torque of any joint is about 2 N m under each law."""
     low, high = PEAK_TORQUE
     finding = Finding(
         "largest torque of any joint", "N m", largest(nmpc.torque.peak), largest(pid.torque.peak)
@@ -220,7 +216,6 @@ def _peak_torque(nmpc: RunMetrics, pid: RunMetrics) -> Claim:
 
 
 def _final_error(nmpc: RunMetrics, pid: RunMetrics) -> Claim:
-    """Judge whether NMPC brings every tool to its target by the end of every phase."""
     worst = [
         largest([tool.final_error for phase in run.phases for tool in phase.tools.values()])
         for run in (nmpc, pid)
@@ -236,14 +231,13 @@ def _final_error(nmpc: RunMetrics, pid: RunMetrics) -> Claim:
 
 
 def _common_phases(nmpc: RunMetrics, pid: RunMetrics) -> list[str]:
-    """Return the names of the phases that both runs have."""
     return [item.phase.name for item in nmpc.phases if pid.phase(item.phase.name) is not None]
 
 
 def _per_motion(
     nmpc: RunMetrics, pid: RunMetrics, unit: str, value: Callable[[ToolTracking], float]
 ) -> tuple[Finding, ...]:
-    """Return a figure of every phase and arm in which both laws move the tool."""
+    """Return a figure for every phase and arm in which the tool moves under both laws."""
     findings = []
     for name in _common_phases(nmpc, pid):
         tools: list[Mapping[str, ToolTracking]] = [
@@ -256,13 +250,7 @@ def _per_motion(
     return tuple(findings)
 
 
-def _never_as_infinite(finding: Finding) -> Finding:
-    """Return a finding in which what never happened takes for ever."""
-    nmpc, pid = (inf if isnan(value) else value for value in (finding.nmpc, finding.pid))
-    return Finding(finding.label, finding.unit, nmpc, pid)
-
-
-def _all_larger(findings: Iterable[Finding]) -> bool:
-    """Whether there are findings, and in each of them PID's value is the larger one."""
-    compared = [finding.pid > finding.nmpc for finding in findings]
-    return bool(compared) and all(compared)
+def _all_larger(findings: Iterable[Finding], undefined: float = nan) -> bool:
+    """Whether PID has the larger value in every finding, with ``undefined`` for NaN, and there is one."""
+    pairs = [[undefined if isnan(value) else value for value in (item.nmpc, item.pid)] for item in findings]
+    return bool(pairs) and all(pid > nmpc for nmpc, pid in pairs)

@@ -1,4 +1,4 @@
-"""Several runs side by side, and the paper's claims where they are a pair of NMPC and PID."""
+"""Comparison of several runs, with the paper's claims where they are a pair of NMPC and PID."""
 
 import re
 from collections.abc import Mapping
@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 from sms_handover.analysis.base_motion import BaseMotion
 from sms_handover.analysis.claims import Claim, judge
+from sms_handover.analysis.clearance import TaskTexts
 from sms_handover.analysis.metrics import RunMetrics, common_settling, measure
 from sms_handover.bag.run.loop_record import LoopRecord
 from sms_handover.errors import UnknownNameError
@@ -18,10 +19,10 @@ PID = "pid"
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """The metrics of every run by its name; the drift of the base per run and phase; the claims.
+    """The metrics of every run by name; the drift of the base per run and phase; the claims.
 
-    ``phase_names`` has every phase that any run has. The drift of a phase is taken over one window for
-    all runs, from when the slowest of those that settle has settled. ``claims`` is empty unless
+    ``phase_names`` has every phase of any run. The drift of a phase is taken over the same window for
+    all runs, which begins when the slowest of those that settle has settled. ``claims`` is empty unless
     exactly one run is under NMPC and one under PID.
     """
 
@@ -40,18 +41,22 @@ def compare(
     runs: Mapping[str, RunData],
     laws: Mapping[str, str] | None = None,
     loops: Mapping[str, LoopRecord] | None = None,
+    texts: Mapping[str, TaskTexts] | None = None,
 ) -> Comparison:
     """Return the comparison of runs by name.
 
-    ``laws`` has the control law of each run; without it a run whose name holds the word ``nmpc`` or
-    ``pid`` is taken to be under that law. ``loops`` has the course of runs in wall time. Raises
-    UnknownNameError for a law or a course of a run that is not there.
+    ``laws`` has the control law of each run; without it a run whose name contains the word ``nmpc`` or
+    ``pid`` is taken to be under that law. ``loops`` has the wall-clock records of runs, and
+    ``texts`` what each was made with, by which clearance and joint limits are judged. Raises UnknownNameError
+    for a law, a record or texts of an unknown run.
     """
-    for given, what in ((laws, "control laws"), (loops, "loops")):
+    for given, what in ((laws, "control laws"), (loops, "loops"), (texts, "texts")):
         for name in given or {}:
             if name not in runs:
                 raise UnknownNameError("run", name, runs, what)
-    metrics = {name: measure(run, (loops or {}).get(name)) for name, run in runs.items()}
+    metrics = {
+        name: measure(run, (loops or {}).get(name), (texts or {}).get(name)) for name, run in runs.items()
+    }
     names = tuple(dict.fromkeys(item.phase.name for run in metrics.values() for item in run.phases))
     begins = {name: common_settling(metrics.values(), name) for name in names}
     drift = {
@@ -65,6 +70,6 @@ def compare(
 
 
 def _law_in(name: str) -> str:
-    """Return the control law that a run's name tells of, '' if it tells of none or of both."""
+    """Return the control law in a run's name, '' if there is none or both are."""
     words = set(re.split(r"[^a-z0-9]+", name.casefold())) & {NMPC, PID}
     return words.pop() if len(words) == 1 else ""

@@ -1,4 +1,4 @@
-"""Whether a run kept the laws that a free-floating robot keeps, and whether its references existed."""
+"""Conservation of momentum and energy over a run, and outcomes of its inverse kinematics."""
 
 from dataclasses import dataclass
 from math import nan
@@ -8,6 +8,7 @@ import numpy as np
 from sms_handover.analysis.numbers import largest, lengths
 from sms_handover.analysis.phases import PhaseSpan
 from sms_handover.analysis.signals import energy_residual
+from sms_handover.graph.message_constants import CONSTANTS
 from sms_handover.run_data import RunData
 from sms_handover.types import IkStatus
 
@@ -16,7 +17,7 @@ _NOT_ASKED = -1
 
 @dataclass(frozen=True)
 class PhysicsResiduals:
-    """Largest violation of each conservation law over a run that starts at rest.
+    """Largest violation of each conservation law in a run that starts at rest.
 
     ``linear_momentum`` kg m/s and ``angular_momentum`` kg m^2/s, the latter about the centre of
     mass; ``energy`` is the largest |change of kinetic energy - work of the torques|, relative to
@@ -31,9 +32,9 @@ class PhysicsResiduals:
 
 @dataclass(frozen=True)
 class IkOutcomes:
-    """How many inverse-kinematics solves a run asked for, and how many did not converge.
+    """How many inverse-kinematics solves a run requested, and how many did not converge.
 
-    ``failures`` are those that ``stalled`` and those that came to the ``iteration_limit``.
+    ``failures`` are those that ``stalled`` plus those that reached the ``iteration_limit``.
     """
 
     solves: int
@@ -43,9 +44,9 @@ class IkOutcomes:
 
 
 def physics_residuals(run: RunData, phase: PhaseSpan | None = None) -> PhysicsResiduals:
-    """Return how far momenta and energy were from what they must be, in a phase or in the whole run.
+    """Return the residuals of momenta and energy in a phase or in the whole run.
 
-    The energy of a phase is balanced from its first sample on.
+    The energy balance of a phase starts at its first sample.
     """
     rows = phase.rows if phase else slice(None)
     peak = largest(run.kinetic_energy[rows])
@@ -60,9 +61,9 @@ def physics_residuals(run: RunData, phase: PhaseSpan | None = None) -> PhysicsRe
 
 
 def ik_outcomes(run: RunData, phase: PhaseSpan | None = None) -> IkOutcomes:
-    """Return how the inverse-kinematics solves of a phase, or of the whole run, ended."""
+    """Return the outcomes of the inverse-kinematics solves in a phase or in the whole run."""
     status = run.ik_status[phase.rows if phase else slice(None)]
-    of_kind = {kind: int(np.count_nonzero(status == number)) for number, kind in enumerate(IkStatus)}
+    of_kind = {kind: int(np.count_nonzero(status == CONSTANTS[kind])) for kind in IkStatus}
     solves = int(np.count_nonzero(status != _NOT_ASKED))
     return IkOutcomes(
         solves=solves,

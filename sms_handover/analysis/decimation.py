@@ -1,4 +1,4 @@
-"""Thin a long series for drawing, without losing what the eye would see."""
+"""Decimation of a long series for drawing that keeps its visible shape."""
 
 from itertools import pairwise
 
@@ -9,7 +9,7 @@ from sms_handover.errors import ConfigurationError
 from sms_handover.types import Array
 
 _EXTREMES = 2  # samples kept of a bucket: its smallest and its largest value
-_GAPS = 3  # more of them where there is NaN: one before, between and behind the extremes
+_GAPS = 3  # further samples where there is NaN: one before, between and after the extremes
 FEWEST_POINTS = 2 + _EXTREMES + _GAPS  # the two ends, and one bucket
 
 
@@ -17,15 +17,14 @@ def decimate(time: Array, values: Array, points: int) -> tuple[Array, Array]:
     """Return at most ``points`` samples of a series (N,) that draw the same picture, in the order of time.
 
     The samples between the first and the last are split into buckets of equal count. Kept are the first
-    and the last sample, the smallest and the largest value of each bucket, and so many NaN that no two
-    kept numbers have a NaN between them that is left out: a line never bridges a gap. A series of no
-    more than ``points`` is returned whole. Raises ConfigurationError for fewer than 7 points, or a
-    time and values of different length.
+    and the last sample, the smallest and the largest value of each bucket, and enough NaN that a line
+    never bridges a gap. A series of at most ``points`` samples is returned unchanged. Raises
+    ConfigurationError for fewer than 7 points, or if time and values differ in length.
     """
     if time.ndim != 1 or time.shape != values.shape:
-        raise ConfigurationError(f"time {time.shape} and values {values.shape} must be two series (N,) alike")
+        raise ConfigurationError(f"time {time.shape} and values {values.shape} must both have the shape (N,)")
     if points < FEWEST_POINTS:
-        raise ConfigurationError(f"points is {points}, it must be at least {FEWEST_POINTS}")
+        raise ConfigurationError(f"points is {points}, it must be >= {FEWEST_POINTS}")
     if len(values) <= points:
         return time, values
     unknown = np.isnan(values)
@@ -40,7 +39,7 @@ def decimate(time: Array, values: Array, points: int) -> tuple[Array, Array]:
 
 
 def _of_bucket(values: Array, unknown: npt.NDArray[np.bool_]) -> set[int]:
-    """Return the places of the extremes of a bucket, and of a NaN in each part that they divide it into."""
+    """Return the indices of the extremes of a bucket, and of one NaN in each part between them."""
     if np.all(unknown):
         return {0}
     low = int(np.argmin(np.where(unknown, np.inf, values)))

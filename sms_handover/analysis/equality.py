@@ -1,4 +1,4 @@
-"""Whether two runs are the same, bit for bit."""
+"""Equality of two runs, bit for bit."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
@@ -27,27 +27,26 @@ _PER_JOINT = (
 
 @dataclass(frozen=True)
 class Difference:
-    """One field in which two runs differ: how many rows, the first of them, and by how much at most."""
+    """One field in which two runs differ: how many rows, the first of them, and the largest difference."""
 
     field: str
     detail: str
 
     def __str__(self) -> str:
-        """Return the difference in words."""
         return f"{self.field}: {self.detail}"
 
 
 def compare_runs(a: RunData, b: RunData) -> tuple[Difference, ...]:
-    """Return the fields in which two runs differ; none means that every bit is the same (NaN equals NaN).
+    """Return the fields in which two runs differ; none if they are bit-identical (NaN equals NaN).
 
-    Of what the nodes have decided only the trajectory's count: they follow from the numbers, those of
-    the others from wall time too. That somebody has refused a message follows from what a stranger sent.
+    Of the run events only those of the trajectory are compared, because those of other nodes depend on
+    wall time too. Events of rejected messages are left out: they depend on what strangers sent.
     """
     return tuple(_differences(a, b))
 
 
 def before(run: RunData, end_ns: int) -> RunData:
-    """Return what a run was before a time."""
+    """Return the part of a run before ``end_ns``."""
     ticks, periods = run.tick_ns < end_ns, run.reference_ns < end_ns
     values: dict[str, Any] = {}
     for item in fields(RunData):
@@ -64,7 +63,6 @@ def before(run: RunData, end_ns: int) -> RunData:
 
 
 def _differences(a: RunData, b: RunData) -> Iterator[Difference]:
-    """Yield the differences field by field."""
     for item in fields(RunData):
         left, right = _compared(a, item.name), _compared(b, item.name)
         if isinstance(left, np.ndarray):
@@ -93,7 +91,7 @@ def _compared(run: RunData, name: str) -> Any:
 
 
 def _first_difference(left: tuple[object, ...], right: tuple[object, ...]) -> str:
-    """Return in words where two tuples differ first; they are compared by what they print, as NaN is."""
+    """Return the first difference of two tuples; they are compared by their repr, in which NaN equals NaN."""
     for index, (one, other) in enumerate(zip(left, right, strict=False)):
         if repr(one) != repr(other):
             return f"item {index} is {one!r} and {other!r}"
@@ -101,7 +99,6 @@ def _first_difference(left: tuple[object, ...], right: tuple[object, ...]) -> st
 
 
 def _compare(name: str, left: np.ndarray, right: np.ndarray) -> Iterator[Difference]:
-    """Yield the difference of two arrays, if there is one."""
     if left.shape != right.shape:
         yield Difference(name, f"shapes {left.shape} and {right.shape}")
         return

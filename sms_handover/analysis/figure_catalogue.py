@@ -1,4 +1,4 @@
-"""Which figures there are; known without matplotlib, so that help can list them."""
+"""Catalogue of the figures, which needs no matplotlib, so that ``--help`` can list them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ FORMATS = ("pdf", "png", "svg")
 
 @dataclass(frozen=True)
 class FigureKind:
-    """One kind of figure: ``paper`` has the numbers of the paper's figures that show the same, or ''."""
+    """One kind of figure; ``paper`` has the numbers of the corresponding figures of the paper, or ''."""
 
     name: str
     text: str
@@ -29,7 +29,7 @@ FIGURES = (
 
 
 def chosen_figures(names: Sequence[str] = ()) -> tuple[FigureKind, ...]:
-    """Return the kinds of these names, each once, or all of them; raises UnknownNameError."""
+    """Return the kinds with these names, each once, or all if none is given; raises UnknownNameError."""
     known = {kind.name: kind for kind in FIGURES}
     for name in names:
         if name not in known:
@@ -38,7 +38,7 @@ def chosen_figures(names: Sequence[str] = ()) -> tuple[FigureKind, ...]:
 
 
 def chosen_formats(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the formats of these names, each once; raises UnknownNameError."""
+    """Return the formats with these names, each once; raises UnknownNameError."""
     for name in names:
         if name not in FORMATS:
             raise UnknownNameError("figure format", name, FORMATS)

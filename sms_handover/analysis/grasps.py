@@ -1,4 +1,4 @@
-"""Who held the deputy, from the grasp events of a run."""
+"""Grasps of a run: who held the deputy, and within which tolerance."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from sms_handover.types import GraspAction, GraspEvent, GraspStatus
 
 
 class Tolerance(Protocol):
-    """How far a tool may be from a grasp frame when it closes: m, rad, m/s."""
+    """Largest pose error and relative speed at which a grasp succeeds: m, rad, m/s."""
 
     @property
     def position(self) -> float:
@@ -25,7 +25,7 @@ class Tolerance(Protocol):
 
 @dataclass(frozen=True)
 class Hold:
-    """From ``since_ns`` on ``holder`` has the deputy; '' while it floats. ``giver`` had it before."""
+    """``holder`` has the deputy from ``since_ns`` on, '' while it floats; ``giver`` had it before."""
 
     since_ns: int
     holder: str
@@ -33,7 +33,7 @@ class Hold:
 
 
 def holds(events: Iterable[GraspEvent]) -> tuple[Hold, ...]:
-    """Return every change of who holds the deputy, in the order of time; only what succeeded counts."""
+    """Return every change of holder, in the order of time; only successful grasps and releases count."""
     changes: list[Hold] = []
     holder = ""
     for event in events:

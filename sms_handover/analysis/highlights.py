@@ -1,4 +1,4 @@
-"""The few figures that a comparison of runs is read for first, each the worst one of a whole run."""
+"""Highlights of a comparison: a few figures, each the worst value over a whole run."""
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
@@ -57,32 +57,28 @@ def succeeded(events: Iterable[GraspEvent]) -> tuple[int, int]:
 
 
 def _succeeded(run: RunMetrics) -> str:
-    """Return the outcome of all grasp commands as one cell."""
     count, total = succeeded(run.run.grasp_events)
     return f"{count} of {total}"
 
 
 def _worst_grasp(run: RunMetrics) -> float:
-    """Return the largest distance in mm between tool and grasp frame at a grasp command."""
+    """Return the largest distance in mm between tool and grasp frame at any grasp command."""
     return largest([event.position_error for event in run.run.grasp_events]) * MM_PER_M
 
 
 def _tools(run: RunMetrics) -> list[ToolTracking]:
-    """Return the tools of all phases of a run."""
     return [tool for phase in run.phases for tool in phase.tools.values()]
 
 
 def _worst(run: RunMetrics, value: Callable[[ToolTracking], float]) -> float:
-    """Return the largest value of any tool in any phase."""
     return largest([value(tool) for tool in _tools(run)])
 
 
 def _slowest(run: RunMetrics) -> float:
-    """Return the longest settling time in s of a tool that moves, NaN if one never settles."""
+    """Return the longest settling time in s of any moving tool, NaN if one never settles."""
     times = [tool.settling_time for tool in _tools(run) if tool.motion is not Motion.HOLD]
     return nan if any(map(isnan, times)) else largest(times)
 
 
 def _fastest(phases: Mapping[str, BaseMotion], rate: Callable[[BaseMotion], float]) -> float:
-    """Return the largest drift of any phase."""
     return largest([rate(drift) for drift in phases.values()])

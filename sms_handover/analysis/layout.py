@@ -1,4 +1,4 @@
-"""Plain-text tables with a column per run, wrapped into several blocks where they would be too wide."""
+"""Layout of plain-text tables with a column per run, split into blocks where they would be too wide."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -7,17 +7,17 @@ from typing import TypeVar
 
 T = TypeVar("T")
 
-WIDTH = 100  # [characters] no line is longer
+WIDTH = 100  # [characters] of the longest line
 MISSING = "-"
-_LONGEST_NAME = 24  # [characters] of a run; longer ones keep their end
+_LONGEST_NAME = 24  # [characters] of a run; a longer one is shortened to its end
 _GAP = "  "
 
 
 @dataclass(frozen=True)
 class Row:
-    """A label with its unit, and one cell per run; a subheading has none.
+    """A label with its unit, and one cell per run; a subheading has no cells.
 
-    ``better`` has the places of the cells with the best value; none where there is nothing to choose.
+    ``better`` has the indices of the cells with the best value, none if they are all equal.
     """
 
     label: str
@@ -27,7 +27,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Section:
-    """Rows under a title, beside which the names of the runs are printed."""
+    """Rows under a title; the names of the runs are printed beside the title."""
 
     title: str
     rows: tuple[Row, ...]
@@ -46,9 +46,9 @@ def row(
     *,
     smaller_is_better: bool = False,
 ) -> Row:
-    """Return a row with a number of every item; ``missing`` stands for NaN, a dash for no item.
+    """Return a row with a number for every item; ``missing`` stands for NaN, a dash for no item.
 
-    Where ``smaller_is_better``, a NaN with a word of its own, as *never*, is worse than any number.
+    With ``smaller_is_better`` a NaN with its own text, such as *never*, is worse than any number.
     """
     values = [None if item is None else value(item) for item in items]
     cells = tuple(MISSING if each is None else number(each, missing) for each in values)
@@ -59,7 +59,7 @@ def row(
 
 
 def _best(cells: Sequence[str], costs: Sequence[float]) -> frozenset[int]:
-    """Return the places of the smallest cost, none if all that is known reads the same."""
+    """Return the indices of the smallest cost, none if all known cells read the same."""
     known = [cell for cell in cells if cell != MISSING]
     if len(set(known)) <= 1:
         return frozenset()
@@ -68,7 +68,7 @@ def _best(cells: Sequence[str], costs: Sequence[float]) -> frozenset[int]:
 
 
 def layout(names: Sequence[str], sections: Sequence[Section]) -> list[str]:
-    """Return the lines of the sections, with as many runs side by side as fit."""
+    """Return the lines of the sections, with as many runs side by side as the width allows."""
     short = [name if len(name) <= _LONGEST_NAME else f"...{name[3 - _LONGEST_NAME :]}" for name in names]
     rows = [item for section in sections for item in section.rows]
     labels = [*(section.title for section in sections), *(item.label for item in rows if item.cells)]
@@ -86,5 +86,4 @@ def layout(names: Sequence[str], sections: Sequence[Section]) -> list[str]:
 
 
 def _line(item: Row, label: int, cell: int) -> str:
-    """Return one row with its cells to the right."""
     return (item.label.ljust(label) + "".join(_GAP + text.rjust(cell) for text in item.cells)).rstrip()

@@ -1,4 +1,4 @@
-"""How the loop of a recorded run kept time."""
+"""Timing of the loop in a recorded run."""
 
 from dataclasses import dataclass
 from math import nan, sqrt
@@ -9,19 +9,19 @@ from sms_handover.analysis.numbers import largest
 from sms_handover.bag.run.loop_record import LoopRecord
 from sms_handover.units import NS_PER_S, ns_to_seconds
 
-_TAIL = 99.0  # [%] of the periods are no longer than the one that is told
+_TAIL = 99.0  # [%] percentile of the periods that is reported
 
 
 @dataclass(frozen=True)
 class LoopTiming:
     """Wall time of a run, in s; NaN where it was not recorded.
 
-    As the recorder got the states: ``wall_duration`` from the first to the last, ``real_time_factor``
-    simulated over wall time, ``largest_lag`` how far the simulation was behind the wall clock at most,
-    ``period_median`` and ``period_tail`` (99 % are no longer) between two of them. As the plant itself
-    measured: ``period_mean``, ``period_std`` and ``period_max`` between its ticks, the number of
-    ``late_ticks``, which began more than a tick behind their deadline, and of ``held_commands``, ticks
-    integrated with an old command; both happen in real time only.
+    From the states as the recorder received them: ``wall_duration`` from the first to the last,
+    ``real_time_factor`` simulated over wall time, ``largest_lag`` of the simulation behind the wall
+    clock, and median and 99th percentile of the period between states, ``period_median`` and
+    ``period_tail``. As measured by the plant: ``period_mean``, ``period_std`` and ``period_max``
+    between ticks; the number of ``late_ticks``, which began more than a tick after their deadline, and
+    of ``held_commands``, ticks integrated with an old command; both occur in real time only.
     """
 
     wall_duration: float
@@ -37,7 +37,7 @@ class LoopTiming:
 
 
 def loop_timing(record: LoopRecord) -> LoopTiming:
-    """Return how the loop kept time."""
+    """Return the timing of a loop."""
     walls, stamps = record.wall, record.tick_ns
     periods = np.diff(walls)
     wall = float(walls[-1]) if periods.size else nan
@@ -59,7 +59,7 @@ def loop_timing(record: LoopRecord) -> LoopTiming:
 
 
 def _pooled(record: LoopRecord) -> tuple[float, float]:
-    """Return mean and standard deviation in s of all periods that the plant's reports speak of."""
+    """Return mean and standard deviation in s of all periods, pooled over the plant's reports."""
     counts = np.diff(record.ticks, prepend=0.0)
     total = float(counts.sum())
     if not total > 0.0:

@@ -1,4 +1,4 @@
-"""Everything that is measured on one run."""
+"""Metrics of one run, for each phase and for the whole of it."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -6,7 +6,9 @@ from math import isnan, nan
 from types import MappingProxyType
 
 from sms_handover.analysis.base_motion import UNKNOWN_MOTION, BaseMotion, base_motion
+from sms_handover.analysis.clearance import RunClearance, TaskTexts, run_clearance
 from sms_handover.analysis.conservation import IkOutcomes, PhysicsResiduals, ik_outcomes, physics_residuals
+from sms_handover.analysis.joint_limits import LimitUse, limit_use
 from sms_handover.analysis.loop_timing import LoopTiming, loop_timing
 from sms_handover.analysis.numbers import largest
 from sms_handover.analysis.phases import PhaseSpan, phase_spans
@@ -14,12 +16,13 @@ from sms_handover.analysis.torque import JointTorque, joint_torque
 from sms_handover.analysis.tracking import ToolTracking, tool_tracking
 from sms_handover.analysis.work import JointWork, joint_work
 from sms_handover.bag.run.loop_record import LoopRecord
+from sms_handover.model.floating_model import floating_model
 from sms_handover.run_data import RunData
 
 
 @dataclass(frozen=True, eq=False)
 class PhaseMetrics:
-    """One phase: every arm's tracking, the motion of the base over it, torques, work and receipts."""
+    """One phase: tracking of every arm, motion of the base, torques, work, conservation residuals."""
 
     phase: PhaseSpan
     tools: Mapping[str, ToolTracking]
@@ -41,9 +44,10 @@ class PhaseMetrics:
 
 @dataclass(frozen=True, eq=False)
 class RunMetrics:
-    """One run: its phases in the order of time, and what holds for the whole of it.
+    """One run: its phases in the order of time, and the figures of the whole run.
 
-    ``loop`` is how the run kept time, None where that is not known.
+    ``loop`` is the timing of the run, None where it is not known; so are ``clearance`` and ``limits``
+    where it is not known what the run was made with.
     """
 
     run: RunData
@@ -53,15 +57,17 @@ class RunMetrics:
     physics: PhysicsResiduals
     ik: IkOutcomes
     loop: LoopTiming | None = None
+    clearance: RunClearance | None = None
+    limits: LimitUse | None = None
 
     def phase(self, name: str) -> PhaseMetrics | None:
-        """Return the phase of a name, None if the run has none."""
+        """Return the phase with a name, None if the run has none."""
         return next((item for item in self.phases if item.phase.name == name), None)
 
     def drift(self, name: str, begin: float) -> BaseMotion:
         """Return the motion of the base from ``begin`` s after the start of a phase to its end.
 
-        NaN throughout if the run has no such phase, or its own tools have not settled by then.
+        Every figure is NaN if the run has no such phase, or its own tools have not settled by then.
         """
         found = self.phase(name)
         if found is None or not found.settling_time <= begin:
@@ -72,14 +78,14 @@ class RunMetrics:
 def common_settling(runs: Iterable[RunMetrics], name: str) -> float:
     """Return the time in s after the start of a phase at which the slowest run has settled.
 
-    Runs that never settle in it, or do not have it, are left out; NaN if no run is left.
+    Runs that do not settle in the phase, or lack it, are left out; NaN if no run remains.
     """
     found = [phase for phase in (run.phase(name) for run in runs) if phase is not None]
     return largest([phase.settling_time for phase in found])
 
 
-def measure(run: RunData, loop: LoopRecord | None = None) -> RunMetrics:
-    """Return all metrics of a run; ``loop`` is its course in wall time, where it is known."""
+def measure(run: RunData, loop: LoopRecord | None = None, texts: TaskTexts | None = None) -> RunMetrics:
+    """Return all metrics of a run, given its wall-clock record and what it was made with, if known."""
     return RunMetrics(
         run=run,
         phases=tuple(_measure_phase(run, phase) for phase in phase_spans(run)),
@@ -88,11 +94,12 @@ def measure(run: RunData, loop: LoopRecord | None = None) -> RunMetrics:
         physics=physics_residuals(run),
         ik=ik_outcomes(run),
         loop=loop_timing(loop) if loop else None,
+        clearance=run_clearance(run, texts) if texts else None,
+        limits=limit_use(run, floating_model(texts.urdf)) if texts else None,
     )
 
 
 def _measure_phase(run: RunData, phase: PhaseSpan) -> PhaseMetrics:
-    """Return the metrics of one phase."""
     return PhaseMetrics(
         phase,
         {arm: tool_tracking(run, phase, arm) for arm in run.arms},

@@ -1,4 +1,4 @@
-"""How a tool turned with its target through one phase."""
+"""Orientation tracking of a tool through one phase."""
 
 from dataclasses import dataclass
 from math import nan
@@ -12,8 +12,8 @@ from sms_handover.run_data import Stamps
 from sms_handover.types import Array
 from sms_handover.units import DEG_PER_RAD
 
-# [rad] smallest band, and the smallest turn that counts as one: to the shipped grasp tolerance of
-# 2 degrees what the floor of 1 mm is to that of 10 mm
+# [rad] smallest band, and smallest rotation that counts as one: a tenth of the shipped grasp tolerance,
+# as the floor of 1 mm is a tenth of that of 10 mm
 TURN_FLOOR = 0.2 / DEG_PER_RAD
 
 
@@ -21,10 +21,9 @@ TURN_FLOOR = 0.2 / DEG_PER_RAD
 class OrientationTracking:
     """Orientation errors of one tool in one phase, in rad and s; NaN where not defined.
 
-    ``step_angle`` is the turn from the tool at the start to its goal. ``overshoot`` and
-    ``overshoot_ratio`` (of that turn) are defined only if it is a turn, of more than 0.2 degrees.
-    ``settling_time`` is NaN if the error is outside ``band`` at the end. ``docs/metrics.md`` has the
-    formulas.
+    ``step_angle`` is the rotation from the tool at the start to its goal. ``overshoot`` and
+    ``overshoot_ratio`` (of that rotation) are defined only if it exceeds 0.2 degrees. ``settling_time``
+    is NaN if the error is outside ``band`` at the end. ``docs/metrics.md`` has the formulas.
     """
 
     step_angle: float
@@ -39,9 +38,9 @@ class OrientationTracking:
 def orientation_tracking(
     phase: PhaseSpan, stamp_ns: Stamps, tool: Array, target: Array, *, smooth: bool
 ) -> OrientationTracking:
-    """Return how a tool turned with its target, both quaternions (R, 4) x y z w at ``stamp_ns``.
+    """Return how a tool followed the orientation of its target, quaternions (R, 4) x y z w at ``stamp_ns``.
 
-    The goal is where the target is at each instant, or, if it moves smoothly, where it ends.
+    The goal is the target at each instant, or, with ``smooth``, the target at the end of the phase.
     """
     off = rotation_vectors(target[-1:] if smooth else target, tool)
     error = lengths(rotation_vectors(target, tool))

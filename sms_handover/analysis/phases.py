@@ -1,4 +1,4 @@
-"""The phases of a run as spans of time and of rows."""
+"""Phases of a run as spans of time and of rows."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -16,12 +16,12 @@ from sms_handover.units import ns_to_seconds
 class PhaseSpan:
     """One phase, from its start to the start of the next one or the end of the run.
 
-    A phase that is done again is another one, and so is what is left of one that has failed; ``name``
-    tells them apart. The plain name is that of the first time that it was not left for a missed grasp.
+    A retried phase is another one, and so is the rest of one that has failed; ``name`` distinguishes
+    them. The first attempt that was not given up for a missed grasp has the plain name.
 
-    ``rows`` are the reference periods with this phase's targets. ``states`` are the ticks from
-    start to end, both included, because the state has no jump there; ``efforts`` are the ticks
-    over which this phase's efforts acted: those that end after the start and not after the end.
+    ``rows`` are the reference periods with this phase's targets. ``states`` are the ticks from start to
+    end, both included, because the state is continuous there; ``efforts`` are the ticks over which this
+    phase's efforts acted: those that end after the start and not after the end.
     """
 
     index: int
@@ -34,12 +34,12 @@ class PhaseSpan:
 
     @property
     def duration(self) -> float:
-        """Length in s."""
+        """Duration in s."""
         return ns_to_seconds(self.end_ns - self.start_ns)
 
 
 def phase_spans(run: RunData) -> tuple[PhaseSpan, ...]:
-    """Return the phases of a run in the order of time; entries before the first phase belong to none."""
+    """Return the phases of a run in the order of time; rows before the first phase belong to none."""
     entered = [
         phase
         for before, phase in zip((None, *run.phases), run.phases, strict=False)
@@ -55,9 +55,9 @@ def phase_spans(run: RunData) -> tuple[PhaseSpan, ...]:
 
 
 def _names(entered: Sequence[TaskPhase], aborted_ns: Collection[int]) -> Iterator[str]:
-    """Yield a name for each phase, in the order of time; no two are the same.
+    """Yield a unique name for each phase, in the order of time.
 
-    One was left for a missed grasp if the one before it followed, or its failure at one of ``aborted_ns``.
+    A phase was given up for a missed grasp if an earlier one followed, or if it failed at ``aborted_ns``.
     """
     taken: set[str] = set()
     for phase, following in zip(entered, (*entered[1:], None), strict=False):
@@ -73,7 +73,6 @@ def _names(entered: Sequence[TaskPhase], aborted_ns: Collection[int]) -> Iterato
 
 
 def _span(run: RunData, phase: TaskPhase, end_ns: int, *, is_last: bool) -> PhaseSpan:
-    """Return the span of a phase with its rows and ticks looked up."""
     start_ns = phase.stamp_ns
     # the row at the end already has the targets of the next phase, if there is one
     row_side: Literal["left", "right"] = "right" if is_last else "left"

@@ -1,4 +1,4 @@
-"""When an error has come to stay within a band."""
+"""Settling of an error within a band."""
 
 from math import nan
 
@@ -11,13 +11,13 @@ from sms_handover.types import Array
 from sms_handover.units import ns_to_seconds
 
 SETTLING_BAND = 0.02  # [-] of the step, the usual 2 % criterion
-STEADY_PART = 0.1  # [-] of the phase, at its end, over which a steady-state error is taken
+STEADY_PART = 0.1  # [-] of the phase, at its end, over which the steady-state error is averaged
 
 
 def settling_time(stamp_ns: Stamps, error: Array, band: float, start_ns: int) -> float:
-    """Return the time in s from ``start_ns`` after which an error stays within a band; NaN if it does not.
+    """Return the time in s from ``start_ns`` after which an error stays within a band, NaN if it does not.
 
-    It is the time of the first sample of the last stay within the band, so it is late by at most one
+    It is the time of the first sample after the last one outside the band, so it is late by at most one
     sampling period.
     """
     outside = np.flatnonzero(error > band)
@@ -29,6 +29,6 @@ def settling_time(stamp_ns: Stamps, error: Array, band: float, start_ns: int) ->
 
 
 def steady_rows(stamp_ns: Stamps, phase: PhaseSpan) -> npt.NDArray[np.bool_]:
-    """Tell of each sample whether it is in the part of the phase that counts as steady."""
+    """Return whether each sample is in the part of the phase that counts as steady state."""
     length_ns = phase.end_ns - phase.start_ns
     return np.asarray(stamp_ns >= phase.end_ns - round(STEADY_PART * length_ns))

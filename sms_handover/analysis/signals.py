@@ -1,4 +1,4 @@
-"""The quantities that are drawn over time, derived from a run once for figures and report alike.
+"""Signals over time, derived from a run for figures and reports.
 
 A sample that was not recorded is NaN. ``docs/metrics.md`` has the formulas.
 """
@@ -21,7 +21,7 @@ AXES = ("x", "y", "z")
 class Signal:
     """A quantity over simulation time: ``time`` (N,) s, ``values`` (N, K) in ``unit``, a label per column.
 
-    ``name`` is what a reader calls it. Raises ConfigurationError if the shapes do not fit.
+    ``name`` is the name to display. Raises ConfigurationError if the shapes do not match.
     """
 
     name: str
@@ -31,11 +31,10 @@ class Signal:
     labels: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        """Check the shapes and make the arrays read-only."""
         expected = (*self.time.shape, len(self.labels))
         if self.time.ndim != 1 or self.values.shape != expected:
             raise ConfigurationError(
-                f"signal {self.name!r} has values {self.values.shape}, expected are {expected}"
+                f"signal {self.name!r} has values of shape {self.values.shape}, they must be {expected}"
             )
         self.time.setflags(write=False)
         self.values.setflags(write=False)
@@ -48,13 +47,13 @@ def position_error(run: RunData, arm: str) -> Signal:
 
 
 def orientation_error(run: RunData, arm: str) -> Signal:
-    """Return the rotation vector in rad that turns target into tool, in ``world`` axes."""
+    """Return the rotation vector in rad from target to tool, in ``world`` axes."""
     error = rotation_vectors(run.target_pose[arm][:, 3:], run.tool_pose[arm][:, 3:])
     return _signal(f"orientation error of {arm}", "rad", run.reference_ns, error, AXES)
 
 
 def joint_error(run: RunData, arm: str) -> Signal:
-    """Return e = q - q_d in rad of an arm's joints, each reference period, when q_d is given anew."""
+    """Return e = q - q_d in rad of an arm's joints, each reference period, when q_d is updated."""
     joints = joints_of(run.joint_names, arm)
     position = np.full(run.reference_position.shape, np.nan)
     _, ticks, periods = np.intersect1d(run.tick_ns, run.reference_ns, return_indices=True)
@@ -64,7 +63,7 @@ def joint_error(run: RunData, arm: str) -> Signal:
 
 
 def joint_torque(run: RunData, arm: str) -> Signal:
-    """Return the torque in N m of an arm's joints, each tick: what acted over the tick that ended then."""
+    """Return the torque in N m of an arm's joints, each tick: the one that acted over the tick that ended."""
     joints = joints_of(run.joint_names, arm)
     return _signal(
         f"joint torque of {arm}", "N m", run.tick_ns, run.joint_effort[:, joints], _names(run, joints)
@@ -79,7 +78,7 @@ def base_displacement(run: RunData) -> Signal:
 
 
 def base_rotation(run: RunData) -> Signal:
-    """Return the rotation vector in rad of Q(t) Q(0)^T, the turn of ``base_link`` in ``world`` axes."""
+    """Return the rotation vector in rad of Q(t) Q(0)^T, the rotation of ``base_link`` in ``world`` axes."""
     pose = run.base_pose
     change = rotation_vectors(_first(pose)[:, 3:], pose[:, 3:])
     return _signal("base rotation", "rad", run.tick_ns, change, AXES)
@@ -96,12 +95,12 @@ def base_turn_rate(run: RunData) -> Signal:
 
 
 def linear_momentum(run: RunData) -> Signal:
-    """Return P in kg m/s in ``world`` axes, each reference period; zero but for rounding."""
+    """Return P in kg m/s in ``world`` axes, each reference period; zero up to rounding."""
     return _signal("linear momentum", "kg m/s", run.reference_ns, run.linear_momentum, AXES)
 
 
 def angular_momentum(run: RunData) -> Signal:
-    """Return L in kg m^2/s about the centre of mass in ``world`` axes; zero but for rounding."""
+    """Return L in kg m^2/s about the centre of mass in ``world`` axes; zero up to rounding."""
     return _signal("angular momentum", "kg m^2/s", run.reference_ns, run.angular_momentum, AXES)
 
 
@@ -112,7 +111,7 @@ def energy(run: RunData) -> Signal:
 
 
 def energy_residual(run: RunData) -> Signal:
-    """Return (E(t) - E(0)) - (W(t) - W(0)) in J, each reference period; zero but for rounding."""
+    """Return (E(t) - E(0)) - (W(t) - W(0)) in J, each reference period; zero up to rounding."""
     balance = (run.kinetic_energy - run.work)[:, np.newaxis]
     return _signal("energy residual", "J", run.reference_ns, balance - _first(balance), ("residual",))
 
@@ -138,7 +137,7 @@ _OF_ROBOT = (
 
 
 def _signal(name: str, unit: str, stamp_ns: Stamps, values: Array, labels: tuple[str, ...]) -> Signal:
-    """Return a signal of integer stamps; values of one column may lack the second axis."""
+    """Return a signal with integer stamps; the values may be (N,) for a single column."""
     return Signal(name, unit, stamp_ns / NS_PER_S, values.reshape(len(stamp_ns), len(labels)), labels)
 
 
@@ -149,5 +148,4 @@ def _first(rows: Array) -> Array:
 
 
 def _names(run: RunData, joints: list[int]) -> tuple[str, ...]:
-    """Return the names of the joints at these places."""
     return tuple(run.joint_names[place] for place in joints)

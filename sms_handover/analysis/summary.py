@@ -1,7 +1,7 @@
-"""A comparison of runs as plain values, for JSON and for other tools; SI units, None where not defined."""
+"""Summary of a comparison as plain values, for JSON and other tools; SI units, None where not defined."""
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from enum import Enum
 from math import isfinite
 from typing import Any
@@ -9,45 +9,40 @@ from typing import Any
 import numpy as np
 
 from sms_handover.analysis.base_motion import BaseMotion
-from sms_handover.analysis.claims import Claim
 from sms_handover.analysis.comparison import Comparison
+from sms_handover.analysis.joints import JointFigures
 from sms_handover.analysis.metrics import PhaseMetrics, RunMetrics
-from sms_handover.analysis.torque import JointTorque
 from sms_handover.analysis.tracking import ToolTracking
-from sms_handover.analysis.work import JointWork
 from sms_handover.graph.events import RunEvent
 from sms_handover.types import GraspEvent
 from sms_handover.units import ns_to_seconds
 
 Summary = dict[str, Any]
 
-_TIME_HISTORIES = {"phase", "stamp_ns", "position_error", "orientation_error"}
+_TIME_SERIES = {"phase", "stamp_ns", "position_error", "orientation_error"}
 
 
 def summary(comparison: Comparison) -> Summary:
-    """Return the figures of a comparison, without time histories, ready for ``json.dumps``."""
+    """Return the figures of a comparison without time series, ready for ``json.dumps``."""
     return {
         "runs": {name: _run(metrics, comparison.drift[name]) for name, metrics in comparison.runs.items()},
-        "claims": [_claim(claim) for claim in comparison.claims],
+        "claims": [_values(claim) for claim in comparison.claims],
     }
 
 
 def _run(metrics: RunMetrics, drift: Mapping[str, BaseMotion]) -> Summary:
-    """Return the figures of one run."""
     return {
         "phases": [_phase(item, drift[item.phase.name]) for item in metrics.phases],
-        "torque": _per_joint(metrics.torque),
-        "work": _per_joint(metrics.work),
-        "physics": _values(metrics.physics),
-        "ik": _values(metrics.ik),
+        **_common(metrics),
         "loop": _values(metrics.loop) if metrics.loop else None,
+        "clearance": _plain(metrics.clearance.groups) if metrics.clearance else None,
+        "joint_limits": _values(metrics.limits) if metrics.limits else None,
         "grasp_events": [_event(event) for event in metrics.run.grasp_events],
-        "run_events": [_run_event(event) for event in metrics.run.run_events],
+        "run_events": [_event(event) for event in metrics.run.run_events],
     }
 
 
 def _phase(metrics: PhaseMetrics, drift: BaseMotion) -> Summary:
-    """Return the figures of one phase."""
     return {
         "name": metrics.phase.name,
         "start": ns_to_seconds(metrics.phase.start_ns),
@@ -56,6 +51,13 @@ def _phase(metrics: PhaseMetrics, drift: BaseMotion) -> Summary:
         "tools": {arm: _tool(tool) for arm, tool in metrics.tools.items()},
         "base": _values(metrics.base),
         "base_drift": _values(drift),
+        **_common(metrics),
+    }
+
+
+def _common(metrics: RunMetrics | PhaseMetrics) -> Summary:
+    """Return the figures that a run and each of its phases have."""
+    return {
         "torque": _per_joint(metrics.torque),
         "work": _per_joint(metrics.work),
         "physics": _values(metrics.physics),
@@ -64,13 +66,10 @@ def _phase(metrics: PhaseMetrics, drift: BaseMotion) -> Summary:
 
 
 def _tool(tool: ToolTracking) -> Summary:
-    """Return the figures of one tool."""
-    figures = {name: value for name, value in _values(tool).items() if name not in _TIME_HISTORIES}
-    return {**figures, "orientation": _values(tool.orientation)}
+    return {name: value for name, value in _values(tool).items() if name not in _TIME_SERIES}
 
 
-def _per_joint(figures: JointTorque | JointWork) -> Summary:
-    """Return the figures of every joint by its name."""
+def _per_joint(figures: JointFigures) -> Summary:
     columns = {item.name: getattr(figures, item.name) for item in fields(figures)[1:]}
     return {
         joint: {name: _plain(values[place]) for name, values in columns.items()}
@@ -78,37 +77,22 @@ def _per_joint(figures: JointTorque | JointWork) -> Summary:
     }
 
 
-def _event(event: GraspEvent) -> Summary:
-    """Return one grasp event."""
-    return {
-        "time": ns_to_seconds(event.stamp_ns),
-        "command": _values(event.command),
-        "status": event.status.value,
-        "position_error": _plain(event.position_error),
-        "angle_error": _plain(event.angle_error),
-        "relative_speed": _plain(event.relative_speed),
-        "detail": event.detail,
-    }
-
-
-def _run_event(event: RunEvent) -> Summary:
-    """Return what a node has decided."""
+def _event(event: GraspEvent | RunEvent) -> Summary:
     figures = _values(event)
-    return {"time": ns_to_seconds(figures.pop("stamp_ns")), **figures}
-
-
-def _claim(claim: Claim) -> Summary:
-    """Return one claim with its verdict."""
-    return {**_values(claim), "findings": [_values(finding) for finding in claim.findings]}
+    time = ns_to_seconds(figures.pop("stamp_ns"))
+    return {"time": time, **figures}
 
 
 def _values(item: Any) -> Summary:
-    """Return the fields of a dataclass as plain values."""
     return {field.name: _plain(getattr(item, field.name)) for field in fields(item)}
 
 
 def _plain(value: Any) -> Any:
-    """Return numbers and enums as JSON knows them."""
+    """Return a value as JSON has it."""
+    if is_dataclass(value):
+        return _values(value)
+    if isinstance(value, tuple):
+        return [_plain(each) for each in value]
     if isinstance(value, Enum):
         return value.value
     if isinstance(value, float | np.floating):

@@ -1,4 +1,4 @@
-"""A comparison of runs as plain text: metrics, receipts, and the verdicts on the paper's claims."""
+"""Table of a comparison as plain text: metrics, conservation, and the verdicts on the paper's claims."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -8,6 +8,8 @@ from textwrap import wrap
 
 from sms_handover.analysis.base_motion import BaseMotion
 from sms_handover.analysis.claims import Claim
+from sms_handover.analysis.clearance import TaskTexts
+from sms_handover.analysis.clearance_rows import clearance_sections
 from sms_handover.analysis.comparison import Comparison, compare
 from sms_handover.analysis.grasps import Tolerance
 from sms_handover.analysis.layout import MISSING, WIDTH, Row, Section, layout, number, row
@@ -32,13 +34,14 @@ def comparison_table(
     *,
     laws: Mapping[str, str] | None = None,
     tolerance: Tolerance | None = None,
+    texts: Mapping[str, TaskTexts] | None = None,
 ) -> str:
     """Return a table of the runs, by name, and the verdicts on the paper's claims if they are a pair.
 
-    ``laws`` has the control law of each run, otherwise it is read from the name; ``tolerance`` is
-    printed beside the values that a grasp reached.
+    ``laws`` has the control law of each run, otherwise it is taken from the name; ``tolerance`` is
+    printed beside the values at a grasp. ``texts`` has what each run was made with, for its clearance.
     """
-    return render(compare(runs, laws), tolerance)
+    return render(compare(runs, laws, texts=texts), tolerance)
 
 
 def render(comparison: Comparison, tolerance: Tolerance | None = None) -> str:
@@ -50,20 +53,21 @@ def render(comparison: Comparison, tolerance: Tolerance | None = None) -> str:
 
 
 def figure_sections(comparison: Comparison, tolerance: Tolerance | None = None) -> tuple[Section, ...]:
-    """Return every figure of a comparison but the claims: grasps, each phase, torques, physics."""
+    """Return every figure of a comparison except the claims: grasps, each phase, torques, physics."""
     runs = list(comparison.runs.values())
     return (
         Section("Grasp events", _grasp_rows(runs, tolerance)),
         *_run_event_section(runs),
         *(_phase_section(comparison, name) for name in comparison.phase_names),
         Section("Torque over the whole run, peak / RMS [N m]", _torque_rows(runs)),
+        *clearance_sections(runs),
         Section("Physics and inverse kinematics", _conservation_rows(runs)),
         *([Section("Wall clock", _loop_rows(runs))] if any(item.loop for item in runs) else []),
     )
 
 
 def _grasp_rows(runs: Sequence[RunMetrics], tolerance: Tolerance | None) -> tuple[Row, ...]:
-    """Return what came of every grasp command, with the values reached where it closed."""
+    """Return the outcome of every grasp command, with the errors at which the gripper closed."""
     by_run = [{(event.stamp_ns, event.command): event for event in item.run.grasp_events} for item in runs]
     keys = dict.fromkeys(key for events in by_run for key in events)
     rows = []
@@ -80,7 +84,7 @@ def _grasp_rows(runs: Sequence[RunMetrics], tolerance: Tolerance | None) -> tupl
 
 
 def _run_event_section(runs: Sequence[RunMetrics]) -> tuple[Section, ...]:
-    """Return how often the nodes told of each kind of warning or error, if they did."""
+    """Return the number of warnings and errors of each kind, if the nodes reported any."""
     counts = [
         Counter(
             f"{event.kind} ({event.severity.value})"
@@ -91,7 +95,7 @@ def _run_event_section(runs: Sequence[RunMetrics]) -> tuple[Section, ...]:
     ]
     kinds = dict.fromkeys(kind for count in counts for kind in count)
     rows = [Row(kind, tuple(str(count[kind]) for count in counts)) for kind in kinds]
-    return (Section("Decisions of the nodes", tuple(rows)),) if rows else ()
+    return (Section("Warnings and errors", tuple(rows)),) if rows else ()
 
 
 _REACHED: tuple[tuple[str, Callable[[GraspEvent], float], Callable[[Tolerance], float]], ...] = (
@@ -106,7 +110,7 @@ _REACHED: tuple[tuple[str, Callable[[GraspEvent], float], Callable[[Tolerance], 
 
 
 def _in_words(command: GraspCommand) -> str:
-    """Return a grasp command as a short sentence."""
+    """Return a grasp command in words."""
     if command.action is GraspAction.RELEASE:
         return f"{command.arm} lets go"
     giver = f" from {command.from_arm}" if command.from_arm else ""
@@ -114,7 +118,6 @@ def _in_words(command: GraspCommand) -> str:
 
 
 def _phase_section(comparison: Comparison, name: str) -> Section:
-    """Return the section of one phase: every tool, then the base."""
     phases = [item.phase(name) for item in comparison.runs.values()]
     spans = [item.phase for item in phases if item]
     rows: list[Row] = []
@@ -127,7 +130,7 @@ def _phase_section(comparison: Comparison, name: str) -> Section:
     )
     drifts = [drift[name] for drift in comparison.drift.values()]
     begin = largest([drift.begin for drift in drifts])
-    since = "no run settles" if isnan(begin) else f"from {number(begin)} s on, when all runs that settle have"
+    since = "no run settles" if isnan(begin) else f"from {number(begin)} s, when the last run has settled"
     rows.append(Row(f"base, drift: {since}"))
     rows += [_cost(label, drifts, value) for label, value in _DRIFT]
     begin_s, end_s = (ns_to_seconds(time_ns) for time_ns in (spans[0].start_ns, spans[0].end_ns))
@@ -156,7 +159,6 @@ _EITHER: tuple[tuple[str, Callable[[ToolTracking], float]], ...] = (
 
 
 def _tool_rows(arm: str, phases: Sequence[PhaseMetrics | None]) -> list[Row]:
-    """Return the rows of one arm in one phase."""
     tools = [item.tools.get(arm) if item else None for item in phases]
     torques = [item.torque.of_arm(arm) if item else None for item in phases]
     works = [item.work.of_arm(arm) if item else None for item in phases]
@@ -183,20 +185,18 @@ def _tool_rows(arm: str, phases: Sequence[PhaseMetrics | None]) -> list[Row]:
 
 
 def _torque_rows(runs: Sequence[RunMetrics]) -> tuple[Row, ...]:
-    """Return the torques of every joint over the whole run."""
     torques = [item.torque for item in runs]
     joints = dict.fromkeys(name for torque in torques for name in torque.joint_names)
     return (
         *(Row(name, tuple(_peak_and_rms(item, name) for item in runs)) for name in joints),
         _cost("absolute work [J]", runs, lambda item: float(item.work.absolute.sum())),
         _cost("control effort [(N m)^2 s]", torques, lambda torque: float(torque.effort.sum())),
-        _cost("ticks asking for more, worst joint", torques, lambda torque: largest(torque.saturated_ticks)),
+        _cost("saturated ticks, worst joint", torques, lambda torque: largest(torque.saturated_ticks)),
         _cost("ticks at the peak, worst joint", torques, lambda torque: largest(torque.ticks_at_peak)),
     )
 
 
 def _peak_and_rms(metrics: RunMetrics, joint: str) -> str:
-    """Return the two figures of a joint as one cell."""
     torque = metrics.torque
     if joint not in torque.joint_names:
         return MISSING
@@ -205,7 +205,6 @@ def _peak_and_rms(metrics: RunMetrics, joint: str) -> str:
 
 
 def _conservation_rows(runs: Sequence[RunMetrics]) -> tuple[Row, ...]:
-    """Return the conservation laws and the outcomes of inverse kinematics."""
     return (
         row("largest linear momentum [kg m/s]", runs, lambda item: item.physics.linear_momentum),
         row("largest angular momentum [kg m^2/s]", runs, lambda item: item.physics.angular_momentum),
@@ -219,7 +218,7 @@ def _conservation_rows(runs: Sequence[RunMetrics]) -> tuple[Row, ...]:
 _LOOP: tuple[tuple[str, Callable[[LoopTiming], float]], ...] = (
     ("wall time [s]", lambda loop: loop.wall_duration),
     ("real-time factor [-]", lambda loop: loop.real_time_factor),
-    ("period of the plant, mean [ms]", lambda loop: loop.period_mean * _MS_PER_S),
+    ("plant period, mean [ms]", lambda loop: loop.period_mean * _MS_PER_S),
     ("  standard deviation [ms]", lambda loop: loop.period_std * _MS_PER_S),
     ("  largest [ms]", lambda loop: loop.period_max * _MS_PER_S),
     ("largest lag behind real time [s]", lambda loop: loop.largest_lag),
@@ -229,13 +228,12 @@ _LOOP: tuple[tuple[str, Callable[[LoopTiming], float]], ...] = (
 
 
 def _loop_rows(runs: Sequence[RunMetrics]) -> tuple[Row, ...]:
-    """Return how the loop of each run kept time."""
     loops = [item.loop for item in runs]
     return tuple(row(label, loops, value) for label, value in _LOOP)
 
 
 def _claim_section(claims: Sequence[Claim]) -> Section:
-    """Return every claim: its verdict, the paper's words, and the figures under both laws."""
+    """Return every claim: the verdict, the quotation from the paper, and the figures under both laws."""
     held = sum(claim.holds for claim in claims)
     rows: list[Row] = []
     for claim in claims:

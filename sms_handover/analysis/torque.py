@@ -1,12 +1,12 @@
-"""What the joints were asked for and what they gave."""
+"""Torque of the joints: commanded against applied."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import nan
 
 import numpy as np
 import numpy.typing as npt
 
-from sms_handover.analysis.joints import joints_of
+from sms_handover.analysis.joints import JointFigures
 from sms_handover.analysis.phases import PhaseSpan
 from sms_handover.run_data import RunData
 from sms_handover.types import Array
@@ -16,44 +16,27 @@ Counts = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class JointTorque:
-    """Efforts that acted in a phase or in the whole run, per joint in the order of ``joint_names``.
+class JointTorque(JointFigures):
+    """Torques applied in a phase or in the whole run.
 
-    ``peak`` (n,) and ``rms`` (n,) in N m; ``effort`` (n,), the control effort, is the integral of the
-    squared torque in (N m)^2 s. ``saturated_ticks`` (n,) counts the commands larger than any torque that
-    the joint gave in the whole run; ``ticks_at_peak`` (n,) how often it gave exactly its largest
-    one of the whole run, which a torque that nothing limits does once.
+    ``peak`` and ``rms`` in N m; ``effort``, the control effort, is the integral of the squared torque in
+    (N m)^2 s. ``saturated_ticks`` counts the commands larger than any torque that the joint applied in the
+    whole run; ``ticks_at_peak`` how often it applied exactly its largest torque of the whole run, which
+    without a limit happens once.
     """
 
-    joint_names: tuple[str, ...]
     peak: Array
     rms: Array
     effort: Array
     saturated_ticks: Counts
     ticks_at_peak: Counts
 
-    def __post_init__(self) -> None:
-        for item in fields(self)[1:]:
-            getattr(self, item.name).setflags(write=False)
-
-    def of_arm(self, arm: str) -> "JointTorque":
-        """Return the same for the joints of one arm."""
-        chosen = joints_of(self.joint_names, arm)
-        return JointTorque(
-            tuple(self.joint_names[place] for place in chosen),
-            self.peak[chosen],
-            self.rms[chosen],
-            self.effort[chosen],
-            self.saturated_ticks[chosen],
-            self.ticks_at_peak[chosen],
-        )
-
 
 def joint_torque(run: RunData, phase: PhaseSpan | None = None) -> JointTorque:
     """Return the torques of a phase, or of the whole run.
 
-    A torque is held from one state to the next, so sums over ticks are exact integrals. Torques that were
-    not recorded count neither in the sums nor in the time.
+    A torque is constant over a tick, so sums over ticks are exact integrals. Torques that were not
+    recorded are left out of the sums and of the time.
     """
     efforts = phase.efforts if phase else slice(len(run.tick_ns))
     # interval k lies between states k and k + 1: command[k] asks for what effort[k + 1] then is

@@ -1,4 +1,4 @@
-"""How a tool followed its target through one phase."""
+"""Tracking of its target by a tool through one phase."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -14,27 +14,27 @@ from sms_handover.analysis.settling import SETTLING_BAND, settling_time, steady_
 from sms_handover.run_data import RunData, Stamps
 from sms_handover.types import Array
 
-SETTLING_FLOOR = 1e-3  # [m] smallest band, and the shortest way that counts as a motion
-_MOVED = 1e-9  # [rad] a joint reference that changes by less stands still
+SETTLING_FLOOR = 1e-3  # [m] smallest band, and the shortest distance that counts as a motion
+_MOVED = 1e-9  # [rad] smallest change of a joint reference that counts as a motion
 
 
 class Motion(Enum):
-    """What a phase asks of a tool; the value is what a user reads."""
+    """What a phase asks of a tool; the value is shown to the user."""
 
     STEP = "step"  # the target jumps away from the tool when the phase begins
-    SMOOTH = "smooth"  # the target sets out from the tool
-    HOLD = "hold"  # the joints, or the place in ``world``, are kept
+    SMOOTH = "smooth"  # the target starts at the tool and moves away
+    HOLD = "hold"  # the joints, or the pose in ``world``, are kept
 
 
 @dataclass(frozen=True, eq=False)
 class ToolTracking:
-    """Errors of one tool against its target in one phase; SI units, NaN where not defined.
+    """Errors of one tool relative to its target in one phase; SI units, NaN where not defined.
 
-    A row per reference period that was recorded whole: ``stamp_ns`` (R,), ``position_error`` (R,)
-    m, ``orientation_error`` (R,) rad. ``step_length`` m is the way from the tool at the start to its
-    target. ``overshoot`` m and ``overshoot_ratio`` (of the step length) are not defined for a
-    hold. ``settling_time`` s is NaN if the error is outside ``band`` m at the end. ``orientation``
-    has the same of the angle. ``docs/metrics.md`` has the formulas.
+    One row per reference period with a complete record: ``stamp_ns`` (R,), ``position_error`` (R,) m,
+    ``orientation_error`` (R,) rad. ``step_length`` m is the distance from the tool at the start to its
+    target. ``overshoot`` m and ``overshoot_ratio`` (of the step length) are not defined for a hold.
+    ``settling_time`` s is NaN if the error is outside ``band`` m at the end. ``orientation`` has the
+    same figures for the angle. ``docs/metrics.md`` has the formulas.
     """
 
     arm: str
@@ -60,7 +60,7 @@ class ToolTracking:
 
 
 def tool_tracking(run: RunData, phase: PhaseSpan, arm: str) -> ToolTracking:
-    """Return how the tool of an arm followed its target in a phase."""
+    """Return how well the tool of an arm followed its target in a phase."""
     tool, target = run.tool_pose[arm][phase.rows], run.target_pose[arm][phase.rows]
     known = complete(tool, target)
     stamp_ns, tool, target = run.reference_ns[phase.rows][known], tool[known], target[known]
@@ -108,7 +108,7 @@ def _motion(run: RunData, phase: PhaseSpan, arm: str, tool: Array, target: Array
 
 
 def _reference_moves(run: RunData, phase: PhaseSpan, arm: str) -> bool:
-    """Whether the joint reference of an arm changes within a phase; while held it does not."""
+    """Whether the joint reference of an arm changes within a phase."""
     reference = run.reference_position[phase.rows][:, joints_of(run.joint_names, arm)]
     reference = reference[complete(reference)]
     return bool(reference.size) and bool(np.max(np.ptp(reference, axis=0)) > _MOVED)

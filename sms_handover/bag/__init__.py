@@ -1,1 +1,1 @@
-"""Write and read recordings: MCAP files in the layout of rosbag2, without a ROS installation."""
+"""Bags: recordings as MCAP files in the layout of rosbag2, written and read without ROS."""

@@ -1,4 +1,4 @@
-"""The files that a bag carries so that it stands on its own."""
+"""Attachments: the files that make a bag self-contained."""
 
 import json
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ def parameters_json(parameters: Mapping[str, Mapping[str, object]]) -> str:
 
 
 def parameters_from_json(text: str) -> dict[str, dict[str, object]]:
-    """Return the parameters by node and name; raises BagError if the text is something else."""
+    """Return the parameters by node and name; raises BagError if the text is not such JSON."""
     try:
         values = json.loads(text)
     except ValueError as error:

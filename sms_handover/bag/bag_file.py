@@ -1,4 +1,4 @@
-"""One MCAP file of a recording while it is being written."""
+"""Bag file: one MCAP file while it is being written."""
 
 import os
 from collections.abc import Mapping
@@ -15,10 +15,10 @@ _PROFILE = "ros2"
 
 
 class BagFile:
-    """A file that is open for writing, and what it holds so far; errors of the disk are OSError."""
+    """An MCAP file open for writing; errors of the disk are OSError."""
 
     def __init__(self, folder: int, name: str, chunk_size: int) -> None:
-        """Create a file of this name in an open folder, which is found even where it has been moved."""
+        """Create a file in a folder given by its descriptor, which survives a move of the folder."""
         self.name = name
         self.start_ns: int | None = None
         self.end_ns = 0
@@ -34,7 +34,7 @@ class BagFile:
 
     @property
     def size(self) -> int:
-        """Return how many bytes have been written."""
+        """Return the number of bytes written."""
         return self._stream.tell()
 
     @property
@@ -43,7 +43,7 @@ class BagFile:
         return 0 if self.start_ns is None else self.end_ns - self.start_ns
 
     def open_channel(self, source: Source) -> int:
-        """Open a channel, and its schema unless another channel has the same; return its number."""
+        """Open a channel, and its schema unless it is open; return the number of the channel."""
         schema = source.schema
         same = (schema.name, schema.encoding, schema.data)
         if same not in self._schemas:
@@ -70,18 +70,18 @@ class BagFile:
         self._mcap.add_metadata(name, dict(values))
 
     def flush(self) -> None:
-        """Hand everything to the operating system; raises OSError too if the file has been deleted."""
+        """Hand everything to the operating system; raises OSError also if the file was deleted."""
         self._mcap.flush()  # type: ignore[no-untyped-call]
-        if os.fstat(self._stream.fileno()).st_nlink == 0:  # what is written would be gone with it
+        if os.fstat(self._stream.fileno()).st_nlink == 0:
             raise FileNotFoundError(ENOENT, "it was deleted while it was being written")
 
     def finish(self) -> None:
-        """Write the end of the file, wait until it is on the disk, and close it."""
+        """Write the end of the file, sync and close it."""
         with self._stream as stream:
             self._mcap.finish()  # type: ignore[no-untyped-call]
             stream.flush()
             os.fsync(stream.fileno())
 
     def close(self) -> None:
-        """Close the file as it is, without an end."""
+        """Close the file without writing its end."""
         self._stream.close()

@@ -20,12 +20,12 @@ _HEADING = (
     "largest gap [ms]",
 )
 
-LEDGER_RECORD = "sms_handover.ledger"  # names of metadata records in the bag: the whole account, and
-PERIODS_RECORD = "sms_handover.periods"  # before any message the step of the stamps in ns by topic
+LEDGER_RECORD = "sms_handover.ledger"  # names of metadata records: the accounts, and
+PERIODS_RECORD = "sms_handover.periods"  # before any message, the step of the stamps in ns by topic
 
 
-def is_of_ours(records: Iterable[str]) -> bool:
-    """Tell by the names of its metadata records whether a bag is one of our recorder, with a ledger."""
+def has_ledger(records: Iterable[str]) -> bool:
+    """Whether a bag with these metadata records was recorded with a loss ledger."""
     return not {LEDGER_RECORD, PERIODS_RECORD}.isdisjoint(records)
 
 
@@ -33,11 +33,10 @@ def is_of_ours(records: Iterable[str]) -> bool:
 class TopicLedger:
     """The account of one topic; stamps are simulation time in nanoseconds.
 
-    ``missing`` counts the stamps between the first and the last that never came, ``duplicates``
-    those that came again, ``out_of_order`` those that came after a later one. Without a fixed
-    period (``period_ns`` 0) nothing can be missing and equal stamps are no duplicates. Stamps are
-    None where no message came or the type carries none; ``published`` is None where nobody
-    reported it.
+    ``missing`` counts the stamps between the first and the last that were not received,
+    ``out_of_order`` those received after a later one. Without a fixed period (``period_ns`` 0)
+    nothing is missing or duplicate. Stamps are None without messages or for a type without stamp;
+    ``published`` is None unless a node reported it.
     """
 
     name: str
@@ -77,12 +76,13 @@ class Ledger:
 
     @property
     def complete(self) -> bool:
-        """Whether no topic is known to miss anything."""
+        """Whether nothing is known to be missing on any topic."""
         return all(topic.complete for topic in self.topics)
 
     def to_record(self) -> dict[str, str]:
         """Return the ledger as a metadata record: one JSON object per topic."""
-        return {topic.name: json.dumps(_without_name(topic)) for topic in self.topics}
+        accounts = [asdict(topic) for topic in self.topics]
+        return {account.pop("name"): json.dumps(account) for account in accounts}
 
     @classmethod
     def from_record(cls, record: Mapping[str, str]) -> "Ledger":
@@ -94,7 +94,7 @@ class Ledger:
 
 
 def periods_of(record: Mapping[str, str]) -> dict[str, int]:
-    """Return the step of the stamps [ns] by topic; raises BagError if the metadata record holds none."""
+    """Return the step of the stamps [ns] by topic from a metadata record; raises BagError."""
     try:
         return {name: int(text) for name, text in record.items()}
     except ValueError as error:
@@ -111,7 +111,6 @@ def ledger_table(ledger: Ledger) -> str:
 
 
 def _row(topic: TopicLedger) -> tuple[str, ...]:
-    """Return the cells of one topic."""
     return (
         topic.name,
         str(topic.received),
@@ -127,10 +126,4 @@ def _row(topic: TopicLedger) -> tuple[str, ...]:
 
 
 def _seconds(stamp_ns: int | None) -> str:
-    """Return a stamp in s."""
     return "-" if stamp_ns is None else f"{stamp_ns / NS_PER_S:.3f}"
-
-
-def _without_name(topic: TopicLedger) -> dict[str, object]:
-    """Return the fields of an account but its name."""
-    return {key: value for key, value in asdict(topic).items() if key != "name"}

@@ -1,6 +1,7 @@
-"""Keep the loss ledger while messages come in; cheap enough for every message of the loop."""
+"""Ledger keeper: the loss ledger while messages come in, cheap enough for every message of the loop."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from sms_handover.bag.ledger import Ledger, TopicLedger
 from sms_handover.errors import BagError
@@ -8,7 +9,7 @@ from sms_handover.errors import BagError
 
 @dataclass
 class _Account:
-    """The running account of one topic; ``holes`` are the ranges of stamps that have not come yet."""
+    """The running account of one topic; ``holes`` are ranges of stamps not received yet."""
 
     name: str
     period_ns: int
@@ -22,7 +23,6 @@ class _Account:
     published: dict[str, int] = field(default_factory=dict)
 
     def closed(self) -> TopicLedger:
-        """Return the account as a value."""
         return TopicLedger(
             name=self.name,
             period_ns=self.period_ns,
@@ -37,7 +37,7 @@ class _Account:
         )
 
     def irregular(self, stamp_ns: int) -> None:
-        """Book a stamp that is not exactly one period after the last one."""
+        """Record a stamp that is not exactly one period after the last one."""
         if self.first_ns is None:
             self.first_ns = self.last_ns = stamp_ns
             return
@@ -53,7 +53,7 @@ class _Account:
             self.duplicates += 1
 
     def _late(self, stamp_ns: int, first_ns: int) -> None:
-        """Book a stamp older than the newest: it fills a hole, comes before all, or came before."""
+        """Record a stamp before the latest: it fills a hole, precedes all, or is a duplicate."""
         if stamp_ns < first_ns:
             self.first_ns = stamp_ns
             self._open_hole(0, stamp_ns + self.period_ns, first_ns - self.period_ns)
@@ -68,7 +68,7 @@ class _Account:
             self.duplicates += 1
 
     def _open_hole(self, index: int, start: int, end: int) -> None:
-        """Remember that the stamps from ``start`` to ``end`` are missing, if there are any."""
+        """Add the stamps from ``start`` to ``end``, if there are any, to the missing ones."""
         if self.period_ns and start <= end:
             self.holes.insert(index, (start, end))
 
@@ -82,11 +82,11 @@ class LedgerKeeper:
     def add_topic(self, name: str, period_ns: int = 0) -> None:
         """Open the account of a topic; ``period_ns`` is the fixed step of its stamps, 0 if it has none."""
         if name in self._accounts:
-            raise BagError(f"topic {name!r} is in the ledger already")
+            raise BagError(f"topic {name!r} is already in the ledger")
         self._accounts[name] = _Account(name, period_ns)
 
     def receive(self, topic: str, stamp_ns: int) -> None:
-        """Book one message with a stamp."""
+        """Count one message with a stamp."""
         account = self._accounts[topic]
         account.received += 1
         period_ns = account.period_ns
@@ -98,15 +98,15 @@ class LedgerKeeper:
             account.irregular(stamp_ns)
 
     def receive_unstamped(self, topic: str) -> None:
-        """Book one message of a type without a stamp."""
+        """Count one message without a stamp."""
         self._accounts[topic].received += 1
 
-    def report_published(self, node: str, topic: str, count: int) -> None:
-        """Book how many messages a node says it has published; topics that are not recorded are ignored."""
-        account = self._accounts.get(topic)
-        if account is not None:
-            account.published[node] = count
+    def report(self, published: Any) -> None:
+        """Take a decoded PublishedCounts; topics that are not recorded are ignored."""
+        for topic, count in zip(published.topics, published.counts, strict=False):
+            if topic in self._accounts:
+                self._accounts[topic].published[published.node] = int(count)
 
     def ledger(self) -> Ledger:
-        """Return the accounts as they stand."""
+        """Return the current accounts."""
         return Ledger(tuple(account.closed() for account in self._accounts.values()))

@@ -1,7 +1,7 @@
-"""The description of a bag that rosbag2 keeps in ``metadata.yaml`` and inside the file, version 9."""
+"""Metadata of a bag as rosbag2 keeps it in ``metadata.yaml`` and inside the file, version 9."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ _ROS_DISTRO = "jazzy"
 
 @dataclass(frozen=True)
 class TopicCount:
-    """One topic of a bag and how many messages it holds; ``qos`` are the profiles as rosbag2 writes them."""
+    """A topic of a bag with its number of messages; ``qos`` are profiles as rosbag2 writes them."""
 
     name: str
     type: str
@@ -32,7 +32,7 @@ class TopicCount:
 
 @dataclass(frozen=True)
 class FileSpan:
-    """One file of a bag: its first and last log time, both 0 without a message, and how many it holds."""
+    """A file of a bag: first and last log time, 0 without messages, and number of messages."""
 
     name: str
     start_ns: int
@@ -62,10 +62,7 @@ def bag_information(files: Sequence[FileSpan], topics: Sequence[TopicCount]) -> 
 
 
 def metadata_of(bag: Path) -> dict[str, Any] | None:
-    """Return the body of ``metadata.yaml``; raises BagError if it is no such.
-
-    None if the bag has none, or is given as one of its files.
-    """
+    """Return the body of the ``metadata.yaml`` in a folder, None without one; raises BagError."""
     file = bag / METADATA_FILE
     if not file.is_file():
         return None
@@ -77,7 +74,7 @@ def metadata_of(bag: Path) -> dict[str, Any] | None:
 
 
 def counts_of(metadata: Mapping[str, Any]) -> dict[str, int]:
-    """Return the number of messages by topic in the body of a ``metadata.yaml``; raises BagError."""
+    """Return the number of messages by topic from the body of ``metadata.yaml``; raises BagError."""
     counts: dict[str, int] = {}
     try:
         for item in metadata.get("topics_with_message_count") or ():
@@ -88,12 +85,45 @@ def counts_of(metadata: Mapping[str, Any]) -> dict[str, int]:
     return counts
 
 
-def counts_in_metadata(bag: Path) -> dict[str, int]:
-    """Return the number of messages by topic that ``metadata.yaml`` tells; nothing if it tells none."""
+@dataclass(frozen=True)
+class FileList:
+    """The files that ``metadata.yaml`` lists, in its order, and the names of those that are not there.
+
+    ``counts`` are the numbers of messages that it states, by topic.
+    """
+
+    files: tuple[Path, ...] = ()
+    missing: tuple[str, ...] = ()
+    counts: Mapping[str, int] = field(default_factory=dict)
+
+
+def files_in_metadata(bag: Path) -> FileList:
+    """Return the files that the ``metadata.yaml`` in a folder lists, none if it is missing or unreadable.
+
+    Raises BagError on a compression that is not zstd.
+    """
     try:
-        return counts_of(metadata_of(bag) or {})
-    except BagError:
-        return {}
+        metadata = metadata_of(bag) or {}
+        names = [str(name) for name in metadata.get("relative_file_paths") or ()]
+        counts = counts_of(metadata)
+    except (BagError, TypeError):
+        return FileList()
+    mode, form = (str(metadata.get(f"compression_{key}") or "") for key in ("mode", "format"))
+    if mode.upper() in {"FILE", "MESSAGE"} and form != "zstd":
+        raise BagError(
+            f"{bag} is compressed as {form!r}, only zstd is read; 'ros2 bag convert' makes another bag of it"
+        )
+    found = {name: _listed(bag, name) for name in dict.fromkeys(names)}
+    missing = [Path(name).name for name, file in found.items() if file is None]
+    return FileList(tuple(file for file in found.values() if file), tuple(missing), counts)
+
+
+def _listed(bag: Path, name: str) -> Path | None:
+    """Return a listed file: by its path in the bag, or as of old rosbag2 versions beside the metadata."""
+    for file in (bag / name, bag / Path(name).name):
+        if file.exists() and file.resolve().is_relative_to(bag.resolve()):
+            return file
+    return None
 
 
 def to_yaml(value: object) -> str:
@@ -107,7 +137,7 @@ def qos_text(profiles: Sequence[Mapping[str, object]]) -> str:
 
 
 def _span(start_ns: int, end_ns: int, message_count: int) -> dict[str, Any]:
-    """Return what both a bag and a file of it tell; a new object each time, so YAML needs no anchors."""
+    """Return the entries of both a bag and a file; new objects each time, so YAML needs no anchors."""
     return {
         "duration": {"nanoseconds": end_ns - start_ns},
         "starting_time": {"nanoseconds_since_epoch": start_ns},
@@ -116,7 +146,6 @@ def _span(start_ns: int, end_ns: int, message_count: int) -> dict[str, Any]:
 
 
 def _topic_information(topic: TopicCount) -> dict[str, Any]:
-    """Return the entry of one topic."""
     return {
         "topic_metadata": {
             "name": topic.name,

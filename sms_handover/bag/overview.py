@@ -1,4 +1,4 @@
-"""What a bag holds as plain values, for people and for JSON."""
+"""Overview of a bag as plain values, for people and for JSON."""
 
 import zlib
 from dataclasses import asdict
@@ -9,7 +9,7 @@ from sms_handover.graph.topics import CONTROLLER, PLANT
 
 
 def overview(info: BagInfo) -> dict[str, object]:
-    """Return the content of a bag; ``run`` and ``ledger`` are None unless it is one of ours."""
+    """Return the content of a bag; ``run`` and ``ledger`` are None unless this package recorded it."""
     return {
         "bag": str(info.path),
         "files": [file.name for file in info.files],
@@ -24,6 +24,8 @@ def overview(info: BagInfo) -> dict[str, object]:
             {"name": topic.name, "type": topic.type, "message_count": topic.message_count}
             for topic in info.channels
         ],
+        "missing": list(info.missing),
+        "notes": list(info.notes),
         "run": _run(info),
         "provenance": dict(info.provenance),
         "attachments": {name: len(content) for name, content in info.attachments.items()},
@@ -34,7 +36,7 @@ def overview(info: BagInfo) -> dict[str, object]:
 
 
 def _run(info: BagInfo) -> dict[str, object] | None:
-    """Return how a run of ours was made, None if the bag holds none."""
+    """Return how the run was made, None if the bag holds none."""
     try:
         parameters = info.parameters
     except BagError:

@@ -17,23 +17,21 @@ class RecorderParameters:
     folder: str = parameter("new folder for the bag; empty: handover_<date>_<time> in the current folder")
     record_all: bool = parameter("record topics beyond those of the graph too")
     niceness: int = parameter(
-        "how far the recorder stands back behind the loop for the processor, as in nice(1)",
+        "niceness of the recorder, as in nice(1), so that the loop comes first",
         minimum=0,
         maximum=19,
     )
     split_duration: float = parameter(
-        "simulated time after which the bag goes on in a new file; 0: never", unit="s", minimum=0.0
+        "simulated time after which the bag is split; 0: never", unit="s", minimum=0.0
     )
-    split_size: float = parameter(
-        "size after which the bag goes on in a new file; 0: never", unit="MB", minimum=0.0
-    )
+    split_size: float = parameter("size after which the bag is split; 0: never", unit="MB", minimum=0.0)
     drain_timeout: float = parameter(
-        "wall time without any message after which the end is not waited for", unit="s", minimum=0.1
+        "wall time without messages after which the recorder stops waiting for the end", unit="s", minimum=0.1
     )
 
     @property
     def split(self) -> Split:
-        """Return when the bag goes on in a new file."""
+        """Return when the bag is split."""
         return Split(seconds_to_ns(self.split_duration), round(self.split_size * _BYTES_PER_MB))
 
 
@@ -50,5 +48,5 @@ class TopicRecorderParameters:
 
     @property
     def choice(self) -> TopicChoice:
-        """Return which topics are wanted."""
+        """Return the choice of topics."""
         return TopicChoice(self.topics, self.regex, self.exclude_topics, self.exclude_regex)

@@ -1,4 +1,4 @@
-"""Where a recording came from: versions, source revision, seed and start, as texts without any path."""
+"""Provenance of a recording: versions, source revision, seed and start, as texts without paths."""
 
 import platform
 import subprocess
@@ -15,7 +15,7 @@ _GIT_TIMEOUT = 5.0  # [s]
 
 
 def provenance(seed: int | None = None, start: datetime | None = None) -> dict[str, str]:
-    """Return what identifies the software of a run; ``start`` is now unless it is given."""
+    """Return what identifies the software of a run; ``start`` defaults to now."""
     revision, state = source_revision(Path(__file__).resolve().parent.parent.parent)
     moment = datetime.now(timezone.utc) if start is None else start.astimezone(timezone.utc)
     return {
@@ -49,7 +49,6 @@ def source_revision(root: Path) -> tuple[str, str]:
 
 
 def _git(root: Path, arguments: Sequence[str]) -> str | None:
-    """Return what git prints, None if it is absent or fails."""
     try:
         result = subprocess.run(
             ["git", "-C", str(root), *arguments],

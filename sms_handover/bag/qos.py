@@ -1,4 +1,4 @@
-"""Quality of service of a recorded topic, in the form that rosbag2 stores."""
+"""QoS of a recorded topic, as rosbag2 stores it."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -26,7 +26,7 @@ class History(Enum):
 
     KEEP_LAST = "keep_last"
     KEEP_ALL = "keep_all"
-    UNKNOWN = "unknown"  # what discovery tells of another node's publisher
+    UNKNOWN = "unknown"  # what discovery reports of a remote publisher
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,9 @@ class Qos:
 
 
 def profiles_of(text: str) -> list[dict[str, object]]:
-    """Return the profiles in the YAML text of a channel, of any version of rosbag2, as version 9 has them.
+    """Return the profiles in the YAML text of a channel, of any rosbag2 version, as version 9 writes them.
 
-    None, if the text is not readable: a profile is no reason to refuse a bag.
+    Empty if the text is not readable: a profile is no reason to reject a bag.
     """
     try:
         return [dict(profile) for profile in dump_qos_v9(parse_qos(text))]
@@ -65,5 +65,5 @@ def profiles_of(text: str) -> list[dict[str, object]]:
 
 
 def _infinite() -> dict[str, int]:
-    """Return the duration that ROS 2 reads as infinite."""
+    """Return the duration that ROS 2 takes as infinite."""
     return {"sec": 9223372036, "nsec": 854775807}

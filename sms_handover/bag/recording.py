@@ -1,9 +1,8 @@
-"""Record the raw messages of a running graph: bag, loss ledger and clock in one object."""
+"""Recording of a running graph: bag, loss ledger and clock in one object."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 
 from sms_handover.bag.attachments import PARAMETERS_FILE, ROBOT_FILE, SCHEDULE_FILE, parameters_json
 from sms_handover.bag.ledger import LEDGER_RECORD, PERIODS_RECORD, Ledger
@@ -19,17 +18,15 @@ from sms_handover.messages.stamps import stamp_ns
 
 PUBLISHED_COUNTS = "sms_handover_interfaces/msg/PublishedCounts"
 
-_NO_STAMP = -1
-
-LONGEST_RUN_NS = 10**17  # [ns] three years; a later stamp is the wall clock's
+LONGEST_RUN_NS = 10**17  # [ns] three years; a later stamp is one of the wall clock
 
 
 class Recording:
     """An open recording of a graph; close it, or use it as a context manager.
 
-    Whoever feeds it needs to know nothing of a message but its topic: the stamp is read from the
-    bytes and becomes the log time, the counts that nodes report at their end go to the ledger. A
-    message without a stamp, or with one of the wall clock, gets the newest simulation time.
+    The caller gives topic and bytes of a message: the stamp in them becomes the log time, the counts
+    that nodes report at their end go to the ledger. A message without a stamp, or with one of the
+    wall clock, gets the latest simulation time.
     """
 
     def __init__(
@@ -47,13 +44,8 @@ class Recording:
     def __enter__(self) -> "Recording":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Close the recording; on an error in the block too, and then that error is the one that counts."""
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        """Close the recording; an error raised in the block takes precedence over one of closing."""
         if error is None:
             self.close()
         else:
@@ -62,12 +54,12 @@ class Recording:
 
     @property
     def ledger(self) -> Ledger:
-        """Return the loss ledger as it stands."""
+        """Return the current loss ledger."""
         return self._keeper.ledger()
 
     @property
     def simulation_ns(self) -> int:
-        """Return the newest simulation time received."""
+        """Return the latest simulation time received."""
         return self._now_ns
 
     def add_topic(self, name: str, type_name: str, qos: Sequence[Qos] = (), period_ns: int = 0) -> None:
@@ -87,10 +79,7 @@ class Recording:
         parameters: Mapping[str, Mapping[str, object]] | None = None,
         provenance: Mapping[str, str] | None = None,
     ) -> None:
-        """Store what makes the bag stand on its own; each is to be given once, whenever it is known.
-
-        ``urdf`` and ``schedule`` are the texts, ``parameters`` are by node and name.
-        """
+        """Store what makes the bag self-contained, each once: texts, and parameters by node and name."""
         if urdf is not None:
             self.writer.attach(ROBOT_FILE, "application/xml", urdf.encode())
         if schedule is not None:
@@ -101,14 +90,14 @@ class Recording:
             self.writer.record(PROVENANCE_RECORD, provenance)
 
     def begin(self) -> None:
-        """Tell in the bag what is to come on the topics opened so far, for a recovery to hold it against."""
+        """Store the periods of the topics opened so far, which a recovery compares stamps with."""
         self.writer.record(PERIODS_RECORD, self._periods)
 
     def receive(self, topic: str, data: bytes, wall_ns: int) -> None:
         """Record the CDR bytes of one message that arrived at ``wall_ns``."""
         if self._stamped.get(topic):
-            time_ns = _stamp_or_not(data)
-            if 0 <= time_ns < LONGEST_RUN_NS:
+            time_ns = run_stamp_ns(data)
+            if time_ns is not None:
                 if time_ns > self._now_ns:
                     self._now_ns = time_ns
                 self.writer.write(topic, data, time_ns, wall_ns)
@@ -117,10 +106,11 @@ class Recording:
         self.writer.write(topic, data, self._now_ns, wall_ns)
         self._keeper.receive_unstamped(topic)
         if topic in self._reports:
-            self._book_counts(data)
+            with suppress(BagError):  # a broken report is in the bag, but counts nothing
+                self._keeper.report(self._types.deserialize(data, PUBLISHED_COUNTS))
 
     def receive_at(self, topic: str, data: bytes, time_ns: int, wall_ns: int) -> None:
-        """Record one message whose simulation time the caller knows, e.g. the transforms it made itself."""
+        """Record one message at a given simulation time, e.g. transforms of the caller's own."""
         self.writer.write(topic, data, time_ns, wall_ns)
         self._keeper.receive(topic, time_ns)
 
@@ -133,19 +123,11 @@ class Recording:
         finally:
             self.writer.close()
 
-    def _book_counts(self, data: bytes) -> None:
-        """Book what a node says it has published."""
-        try:
-            report = self._types.deserialize(data, PUBLISHED_COUNTS)
-        except BagError:
-            return  # it is in the bag, but counts nothing
-        for topic, count in zip(report.topics, report.counts, strict=False):
-            self._keeper.report_published(report.node, topic, int(count))
 
-
-def _stamp_or_not(data: bytes) -> int:
-    """Return the stamp of a message in ns, :data:`_NO_STAMP` if it is broken; it is recorded all the same."""
+def run_stamp_ns(data: bytes) -> int | None:
+    """Return the stamp of a message in ns, None if it is broken or not one of simulation time."""
     try:
-        return stamp_ns(data)
+        time_ns = stamp_ns(data)
     except BagError:
-        return _NO_STAMP
+        return None
+    return time_ns if 0 <= time_ns < LONGEST_RUN_NS else None

@@ -1,4 +1,4 @@
-"""A recording for every run of a graph that is reset: one bag never holds two runs."""
+"""Recordings of the runs of a graph that is reset: one bag per run."""
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import count
@@ -20,10 +20,10 @@ class _Topic(NamedTuple):
 
 
 class RunRecordings:
-    """The recording of the present run, and those of the runs before, which are closed.
+    """The recording of the current run, after those of earlier runs, which are closed.
 
-    The first goes to the folder asked for, the next to ``<folder>_2``, ``<folder>_3`` and so on; a number
-    whose folder exists already is left out.
+    The first is in ``folder``, the next in ``<folder>_2``, ``<folder>_3`` and so on, skipping folders
+    that exist.
     """
 
     def __init__(
@@ -40,21 +40,21 @@ class RunRecordings:
 
     @property
     def current(self) -> Recording:
-        """Return the recording of the present run."""
+        """Return the recording of the current run."""
         return self._current
 
     @property
     def complete(self) -> bool:
-        """Whether nothing is known to be missing in any recording that is closed."""
+        """Whether nothing is known to be missing in the closed recordings."""
         return self._complete
 
     def add_topic(self, name: str, type_name: str, qos: Sequence[Qos] = (), period_ns: int = 0) -> None:
-        """Open a topic in this recording and in every one that follows; raises BagError."""
+        """Open a topic in this and all later recordings; raises BagError."""
         self._current.add_topic(name, type_name, qos, period_ns)
         self._topics.append(_Topic(name, type_name, qos, period_ns))
 
     def begin_next(self) -> Ledger:
-        """Close the recording and open that of the next run; return the ledger of the closed one."""
+        """Close the recording and open the next; return the ledger of the closed one."""
         ledger = self.close()
         self._current = self._open()
         for topic in self._topics:
@@ -63,21 +63,19 @@ class RunRecordings:
         return ledger
 
     def close(self) -> Ledger:
-        """Close the recording of the present run and return its ledger; again to no other effect."""
+        """Close the current recording and return its ledger; idempotent."""
         self._current.close()
         ledger = self._current.ledger
         self._complete = self._complete and ledger.complete
         return ledger
 
     def _open(self) -> Recording:
-        """Return a new recording that tells what it is made with."""
         recording = Recording(next(self._folders), types=self.types, split=self._split)
         self._describe(recording)
         return recording
 
 
 def _folders(first: Path) -> Iterator[Path]:
-    """Yield the folder of each run."""
     yield first
     for number in count(2):
         folder = first.with_name(f"{first.name}_{number}")

@@ -1,4 +1,4 @@
-"""Go through the messages of a bag in the order of their log time, from any time on.
+"""Time order: the messages of a bag by log time, from any time on.
 
 A recorder takes messages topic by topic, so the order in the file is not that of time. Only the chunks
 that overlap in time are held in memory.
@@ -10,18 +10,23 @@ from dataclasses import dataclass
 from itertools import count
 from math import inf
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import BinaryIO, NamedTuple
 
-from mcap.data_stream import ReadDataStream
-from mcap.reader import SeekingReader
-from mcap.records import Chunk, ChunkIndex, Message
-from mcap.stream_reader import breakup_chunk
-from mcap.summary import Summary
+from mcap.records import ChunkIndex
 
-from sms_handover.bag.files import RawMessage, bag_files, damage_reported, read_messages
+from sms_handover.bag.files import (
+    BagFiles,
+    RawMessage,
+    check_ends,
+    damage_error,
+    damage_reported,
+    whole_files,
+)
+from sms_handover.bag.mcap.damage import Damage
+from sms_handover.bag.mcap.scan import FileScan, ScannedMessage, Source
+from sms_handover.bag.mcap.summary import FileSummary, summarize
 
-_RECORD_HEAD = 9  # [byte] opcode and length of a record
-_WINDOW = 10_000  # [messages] held back to put them in order where a file has no index
+_WINDOW = 10_000  # [messages] held back to put them in order where a file has no usable index
 
 
 @dataclass(frozen=True)
@@ -46,43 +51,67 @@ def messages_by_time(
 ) -> Iterator[RawMessage]:
     """Yield the messages of a bag, of ``topics`` or of all, by log time; equal times in recorded order.
 
-    A file without a chunk index (rosbag2's ``fastwrite``) is read from its begin, and messages that are
-    more than 10000 places late in it stay late. Raises BagError on a damaged file.
+    A file without a usable chunk index (rosbag2's ``fastwrite``) is read from its begin, and messages that
+    are more than 10000 places late in it stay late. Raises BagError on a damaged file.
     """
-    span = span or TimeSpan()
-    files = [_file_by_time(file, topics, span) for file in bag_files(path)]
-    return heapq.merge(*files, key=lambda message: message.log_time_ns)
+    return _merged(whole_files(path), topics, span or TimeSpan())
 
 
-def _file_by_time(file: Path, topics: Collection[str] | None, span: TimeSpan) -> Iterator[RawMessage]:
+def _merged(bag: BagFiles, topics: Collection[str] | None, span: TimeSpan) -> Iterator[RawMessage]:
+    with bag.opened() as files:
+        for file in files:
+            check_ends(file, bag.path)
+        by_time = (_file_by_time(bag.path, file, topics, span) for file in files)
+        yield from heapq.merge(*by_time, key=lambda message: message.log_time_ns)
+
+
+def _file_by_time(
+    bag: Path, file: Path, topics: Collection[str] | None, span: TimeSpan
+) -> Iterator[RawMessage]:
     """Yield the messages of one file."""
-    with damage_reported(file), file.open("rb") as stream:
-        summary = SeekingReader(stream, record_size_limit=file.stat().st_size).get_summary()
-        if summary is not None and summary.chunk_indexes:
-            yield from _indexed(stream, summary, topics, span)
+    with damage_reported(file):
+        summary = summarize(file)
+        if summary.damages:
+            raise damage_error(summary.damages[0], bag)
+        wanted = {source for source in summary.sources.values() if topics is None or source.topic in topics}
+        if summary.chunks:
+            with file.open("rb") as stream:
+                chunks = [chunk for chunk in summary.chunks if _may_hold(chunk, summary, wanted, span)]
+                scan = FileScan(file, summary.sources)
+                yield from _indexed(scan, bag, stream, chunks, wanted, span)
             return
-    in_span = (m for m in read_messages(file, topics) if span.start_ns <= m.log_time_ns <= span.end_ns)
-    yield from _through_window(in_span)
+        found = (item for item in FileScan(file) if isinstance(item, ScannedMessage))
+        yield from _through_window(
+            _raw(item)
+            for item in found
+            if (topics is None or item.source.topic in topics)
+            and span.start_ns <= item.log_time_ns <= span.end_ns
+        )
 
 
 def _indexed(
-    stream: IO[bytes], summary: Summary, topics: Collection[str] | None, span: TimeSpan
+    scan: FileScan,
+    bag: Path,
+    stream: BinaryIO,
+    chunks: list[ChunkIndex],
+    wanted: Collection[Source],
+    span: TimeSpan,
 ) -> Iterator[RawMessage]:
-    """Yield the messages of a file with a chunk index; a chunk is read when its first time has come."""
-    wanted = {
-        channel.id: (channel.topic, schema.name if schema else "")
-        for channel in summary.channels.values()
-        if topics is None or channel.topic in topics
-        for schema in [summary.schemas.get(channel.schema_id)]
-    }
-    chunks = sorted(
-        (chunk for chunk in summary.chunk_indexes if _may_hold(chunk, wanted, span)),
-        key=lambda chunk: chunk.message_start_time,
-    )
+    """Yield the messages of chunks; a chunk is read when its first time has come."""
+    chunks.sort(key=lambda chunk: chunk.message_start_time)
     nexts: list[float] = [*(chunk.message_start_time for chunk in chunks[1:]), inf]
     waiting: list[_Placed] = []
     for chunk, next_ns in zip(chunks, nexts, strict=False):
-        waiting += _chunk_messages(stream, chunk, wanted, span)
+        begin = chunk.chunk_start_offset
+        for place, found in enumerate(scan.chunk_at(stream, begin, chunk.chunk_length)):
+            if isinstance(found, Damage):
+                raise damage_error(found, bag)
+            if (
+                isinstance(found, ScannedMessage)
+                and found.source in wanted
+                and span.start_ns <= found.log_time_ns <= span.end_ns
+            ):
+                waiting.append(_Placed(found.log_time_ns, begin, place, _raw(found)))
         waiting.sort()
         ready = next((n for n, item in enumerate(waiting) if item.log_time_ns >= next_ns), len(waiting))
         for item in waiting[:ready]:
@@ -90,29 +119,17 @@ def _indexed(
         del waiting[:ready]
 
 
-def _may_hold(chunk: ChunkIndex, wanted: Collection[int], span: TimeSpan) -> bool:
+def _may_hold(chunk: ChunkIndex, summary: FileSummary, wanted: Collection[Source], span: TimeSpan) -> bool:
     """Whether a chunk can hold a message of the wanted channels and times."""
-    indexed = chunk.message_index_offsets
     return (
         chunk.message_end_time >= span.start_ns
         and chunk.message_start_time <= span.end_ns
-        and (not indexed or not indexed.keys().isdisjoint(wanted))
+        and any(summary.sources[number] in wanted for number in chunk.message_index_offsets)
     )
 
 
-def _chunk_messages(
-    stream: IO[bytes], chunk: ChunkIndex, wanted: dict[int, tuple[str, str]], span: TimeSpan
-) -> Iterator[_Placed]:
-    """Yield the messages of one chunk in recorded order, its checksum checked."""
-    offset = chunk.chunk_start_offset
-    stream.seek(offset + _RECORD_HEAD)
-    records = breakup_chunk(Chunk.read(ReadDataStream(stream)), validate_crc=True)
-    for index, record in enumerate(records):
-        if isinstance(record, Message) and record.channel_id in wanted:
-            time_ns = record.log_time
-            if span.start_ns <= time_ns <= span.end_ns:
-                message = RawMessage(*wanted[record.channel_id], record.data, time_ns, record.publish_time)
-                yield _Placed(time_ns, offset, index, message)
+def _raw(found: ScannedMessage) -> RawMessage:
+    return RawMessage(found.source.topic, found.source.schema.name, *found[1:4])
 
 
 def _through_window(messages: Iterable[RawMessage]) -> Iterator[RawMessage]:

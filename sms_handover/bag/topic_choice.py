@@ -1,4 +1,4 @@
-"""Choose topics by name and by regular expression, as ``ros2 bag`` does."""
+"""Choice of topics by name and regular expression, as ``ros2 bag`` makes it."""
 
 import re
 from collections.abc import Collection, Iterable
@@ -9,10 +9,10 @@ from sms_handover.errors import ConfigurationError
 
 @dataclass(frozen=True)
 class TopicChoice:
-    """Topics named or matched are wanted, all if neither is given; exclusions come on top.
+    """Topics named or matched are chosen, all if neither is given, except those excluded.
 
-    A name without a leading slash is taken as one from the root; a regular expression may match
-    any part of a name. Raises ConfigurationError on one that cannot be read.
+    A name without a leading slash is one from the root; a regular expression may match any part of
+    a name. Raises ConfigurationError on an invalid one.
     """
 
     topics: tuple[str, ...] = ()
@@ -21,7 +21,6 @@ class TopicChoice:
     exclude_regex: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse expressions that are none."""
         for text in (self.regex, self.exclude_regex):
             try:
                 re.compile(text)

@@ -1,7 +1,7 @@
-"""Write a recording: MCAP files and ``metadata.yaml`` in a new folder, as rosbag2 lays it out.
+"""Bag writer: MCAP files and ``metadata.yaml`` in a new folder, in the layout of rosbag2.
 
-``log_time`` of a message is simulation time, so readers and players see the run's own clock;
-``publish_time`` is wall time, so what happened to the messages on the way stays visible.
+``log_time`` of a message is simulation time, the run's own clock for readers and players;
+``publish_time`` is wall time, which keeps the delays of the messages visible.
 """
 
 import os
@@ -10,7 +10,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from types import TracebackType
 
 from mcap.records import Schema as McapSchema
 
@@ -37,7 +36,7 @@ FLUSH_PERIOD_NS = 20_000_000  # [ns] of log time held back at most
 
 @dataclass
 class _Topic:
-    """A topic and its channel in the present file; ``count`` grows with each message."""
+    """A topic, its channel in the current file, and its number of messages."""
 
     source: Source
     qos: Sequence[Mapping[str, object]]
@@ -46,7 +45,7 @@ class _Topic:
 
 
 class BagWriter:
-    """An open recording; use it as a context manager, it leaves a complete bag even on an error."""
+    """An open bag; as a context manager it leaves a complete bag even after an error."""
 
     def __init__(
         self,
@@ -59,8 +58,8 @@ class BagWriter:
     ) -> None:
         """Create ``folder`` and ``<folder>/<name>_0.mcap``; raises BagError if it cannot.
 
-        With a ``split`` the recording goes on in ``<name>_1.mcap`` and so on. Each file is complete
-        by itself: it has every topic, attachment and record that was there before it.
+        With a ``split`` the recording continues in ``<name>_1.mcap`` and so on. Each file is complete
+        by itself: it repeats all earlier topics, attachments and records.
         """
         self.folder = Path(folder)
         self.types = MessageTypes() if types is None else types
@@ -69,12 +68,12 @@ class BagWriter:
         self._split = Split() if split is None else split
         self._flushed_ns = 0
         self._topics: dict[str, _Topic] = {}
-        self._repeated: list[Callable[[BagFile], None]] = []  # what goes into every later file too
+        self._repeated: list[Callable[[BagFile], None]] = []  # in every later file too
         self._finished: list[FileSpan] = []
         self._closed = False
         self._writable = True
         self._failure: BagError | None = None
-        self._handle = _create(self.folder)  # finds the folder even if it is moved
+        self._handle = _create(self.folder)  # still valid if the folder is moved
         try:
             self._file = BagFile(self._handle, self._next_name, chunk_size)
         except OSError as error:
@@ -93,13 +92,8 @@ class BagWriter:
     def __enter__(self) -> "BagWriter":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Close the bag; on an error in the block too, and then that error is the one that counts."""
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        """Close the bag; an error raised in the block takes precedence over one of closing."""
         if error is None:
             self.close()
         else:
@@ -149,7 +143,7 @@ class BagWriter:
         """Append the CDR bytes of one message; the topic must have been added."""
         entry = self._topics.get(topic)
         if not self._writable or entry is None or log_time_ns < 0 or publish_time_ns < 0:
-            raise self._refusal(topic)
+            raise self._rejection(topic)
         try:
             self._file.write(entry.channel, log_time_ns, data, publish_time_ns, sequence)
         except OSError as error:
@@ -159,16 +153,16 @@ class BagWriter:
             self.flush()
 
     def flush(self) -> None:
-        """Hand everything written so far to the operating system; call it also when no messages come.
+        """Hand everything written so far to the operating system; call it also while no messages come.
 
-        Raises BagError if the disk refuses, or if the file has been deleted meanwhile.
+        Raises BagError if writing fails, or if the file has been deleted.
         """
         self._require_open()
         self._flushed_ns = self._file.end_ns
         with self._reported():
             self._file.flush()
             if self._split.due(self._file.duration_ns, self._file.size):
-                self._go_on_in_a_new_file()
+                self._next_file()
 
     def attach(
         self,
@@ -196,10 +190,8 @@ class BagWriter:
     def close(self) -> None:
         """Complete the bag and wait until it is on the disk; a second call does nothing.
 
-        A folder that has been moved meanwhile gets its ``metadata.yaml`` where it is now.
-
-        After a failure of the disk the file is left as it is, without an end that would claim
-        that it is complete, and BagError is raised.
+        A folder that has been moved gets its ``metadata.yaml`` where it is now. After a failed write
+        BagError is raised and the file has no end, so that it does not look complete.
         """
         if self._closed:
             return
@@ -213,13 +205,13 @@ class BagWriter:
             with self._reported():
                 self._end_file()
                 _write_synced(self._handle, METADATA_FILE, to_yaml({ROSBAG2_KEY: self._information()}))
-                with suppress(OSError):  # not every file system can wait for the names in a folder
+                with suppress(OSError):  # not every file system can sync a folder
                     os.fsync(self._handle)
         finally:
             os.close(self._handle)
 
     def abandon(self) -> None:
-        """Remove a bag that is not worth keeping."""
+        """Delete the bag."""
         if not self._closed:
             self._closed, self._writable = True, False
             with suppress(OSError):
@@ -231,27 +223,24 @@ class BagWriter:
             self.folder.rmdir()
 
     def _open(self, key: str, source: Source, profiles: Sequence[Mapping[str, object]]) -> None:
-        """Open a channel for a topic."""
         self._topics[key] = _Topic(source, tuple(profiles), self._file.open_channel(source))
 
     @property
     def _next_name(self) -> str:
-        """Return the name of the next file."""
         return f"{self.folder.name}_{len(self._finished)}.mcap"
 
     def _begin_file(self) -> None:
-        """Write the head of a file; one that is never closed still tells how its QoS texts are to be read."""
+        """Write the head of a file; even one that is never closed gives the version of its QoS texts."""
         self._file.start()
         self._describe()
 
     def _end_file(self) -> None:
-        """Complete the present file."""
         self._file.flush()
         self._describe()
         self._file.finish()
 
-    def _go_on_in_a_new_file(self) -> None:
-        """Complete the present file and open the next one, with all that stands before the messages."""
+    def _next_file(self) -> None:
+        """Complete the current file and open the next, with all that precedes messages."""
         self._end_file()
         self._finished.append(_span(self._file))
         self._file = BagFile(self._handle, self._next_name, self._chunk_size)
@@ -266,7 +255,6 @@ class BagWriter:
         self._file.record(ROSBAG2_RECORD, {"serialized_metadata": to_yaml(self._information())})
 
     def _information(self) -> dict[str, object]:
-        """Return the metadata of what has been written so far."""
         topics = [
             TopicCount(
                 topic.source.topic,
@@ -281,28 +269,24 @@ class BagWriter:
         return bag_information([*self._finished, _span(self._file)], topics)
 
     def _require_open(self) -> None:
-        """Raise BagError if nothing can be written any more."""
         if not self._writable:
             raise self._failure or BagError(f"the recording in {self.folder} is closed")
 
-    def _refusal(self, topic: str) -> BagError:
-        """Return why a message cannot be written."""
-        if not self._writable:
-            return self._failure or BagError(f"the recording in {self.folder} is closed")
+    def _rejection(self, topic: str) -> BagError:
+        self._require_open()
         if topic not in self._topics:
             return BagError(f"topic {topic!r} was not added to the recording in {self.folder}")
         return BagError(f"a message on {topic!r} has a negative time")
 
     @contextmanager
     def _reported(self) -> Iterator[None]:
-        """Turn an error of the file system into one for the user, and remember it."""
         try:
             yield
         except OSError as error:
             raise self._failed(error) from error
 
     def _failed(self, error: OSError) -> BagError:
-        """Remember that the disk refused something: what follows would not be a readable file."""
+        """Stop writing after an error: what follows would not be a readable file."""
         self._writable = False
         path = self.folder / (error.filename or self._file.name)
         self._failure = BagError(f"cannot write the recording {path}: {error.strerror}")
@@ -310,7 +294,6 @@ class BagWriter:
 
 
 def _create(folder: Path) -> int:
-    """Create the folder, which must not exist, and open it."""
     try:
         folder.mkdir()
         return os.open(folder, os.O_RDONLY)
@@ -325,13 +308,11 @@ def _create(folder: Path) -> int:
 
 
 def _span(file: BagFile) -> FileSpan:
-    """Return what is told of a file in the metadata."""
     start_ns = 0 if file.start_ns is None else file.start_ns
     return FileSpan(file.name, start_ns, max(start_ns, file.end_ns), file.message_count)
 
 
 def _write_synced(folder: int, name: str, text: str) -> None:
-    """Write a text file into an open folder and wait until it is on the disk."""
     handle = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666, dir_fd=folder)
     with os.fdopen(handle, "w", encoding="utf-8") as stream:
         stream.write(text)

@@ -1,1 +1,1 @@
-"""The command ``sms-handover``: run, simulate, and look at what came out."""
+"""The command line (cli) ``sms-handover``: run, simulate, and analyse the results."""

@@ -6,13 +6,12 @@ from argparse import ArgumentParser, Namespace
 from io import StringIO
 from pathlib import Path
 
-from sms_handover.analysis.comparison import compare
 from sms_handover.analysis.records import Record, records_of
 from sms_handover.analysis.summary import summary
 from sms_handover.analysis.table import render
 from sms_handover.cli.recorded_runs import read_all
-from sms_handover.errors import ConfigurationError
-from sms_handover.report.recorded_run import common_tolerance
+from sms_handover.cli.text_files import write_text
+from sms_handover.report.recorded_run import common_tolerance, compare_recorded
 
 
 def add_parser(parser: ArgumentParser) -> None:
@@ -27,26 +26,14 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     recorded = read_all(options.runs)
-    comparison = compare(
-        {run.name: run.data for run in recorded},
-        laws={run.name: run.law for run in recorded},
-        loops={run.name: run.loop for run in recorded},
-    )
+    comparison = compare_recorded(recorded)
     print(render(comparison, common_tolerance(recorded)))
     if options.csv:
         table = StringIO()
         csv.writer(table, lineterminator="\n").writerows([Record._fields, *records_of(comparison)])
-        _write(options.csv, table.getvalue())
+        write_text(options.csv, table.getvalue())
     if options.json:
-        _write(options.json, json.dumps(summary(comparison), indent=2) + "\n")
+        write_text(options.json, json.dumps(summary(comparison), indent=2) + "\n")
     return 0
-
-
-def _write(path: Path, text: str) -> None:
-    """Write a text file; raises ConfigurationError if that cannot be done."""
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ConfigurationError(f"{path} cannot be written: {error.strerror}") from error

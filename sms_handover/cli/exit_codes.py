@@ -1,20 +1,19 @@
-"""Exit codes of commands that need no ROS."""
+"""Exit codes of the commands."""
 
 from collections.abc import Iterable
 
 from sms_handover.graph.events import GRASP_FAILED, RunEvent
 from sms_handover.types import GraspEvent, GraspStatus
 
-EXIT_OK = 0
-EXIT_FAILED = 1
+EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
 EXIT_LOSS = 3  # what was asked for is done, but something of the recording is missing
-EXIT_MISSED = 4
+EXIT_MISSED, EXIT_INTERRUPTED = 4, 130
 
 
 def task_code(grasps: Iterable[GraspEvent], decisions: Iterable[RunEvent], *, failed: bool) -> int:
-    """Return the exit code of a run by its task: failed for another reason than a grasp, missed, or well.
+    """Return the exit code of a run: failed for another reason than a grasp, a grasp missed, or succeeded.
 
-    A command that missed and succeeded when it was given again has not missed.
+    A grasp that missed and succeeded when it was repeated has not missed.
     """
     last = {event.command: event.status for event in grasps}
     if failed and all(event.kind != GRASP_FAILED for event in decisions):

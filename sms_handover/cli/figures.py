@@ -15,7 +15,7 @@ from sms_handover.scene.scene import Scene, make_scene
 _SNAPSHOTS = "snapshots"  # the one figure that needs a scene
 _FRAME_RATE = 10.0  # [1/s] of the scene that snapshots are taken from
 _DEFAULT_FORMATS = "pdf,png"
-_DPI = (50, 1200)  # [1/in] allowed
+_DPI = (50, 1200)  # [1/in] least and most
 
 
 def add_parser(parser: ArgumentParser) -> None:
@@ -27,7 +27,7 @@ def add_parser(parser: ArgumentParser) -> None:
     parser.formatter_class = RawDescriptionHelpFormatter
     parser.description = (
         "Draw figures for print from bags. The runs are laid over each other: the first is solid, the\n"
-        "second dashed. docs/figures.md shows each figure and tells what to see in it."
+        "second dashed. docs/figures.md explains each figure."
     )
     parser.epilog = "figures:\n" + "\n".join(listed) + "\n\nFiles that are there already are replaced."
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="output folder of a run, or a bag")
@@ -56,11 +56,11 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     formats = chosen_formats([name.strip() for name in options.format.split(",")])
     with_scenes = _SNAPSHOTS in {kind.name for kind in chosen_figures(options.only)}
     if not _DPI[0] <= options.dpi <= _DPI[1]:
-        raise ConfigurationError(f"--dpi is {options.dpi} dots per inch, allowed is {_DPI[0]} to {_DPI[1]}")
+        raise ConfigurationError(f"--dpi is {options.dpi} dots per inch, must be {_DPI[0]} to {_DPI[1]}")
     # here, because matplotlib is optional and slow to import: help and wrong input need none of it
     from sms_handover.analysis.figures.draw import draw_figures, write_figure  # noqa: PLC0415
     from sms_handover.analysis.figures.drawn_run import DrawnRun  # noqa: PLC0415

@@ -1,4 +1,4 @@
-"""Main program: the command line ``sms-handover``."""
+"""The main program of the command line ``sms-handover``."""
 
 import os
 import sys
@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from sms_handover import __version__
+from sms_handover.cli.exit_codes import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_USAGE
 from sms_handover.errors import ConfigurationError, SmsHandoverError
 from sms_handover.ros.process.environment import (
     draw_to_files,
@@ -30,11 +31,10 @@ _COMMANDS = {
     "record": "record topics of any graph to an MCAP bag",
 }
 _WITH_ROS = ("run", "play", "record")
-_EXIT_FAILED, _EXIT_USAGE, _EXIT_INTERRUPTED = 1, 2, 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; return the exit code. Our errors are one line on standard error.
+    """Run one command; return the exit code. Errors of ours are one line on standard error.
 
     Only the module of that command is imported, so that commands without ROS need no ROS.
     """
@@ -43,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = ArgumentParser(
         prog="sms-handover",
         description="A free-floating spacecraft with two arms hands a CubeSat from one arm to the other.",
-        epilog=f"commands:\n{listed}\n\n'sms-handover COMMAND --help' describes each.",
+        epilog=f"commands:\n{listed}\n\nSee 'sms-handover COMMAND --help'.",
         formatter_class=RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"sms-handover {__version__}")
@@ -53,17 +53,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(chosen.command, chosen.arguments)
     except BrokenPipeError:  # the reader has closed the pipe, as head(1) does
-        return _EXIT_FAILED
+        return EXIT_FAILED
     except UnicodeEncodeError as error:
         reason = f"{error.object!a} is not UTF-8: rename it, or give a symbolic link to it"
         print(f"sms-handover {chosen.command}: error: {reason}", file=sys.stderr)
-        return _EXIT_USAGE
+        return EXIT_USAGE
     except (SmsHandoverError, OSError, MemoryError) as error:
         print(f"sms-handover {chosen.command}: error: {error or 'out of memory'}", file=sys.stderr)
-        return _EXIT_USAGE if isinstance(error, ConfigurationError) else _EXIT_FAILED
+        return EXIT_USAGE if isinstance(error, ConfigurationError) else EXIT_FAILED
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
-        return _EXIT_INTERRUPTED
+        return EXIT_INTERRUPTED
     finally:
         let_go_of_failed_output()
 

@@ -1,4 +1,4 @@
-"""Options of a command that runs one node in this process: they become the node's parameters."""
+"""Node options: command line options that become parameters of a node in this process."""
 
 import os
 from argparse import ArgumentParser, Namespace
@@ -45,7 +45,7 @@ def run_in_process(
     """Run a node in this process; raises ConfigurationError on a domain that does not exist."""
     if options.domain_id is not None:
         if not 0 <= options.domain_id <= LAST_DOMAIN:
-            raise ConfigurationError(f"domain id is {options.domain_id}, allowed is 0 to {LAST_DOMAIN}")
+            raise ConfigurationError(f"domain id is {options.domain_id}, must be 0 to {LAST_DOMAIN}")
         os.environ["ROS_DOMAIN_ID"] = str(options.domain_id)
     rules = [part for rule in remap for part in ("--remap", rule)]
     return main(["sms-handover", "--ros-args", *rules, *as_arguments(parameters)])

@@ -5,12 +5,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import yaml
-
 from sms_handover.bag.parameters import RecorderParameters
-from sms_handover.configuration import yaml_reader as yaml_files
 from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.parameters import build, read_parameter_files
+from sms_handover.configuration.yaml_reader import load_value
 from sms_handover.control.parameters import LAWS
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.topics import CONTROLLER, RECORDER, TRAJECTORY
@@ -28,10 +26,7 @@ def add_scenario_options(parser: ArgumentParser) -> None:
     group.add_argument("--schedule", type=Path, metavar="FILE", help="task schedule (default: handover.yaml)")
     group.add_argument("--robot", type=Path, metavar="FILE", help="robot description (default: robot.yaml)")
     group.add_argument(
-        "--duration",
-        type=float,
-        metavar="S",
-        help="simulated time in s (default: the schedule's)",
+        "--duration", type=float, metavar="S", help="simulated time in s (default: the schedule's)"
     )
     group.add_argument("--time-law", choices=tuple(TIME_LAWS), help="approach of targets (default: step)")
     group.add_argument(
@@ -54,7 +49,8 @@ def add_scenario_options(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NODE.NAME:=VALUE",
-        help="one parameter, e.g. plant.integrator:=midpoint; the node 'common' is for all of them",
+        help="one parameter, e.g. plant.integrator:=midpoint, where the node 'common' is for all of "
+        "them; or a value of robot, deputy or schedule by path, e.g. robot.arms.arm_a.gripper.mass:=0.9",
     )
 
 
@@ -67,8 +63,8 @@ def overrides_of(options: Namespace) -> Overrides:
     shortcuts = (
         (CONTROLLER, "law", options.controller),
         (TRAJECTORY, "time_law", options.time_law),
-        (COMMON, "schedule", options.schedule and str(options.schedule.resolve())),
-        (COMMON, "robot", options.robot and str(options.robot.resolve())),
+        (COMMON, "schedule", options.schedule and str(_found(options.schedule))),
+        (COMMON, "robot", options.robot and str(_found(options.robot))),
         (COMMON, "duration", options.duration),
         (COMMON, "dynamics", options.dynamics),
     )
@@ -91,7 +87,7 @@ def scenario_of(
     if external:
         overrides[COMMON]["external"] = list(external)
     of_recorder = overrides.pop(RECORDER, {}) if recorded else {}
-    files = [path.resolve() for path in options.params_file]
+    files = [_found(path) for path in options.params_file]
     scenario = load_scenario(overrides, files)
     if not recorded:
         return scenario
@@ -106,8 +102,9 @@ def _parse(text: str) -> tuple[str, str, object]:
     node, dot, name = target.partition(".")
     if not (assigned and dot and node and name):
         raise ConfigurationError(f"parameter {text!r} is not of the form NODE.NAME:=VALUE")
-    try:
-        return node, name, yaml_files.load(value)
-    except (yaml.YAMLError, ValueError) as error:
-        reason = yaml_files.reason(error)
-        raise ConfigurationError(f"the value of parameter {text!r} is not YAML: {reason}") from error
+    return node, name, load_value(value, text)
+
+
+def _found(path: Path) -> Path:
+    """Return a file as every working directory finds it; anything else as written, for the error to name."""
+    return path.resolve() if path.is_file() else path

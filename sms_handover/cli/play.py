@@ -5,9 +5,9 @@ from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from dataclasses import fields
 from pathlib import Path
 
-from sms_handover.cli.closed_loop import closed_loop
 from sms_handover.cli.node_options import add_graph_options, add_topic_options, given, run_in_process
 from sms_handover.errors import ConfigurationError
+from sms_handover.launcher.closed_loop import closed_loop
 from sms_handover.launcher.run_folder import bag_of
 from sms_handover.nodes.player import KEYS
 from sms_handover.nodes.player import main as run_player

@@ -1,13 +1,13 @@
 """``sms-handover report``: recorded runs as one HTML page."""
 
-import os
-import sys
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from pathlib import Path
 
 from sms_handover.cli.recorded_runs import read_all
+from sms_handover.cli.text_files import write_text
 from sms_handover.errors import ConfigurationError
 from sms_handover.report.page import report_page
+from sms_handover.terminal.progress import Progress
 
 _PAGE = "index.html"
 _BYTES_PER_MB = 1e6
@@ -42,33 +42,14 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     page: Path = options.output if options.output.suffix == ".html" else options.output / _PAGE
     if page.exists() and not options.overwrite:
         raise ConfigurationError(f"{page} exists; choose another place, or --overwrite it")
-    _tell(f"reading {len(options.runs)} bags" if len(options.runs) > 1 else "reading the bag")
-    runs = read_all(options.runs)
-    _tell("drawing")
-    content = report_page(runs)
-    _write(page, content)
+    with Progress() as progress:
+        runs = read_all(options.runs, progress)
+        progress.show("drawing")
+        content = report_page(runs)
+    write_text(page, content, parents=True)
     print(f"{page}: {len(content.encode()) / _BYTES_PER_MB:.1f} MB; open it in a browser")
     return 0
-
-
-def _write(page: Path, content: str) -> None:
-    """Write a page whole or not at all; raises ConfigurationError if its place cannot be written to."""
-    unfinished = page.with_name(f".{page.name}.{os.getpid()}")
-    try:
-        page.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            unfinished.write_text(content, encoding="utf-8")
-            unfinished.replace(page)
-        finally:
-            unfinished.unlink(missing_ok=True)
-    except OSError as error:
-        raise ConfigurationError(f"{page} cannot be written: {error.strerror}") from error
-
-
-def _tell(text: str) -> None:
-    """Say what goes on, where it does not mix with the output."""
-    print(text, file=sys.stderr, flush=True)

@@ -5,19 +5,13 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from sms_handover.analysis.equality import before, compare_runs
-from sms_handover.bag.info import BagInfo, read_info
+from sms_handover.bag.info import read_info
 from sms_handover.bag.run.reader import read_run
 from sms_handover.errors import BagError, ConfigurationError
-from sms_handover.graph.topics import CONTROLLER, IK, PLANT, TRAJECTORY
+from sms_handover.launcher.recorded_scenario import scenario_in
 from sms_handover.launcher.run_folder import bags_of
-from sms_handover.simulation.parameters import CommonParameters
-from sms_handover.simulation.scenario import COMMON, Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.units import ns_to_seconds
-
-_NODES = (PLANT, TRAJECTORY, IK, CONTROLLER)
-_COMMON_NAMES = tuple(CommonParameters.__dataclass_fields__)
-_ROS_OWN = ("use_sim_time", "start_type_description_service")
 
 
 def add_parser(parser: ArgumentParser) -> None:
@@ -31,15 +25,15 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     return max([_reproduce(bag) for bag in bags_of(options.run)])
 
 
 def _reproduce(bag: Path) -> int:
-    """Run a bag again, say what differs, and return the exit code.
+    """Run a bag again, print what differs, and return the exit code.
 
-    A run that was reset or ended before its end is run up to where it had come; the command that would
-    have answered its last state need not have been given any more.
+    A run that was reset or ended early is compared up to its last state, without the command that would
+    have answered it.
     """
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -60,22 +54,3 @@ def _reproduce(bag: Path) -> int:
         states, references = recorded.tick_ns.size, recorded.reference_ns.size
         print(f"the same bit for bit: {states} states, {references} references{until}")
     return 1 if differences else 0
-
-
-def scenario_in(info: BagInfo, folder: Path) -> Scenario:
-    """Return the scenario that a bag was made with; its schedule is unpacked into ``folder``."""
-    if not info.parameters.keys() >= {*_NODES} or info.schedule_text is None or info.urdf_text is None:
-        raise BagError(f"{info.path} does not say what it was made with")
-    schedule = folder / "schedule.yaml"
-    schedule.write_text(info.schedule_text, encoding="utf-8")
-    overrides: dict[str, dict[str, object]] = {}
-    for node in _NODES:
-        values = info.parameters[node]
-        own = {n: v for n, v in values.items() if n not in _COMMON_NAMES and n not in _ROS_OWN}
-        overrides[node] = own
-        overrides[COMMON] = {n: v for n, v in values.items() if n in _COMMON_NAMES}
-    overrides[COMMON]["schedule"] = str(schedule)
-    scenario = load_scenario(overrides)
-    if scenario.robot.urdf != info.urdf_text:
-        raise BagError(f"{info.path} was made with another robot description than the one in use now")
-    return scenario

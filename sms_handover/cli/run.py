@@ -10,7 +10,7 @@ from contextlib import contextmanager, nullcontext
 from datetime import datetime
 from pathlib import Path
 
-from sms_handover.cli.exit_codes import task_code
+from sms_handover.cli.exit_codes import EXIT_INTERRUPTED, EXIT_LOSS, task_code
 from sms_handover.cli.options import add_scenario_options, scenario_of
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import graver_in_words
@@ -19,16 +19,14 @@ from sms_handover.launcher.domain import reservation
 from sms_handover.launcher.launcher import LaunchPlan, launch
 from sms_handover.launcher.run_folder import BAG, LOGS, locked_logs
 from sms_handover.ros.launching.composition import listed, placed
-from sms_handover.ros.process.main import EXIT_LOSS
 from sms_handover.ros.process.network_scope import network_scope_to
 from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.parameters import LOCKSTEP, REALTIME
 from sms_handover.simulation.scenario import Scenario
+from sms_handover.units import ns_to_seconds
 
-EXIT_INTERRUPTED = 130
-
-OWN = "own"  # in the name of the output folder, for a law of which we know no name
-_AT_ONCE = 100  # runs at most that begin within one second without an output folder of their own
+OWN = "own"  # in the name of the output folder, for a law whose name is not known
+_AT_ONCE = 100  # most runs that start within one second without a given output folder
 
 
 def add_parser(parser: ArgumentParser) -> None:
@@ -71,7 +69,7 @@ def add_parser(parser: ArgumentParser) -> None:
     controller.add_argument(
         "--without-controller",
         action="store_true",
-        help="start no controller: the run begins when a node 'controller' of yours has come",
+        help="start no controller: the run begins when your own node 'controller' has joined",
     )
     group.add_argument(
         "--domain-id", type=int, metavar="N", help="ROS domain (default: a free one of this machine's)"
@@ -96,11 +94,11 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     mode = REALTIME if options.real_time else LOCKSTEP
     here, elsewhere = placed(options.nodes, record=not options.no_record)
-    reach = network_scope_to(listed(options.peers))
-    if (elsewhere or reach.hosts) and options.domain_id is None:
+    scope = network_scope_to(listed(options.peers))
+    if (elsewhere or scope.hosts) and options.domain_id is None:
         raise ConfigurationError(
             "nodes of several hosts meet on a ROS domain: give each host the same --domain-id"
         )
@@ -124,25 +122,26 @@ def command(options: Namespace) -> int:
             inherited=(*held.descriptors, lock),
             nodes=here,
             elsewhere=elsewhere,
-            reach=reach,
+            scope=scope,
         )
         where = options.output or output
-        print(f"running on ROS domain {held.domain}, {reach}; output in {where}", flush=True)
+        print(f"running on ROS domain {held.domain}, {scope}; output in {where}", flush=True)
         if elsewhere:
             print(f"this host runs {', '.join(here)}; waiting for {', '.join(elsewhere)}", flush=True)
         if options.without_controller:
             print(_how_to_join(held.domain), flush=True)
         outcome = launch(plan)
+    progress = outcome.progress
     print(outcome.recorder_said, end="")
-    if told := graver_in_words(outcome.run_events):
-        print(f"the nodes told of {told}, see above")
-    print(f"{outcome.detail} at {outcome.stamp_ns / 1e9:g} s of simulated time")
+    if summary := graver_in_words(progress.run_events):
+        print(f"the nodes reported {summary}, see above")
+    print(f"{progress.detail} at {ns_to_seconds(progress.stamp_ns):g} s of simulated time")
     if outcome.interrupted:
         return EXIT_INTERRUPTED
     if outcome.recorder_code:
         print("messages are missing in the bag, see the table above", file=sys.stderr)
         return EXIT_LOSS
-    return task_code(outcome.events, outcome.run_events, failed=outcome.failed)
+    return task_code(progress.events, progress.run_events, failed=progress.failed)
 
 
 def _own_controller(options: Namespace) -> tuple[str, ...]:
@@ -163,7 +162,6 @@ def _own_controller(options: Namespace) -> tuple[str, ...]:
 
 
 def _how_to_join(domain: int) -> str:
-    """Return how a controller that the user starts finds the graph."""
     return (
         f"waiting for your node {CONTROLLER!r}; it joins with ROS_DOMAIN_ID={domain} "
         "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST and --ros-args --remap __node:=controller"
@@ -221,7 +219,6 @@ def _earlier_run_aside(folder: Path) -> Iterator[None]:
 
 
 def _makes(folder: Path) -> bool:
-    """Make a folder; tell whether it is new."""
     try:
         folder.mkdir()
     except FileExistsError:

@@ -3,6 +3,7 @@
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from sms_handover.analysis.clearance import TaskTexts
 from sms_handover.analysis.table import comparison_table
 from sms_handover.cli.exit_codes import task_code
 from sms_handover.cli.options import add_scenario_options, scenario_of
@@ -29,22 +30,23 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     scenario = scenario_of(options)
     check_scenario(scenario)
     common = scenario.parameters.common
-    display = Display(common.last_tick(scenario.schedule.end_ns) * common.tick_ns)
+    with Display(common.last_tick(scenario.schedule.end_ns) * common.tick_ns) as display:
 
-    def show(stamp_ns: int, phase: TaskPhase) -> None:
-        display.lasts_until(common.last_tick(phase.end_ns, failed=phase.failed) * common.tick_ns)
-        display.show(stamp_ns, phase.name, {})
+        def show(stamp_ns: int, phase: TaskPhase) -> None:
+            display.lasts_until(common.last_tick(phase.end_ns, failed=phase.failed) * common.tick_ns)
+            display.show_run(stamp_ns, phase.name)
 
-    run = simulate(scenario, progress=show)
-    display.show(int(run.tick_ns[-1]), run.phases[-1].name, {}, last=True)
+        run = simulate(scenario, progress=show)
+        display.show_run(int(run.tick_ns[-1]), run.phases[-1].name, last=True)
     name, tolerance = scenario.parameters.controller.law, scenario.parameters.plant.grasp_tolerance
+    texts = TaskTexts(scenario.robot.urdf, scenario.schedule.text)
     for event in run.run_events:
         print(event)
-    print(comparison_table({name: run}, tolerance=tolerance))
+    print(comparison_table({name: run}, tolerance=tolerance, texts={name: texts}))
     if options.output:
         save_run(run, options.output)
         print(f"arrays written to {options.output}")

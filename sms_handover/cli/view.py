@@ -4,9 +4,10 @@ import os
 import tempfile
 import webbrowser
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
-from importlib import import_module
 from pathlib import Path
 
+from sms_handover.cli.recorded_runs import named
+from sms_handover.cli.text_files import write_text
 from sms_handover.errors import BagError, ConfigurationError
 from sms_handover.launcher.run_folder import bag_of
 from sms_handover.scene.page import animation_html
@@ -33,7 +34,7 @@ def add_parser(parser: ArgumentParser) -> None:
     parser.add_argument("runs", nargs="*", type=Path, metavar="RUN", help="output folder of a run, or a bag")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the page there")
     parser.add_argument(
-        "--no-browser", action="store_true", help="open no browser, only tell where the page is"
+        "--no-browser", action="store_true", help="open no browser, only print where the page is"
     )
     parser.add_argument(
         "--frame-rate",
@@ -50,11 +51,11 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Carry out the command; return the exit code."""
+    """Run the command; return the exit code."""
     if options.live:
         if options.runs or options.output:
             raise ConfigurationError("--live shows a running graph: give no RUN and no --output with it")
-        return int(import_module("sms_handover.cli.view_live").follow(options))  # bags need no ROS
+        return _follow(options)
     if options.port is not None or options.domain_id is not None:
         raise ConfigurationError("--port and --domain-id are for a running graph: give --live with them")
     if not options.runs:
@@ -62,36 +63,34 @@ def command(options: Namespace) -> int:
     page = animation_html(
         _scenes(options), title=f"Handover: {', '.join(p.resolve().name for p in options.runs)}"
     )
-    file = _write(page, options.output)
+    file = options.output or _temporary_file()
+    write_text(file, page)
     print(f"{file}: {len(page.encode()) / 1e6:.1f} MB")
     if not options.no_browser and not webbrowser.open(file.resolve().as_uri()):
         print("no browser could be opened; open the file in one")
     return 0
 
 
+def _follow(options: Namespace) -> int:
+    """Run the viewer node in this process until it is interrupted; return the exit code."""
+    from sms_handover.cli.node_options import given, run_in_process  # noqa: PLC0415  (bags need no ROS)
+    from sms_handover.nodes.viewer import main  # noqa: PLC0415
+
+    values = given(options, {"port": "port", "frame_rate": "frame_rate"})
+    if options.no_browser:
+        values["browser"] = False
+    return run_in_process(main, options, values)
+
+
 def _scenes(options: Namespace) -> dict[str, Scene]:
-    """Return the scenes of the runs, by the names of their folders."""
     frame_rate = FRAME_RATE if options.frame_rate is None else options.frame_rate
-    scenes: dict[str, Scene] = {}
-    for path in options.runs:
-        name = path.resolve().name
-        if name in scenes:
-            raise ConfigurationError(f"two runs are named {name!r}; rename one folder")
-        try:
-            scenes[name] = read_scene(bag_of(path), frame_rate)
-        except BagError as error:
-            raise ConfigurationError(str(error)) from error  # exit code 2: what was given cannot be used
-    return scenes
-
-
-def _write(page: str, path: Path | None) -> Path:
-    """Write the page to ``path``, or to a file of its own among the temporary ones."""
-    if path is None:
-        handle, name = tempfile.mkstemp(prefix="handover_", suffix=".html")
-        os.close(handle)
-        path = Path(name)
     try:
-        path.write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise ConfigurationError(f"{path} cannot be written: {error.strerror}") from error
-    return path
+        return {name: read_scene(path, frame_rate) for name, path in named(map(bag_of, options.runs)).items()}
+    except BagError as error:
+        raise ConfigurationError(str(error)) from error  # exit code 2: what was given cannot be used
+
+
+def _temporary_file() -> Path:
+    handle, name = tempfile.mkstemp(prefix="handover_", suffix=".html")
+    os.close(handle)
+    return Path(name)

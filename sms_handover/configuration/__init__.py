@@ -1,1 +1,1 @@
-"""Configuration: files that ship with the package, YAML with positions, parameters with unit and range."""
+"""Configuration: shipped files, YAML with positions, parameters with unit and range."""

@@ -1,4 +1,4 @@
-"""Where the files that ship beside the code (``config/``) are, however the package was installed."""
+"""Package files: where ``config/`` is, however the package was installed."""
 
 import os
 import sysconfig
@@ -10,10 +10,10 @@ _PACKAGE = "sms_handover"
 
 
 def share_directory() -> Path:
-    """Return the folder that holds ``config/``.
+    """Return the folder that holds ``config/``; raises ConfigurationError.
 
-    Looked for in this order: the source tree this module runs from, every prefix of a ROS
-    workspace (AMENT_PREFIX_PATH), the environment of the interpreter. Raises ConfigurationError.
+    Searched in this order: the source tree, every prefix of AMENT_PREFIX_PATH, the environment of the
+    interpreter.
     """
     prefixes = [p for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p]
     prefixes.append(sysconfig.get_path("data"))
@@ -22,8 +22,8 @@ def share_directory() -> Path:
     for candidate in candidates:
         if (candidate / "config" / "robot.yaml").is_file():
             return candidate
-    looked = ", ".join(str(c) for c in candidates)
-    raise ConfigurationError(f"the package's config folder is not installed; looked in {looked}")
+    searched = ", ".join(str(c) for c in candidates)
+    raise ConfigurationError(f"the config folder of the package is not installed; searched {searched}")
 
 
 def config_file(name: str) -> Path:

@@ -1,19 +1,19 @@
 """Parameters as frozen dataclasses, each field with its unit, range and meaning.
 
 A node declares such a dataclass as ROS parameters, the in-process simulation builds it from the
-same YAML files; both go through :func:`build`, so both refuse the same values with the same words.
-The numbers live in ``config/``, never here.
+same YAML files; both use :func:`build`, so both reject the same values with the same words.
+The numbers are in ``config/``.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields
-from math import inf, isfinite
+from math import inf
 from pathlib import Path
+from reprlib import repr as shortened
 from typing import Any, TypeVar, get_type_hints
 
-import yaml
-
-from sms_handover.configuration import yaml_reader as yaml_files
+from sms_handover.configuration.checks import check_number
+from sms_handover.configuration.sections import Section
 from sms_handover.errors import ConfigurationError, UnknownNameError
 
 T = TypeVar("T")
@@ -32,7 +32,7 @@ class ParameterValues(dict[str, object]):
 
 @dataclass(frozen=True)
 class ParameterSpec:
-    """What is known of a parameter besides its type: meaning, unit and the values allowed."""
+    """Meaning, unit and allowed values of a parameter."""
 
     description: str
     unit: str = ""
@@ -50,9 +50,9 @@ def parameter(
     choices: Sequence[str] = (),
     default: Any = MISSING,
 ) -> Any:
-    """Return a dataclass field that carries a :class:`ParameterSpec`; bounds are inclusive.
+    """Return a dataclass field with a :class:`ParameterSpec`; bounds are inclusive.
 
-    The parameters of this package have their defaults in ``config/``; others may give a ``default`` here.
+    Parameters of this package have their defaults in ``config/``, others may give a ``default``.
     """
     spec = ParameterSpec(description, unit, minimum, maximum, tuple(choices))
     return field(default=default, metadata={_SPEC: spec})
@@ -69,10 +69,9 @@ def build(
 ) -> T:
     """Return ``cls`` filled from ``values`` after checking names, types, ranges and choices.
 
-    ``where`` names the origin (a file, a node) in error messages, ``places`` those of single values
-    where they are known more closely. A list gives a tuple, an
-    integer is taken where a float is asked for. Raises ConfigurationError on a missing or bad
-    value and UnknownNameError on a name that ``cls`` does not have.
+    ``where`` names the origin (a file, a node) in error messages, ``places`` that of single values
+    where it is known. A list gives a tuple, an integer is accepted as a float. Raises
+    ConfigurationError on a missing or bad value and UnknownNameError on a name that ``cls`` does not have.
     """
     hints = get_type_hints(cls)
     known = {item.name: item for item in fields(cls)}  # type: ignore[arg-type]
@@ -104,66 +103,28 @@ def read_parameter_files(paths: Sequence[Path], section: str) -> ParameterValues
     """
     merged = ParameterValues()
     for path in paths:
-        document = read_yaml(path)
-        content = document.get(section)
-        if content is None:
-            continue
-        values = content.get("ros__parameters") if isinstance(content, dict) else None
-        if not isinstance(values, dict):
-            place = f"{path}{yaml_files.line_in(document, section)}"
-            raise ConfigurationError(f"{place}: section {section!r} needs a mapping 'ros__parameters'")
-        merged.update(values)
-        merged.places.update((name, f"{path}{yaml_files.line_in(values, name)}") for name in values)
+        document = Section.read(path)
+        if section in document:
+            values = document.section(section).section("ros__parameters")
+            merged.update((name, values.value(name)) for name in values.keys)
+            merged.places.update((name, values.where(name)) for name in values.keys)
     return merged
 
 
-def read_yaml(path: Path) -> dict[str, Any]:
-    """Return the mapping in a YAML file, loaded safely; raises ConfigurationError naming the line."""
-    try:
-        document = yaml_files.load(yaml_files.read_text(path))
-    except OSError as error:
-        raise ConfigurationError(f"cannot read {path}: {error.strerror}") from error
-    except (yaml.YAMLError, ValueError) as error:
-        raise ConfigurationError(f"{path} is not valid YAML: {yaml_files.reason(error)}") from error
-    if not isinstance(document, dict):
-        raise ConfigurationError(f"{path}: expected a mapping at the top level")
-    return document
-
-
-def _check(value: object, hint: Any, spec: ParameterSpec, where: str) -> object:
+def _check(value: object, hint: Any, spec: ParameterSpec, what: str) -> object:
     """Return ``value`` as the type ``hint`` asks for, or raise ConfigurationError."""
     if hint == tuple[float, ...] or hint == tuple[str, ...]:
         if not isinstance(value, list | tuple):
-            raise ConfigurationError(f"{where} is {value!r}, expected a list")
+            raise ConfigurationError(f"{what} is {shortened(value)}, must be a list")
         inner = float if hint == tuple[float, ...] else str
-        return tuple(_check(item, inner, spec, where) for item in value)
+        return tuple(_check(item, inner, spec, what) for item in value)
     if hint is bool or hint is str:
         if not isinstance(value, hint):
-            raise ConfigurationError(f"{where} is {value!r}, expected {hint.__name__}")
+            allowed = "text" if hint is str else "true or false"
+            raise ConfigurationError(f"{what} is {shortened(value)}, must be {allowed}")
         if spec.choices and value not in spec.choices:
-            raise UnknownNameError("value", str(value), spec.choices, where)
+            raise UnknownNameError("value", str(value), spec.choices, what)
         return value
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ConfigurationError(f"{where} is {value!r}, expected a number" + _unit(spec))
-    if hint is int and not isinstance(value, int):
-        raise ConfigurationError(f"{where} is {value!r}, expected a whole number" + _unit(spec))
-    if not isfinite(as_float(value)):
-        raise ConfigurationError(f"{where} is {as_float(value)}, expected a finite number" + _unit(spec))
-    if spec.minimum is not None and value < spec.minimum:
-        raise ConfigurationError(f"{where} is {value}{_unit(spec)}, allowed is at least {spec.minimum}")
-    if spec.maximum is not None and value > spec.maximum:
-        raise ConfigurationError(f"{where} is {value}{_unit(spec)}, allowed is at most {spec.maximum}")
-    return float(value) if hint is float else value
-
-
-def as_float(value: float) -> float:
-    """Return a number as a float; a whole number beyond every float is infinite."""
-    try:
-        return float(value)
-    except OverflowError:
-        return inf
-
-
-def _unit(spec: ParameterSpec) -> str:
-    """Return the unit with a space before it, or nothing."""
-    return f" {spec.unit}" if spec.unit else ""
+    minimum = -inf if spec.minimum is None else spec.minimum
+    maximum = inf if spec.maximum is None else spec.maximum
+    return check_number(value, what, spec.unit, minimum=minimum, maximum=maximum, whole=hint is int)

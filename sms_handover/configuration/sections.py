@@ -1,141 +1,140 @@
-"""YAML mappings and lists that remember the line they start at, for errors that point at it."""
+"""Sections of a YAML file: typed access to keys; each error names file, line, path and what is allowed."""
 
-from collections.abc import Sequence
-from math import inf, isfinite, nan
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from math import inf
 from pathlib import Path
+from reprlib import repr as shortened
 from typing import Any
 
-import yaml
-
-from sms_handover.configuration import yaml_reader as yaml_files
-from sms_handover.configuration.parameters import as_float
-from sms_handover.errors import ScheduleError, UnknownNameError
+from sms_handover.configuration.checks import check_number, check_vector
+from sms_handover.configuration.yaml_reader import Mapping, read_yaml
+from sms_handover.errors import ConfigurationError, UnknownNameError
 
 
 class Section:
-    """A mapping of a YAML file: typed access to its keys, with the line in every error."""
+    """A mapping of a YAML file; ``kind`` is the error that its getters raise."""
 
-    def __init__(self, path: Path, node: yaml.MappingNode) -> None:
-        """Index the keys; raises ScheduleError on a key given twice."""
-        self._path = path
-        self.line = node.start_mark.line + 1
-        self._nodes: dict[str, yaml.Node] = {}
-        self._lines: dict[str, int] = {}
-        for key_node, value_node in node.value:
-            key = str(key_node.value)
-            if key in self._nodes:
-                raise self.error(f"key {key!r} is given twice", key_node.start_mark.line + 1)
-            self._nodes[key] = value_node
-            self._lines[key] = key_node.start_mark.line + 1
+    def __init__(
+        self, values: Mapping, file: Path, kind: type[ConfigurationError] = ConfigurationError, path: str = ""
+    ) -> None:
+        self._values, self._file, self._kind, self._path = values, file, kind, path
+        for key in values:
+            if not isinstance(key, str):
+                raise self.error(f"key {key!r} must be text", key)
 
-    def error(self, text: str, line: int | None = None) -> ScheduleError:
-        """Return an error that names the file and a line, by default that of this section."""
-        return ScheduleError(f"{self._path}:{line or self.line}: {text}")
+    @classmethod
+    def read(cls, file: Path, kind: type[ConfigurationError] = ConfigurationError) -> "Section":
+        """Return the top-level mapping of a file; raises ConfigurationError."""
+        return cls(read_yaml(file), file, kind)
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._values
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Return the keys in the order of the file."""
-        return tuple(self._nodes)
+        """The keys in the order of the file."""
+        return tuple(self._values)
 
-    def line_of(self, key: str) -> int:
-        """Return the line of a key."""
-        return self._lines[key]
+    def where(self, key: object = None) -> str:
+        """Return file and line of a key, or where else it was set; by default of the section itself."""
+        return (
+            self._values.origins.get(key) or f"{self._file}:{self._values.lines.get(key, self._values.line)}"
+        )
 
-    def where(self, key: str) -> str:
-        """Return file and line of a key, as errors name them."""
-        return f"{self._path}:{self.line_of(key)}"
+    def path(self, key: str) -> str:
+        """Return the dotted path of a key."""
+        return f"{self._path}.{key}" if self._path else key
 
-    def reject_unknown(self, known: Sequence[str]) -> None:
-        """Raise ScheduleError on a key that is not among the known ones."""
-        for key in self._nodes:
+    def error(self, text: str, key: object = None) -> ConfigurationError:
+        """Return an error at a key, by default at the section itself."""
+        return self._kind(f"{self.where(key)}: {text}")
+
+    def unknown(self, what: str, name: str, known: Iterable[str], key: str) -> ConfigurationError:
+        """Return the error on an unknown name at a key."""
+        where = f"{self.where(key)}: {self._path}" if self._path else self.where(key)
+        error = UnknownNameError(what, name, known, where)
+        return error if self._kind is ConfigurationError else self._kind(str(error))
+
+    @contextmanager
+    def located(self, key: str | None = None) -> Iterator[None]:
+        """Put file and line of a key before an error raised inside that has no place yet."""
+        try:
+            yield
+        except self._kind as error:
+            raise self.error(str(error), key) from error
+
+    def only(self, required: Sequence[str], optional: Sequence[str] = ()) -> None:
+        """Reject unknown keys and missing ones."""
+        known = (*required, *optional)
+        for key in self.keys:
             if key not in known:
-                raise ScheduleError(str(UnknownNameError("key", key, known, self.where(key))))
-
-    def has(self, key: str) -> bool:
-        """Whether a key is given."""
-        return key in self._nodes
-
-    def section(self, key: str) -> "Section":
-        """Return the mapping under a key."""
-        node = self._get(key)
-        if not isinstance(node, yaml.MappingNode):
-            raise self.error(f"{key!r} must be a mapping", self.line_of(key))
-        return Section(self._path, node)
-
-    def sections(self, key: str) -> list["Section"]:
-        """Return the mappings in the list under a key."""
-        node = self._get(key)
-        if not isinstance(node, yaml.SequenceNode):
-            raise self.error(f"{key!r} must be a list", self.line_of(key))
-        for item in node.value:
-            if not isinstance(item, yaml.MappingNode):
-                raise self.error(f"every item of {key!r} must be a mapping", item.start_mark.line + 1)
-        return [Section(self._path, item) for item in node.value]
-
-    def is_text(self, key: str) -> bool:
-        """Whether the value of a key is a single word or number."""
-        return isinstance(self._get(key), yaml.ScalarNode)
+                raise self.unknown("key", key, known, key)
+        for key in required:
+            self.value(key)
 
     def value(self, key: str) -> Any:
-        """Return the plain value under a key."""
-        loader = yaml_files.YamlLoader("")
-        try:
-            return loader.construct_object(self._get(key), deep=True)
-        except yaml.YAMLError as error:
-            raise self.error(f"{key!r}: {yaml_files.reason(error)}", self.line_of(key)) from error
+        """Return the plain value of a key."""
+        if key not in self._values:
+            raise self.error(f"{self.path(key)} is missing")
+        return self._values[key]
+
+    def section(self, key: str) -> "Section":
+        """Return the mapping of a key."""
+        return self._mapping(self.value(key), key, self.path(key))
+
+    def sections(self, key: str) -> list["Section"]:
+        """Return the mappings in the list of a key; each has its name, or its index, in its path."""
+        values = self.value(key)
+        if not isinstance(values, list):
+            raise self._refusal(key, "a list")
+        found = []
+        for index, item in enumerate(values):
+            name = item.get("name") if isinstance(item, Mapping) else None
+            place = f".{name}" if isinstance(name, str) and name else f"[{index}]"
+            found.append(self._mapping(item, key, self.path(key) + place))
+        return found
 
     def text(self, key: str) -> str:
-        """Return the text under a key."""
+        """Return the text of a key, which is not empty."""
         value = self.value(key)
         if not isinstance(value, str) or not value:
-            raise self.error(f"{key!r} is {value!r}, expected text", self.line_of(key))
+            raise self._refusal(key, "text")
         return value
 
-    def number(self, key: str, unit: str, minimum: float = -inf) -> float:
-        """Return the finite number under a key."""
-        return self._number(self.value(key), key, unit, minimum)
+    def name(self, key: str, kind: str, known: Iterable[str]) -> str:
+        """Return the text of a key, which is one of the known names of a kind."""
+        name = self.text(key)
+        if name not in known:
+            raise self.unknown(kind, name, known, key)
+        return name
+
+    def number(
+        self, key: str, unit: str = "", *, minimum: float = -inf, maximum: float = inf, above: float = -inf
+    ) -> float:
+        """Return the finite number of a key."""
+        value, what, kind = self.value(key), self._what(key), self._kind
+        return check_number(value, what, unit, minimum=minimum, maximum=maximum, above=above, error=kind)
 
     def count(self, key: str, minimum: int, maximum: int) -> int:
-        """Return the whole number under a key."""
-        value = self.value(key)
-        if not isinstance(value, int) or isinstance(value, bool) or not minimum <= value <= maximum:
-            raise self.error(
-                f"{key!r} is {value!r}, expected a whole number from {minimum} to {maximum}",
-                self.line_of(key),
-            )
-        return value
+        """Return the whole number of a key."""
+        value, what = self.value(key), self._what(key)
+        return int(check_number(value, what, minimum=minimum, maximum=maximum, whole=True, error=self._kind))
 
-    def vector(self, key: str, size: int, unit: str) -> list[float]:
-        """Return the list of ``size`` finite numbers under a key."""
-        values = self.value(key)
-        if not isinstance(values, list) or len(values) != size:
-            raise self.error(f"{key!r} is {values!r}, expected {size} numbers in {unit}", self.line_of(key))
-        return [self._number(value, key, unit, -inf) for value in values]
+    def vector(self, key: str, size: int, unit: str = "", *, above: float = -inf) -> tuple[float, ...]:
+        """Return the ``size`` finite numbers of a key."""
+        return check_vector(self.value(key), size, self._what(key), unit, above=above, error=self._kind)
 
-    def _number(self, value: object, key: str, unit: str, minimum: float) -> float:
-        """Return ``value`` as a float if it is a finite number not below ``minimum``."""
-        number = as_float(value) if isinstance(value, int | float) and not isinstance(value, bool) else nan
-        if not isfinite(number) or number < minimum:
-            allowed = f"a number of at least {minimum:g}" if minimum > -inf else "a finite number"
-            raise self.error(f"{key!r} is {value!r}, expected {allowed} in {unit}", self.line_of(key))
-        return number
+    def _mapping(self, value: object, key: str, path: str) -> "Section":
+        """Return a mapping at a key as a section."""
+        if not isinstance(value, Mapping):
+            raise self.error(f"{path} is {shortened(value)}, must be a mapping", key)
+        return Section(value, self._file, self._kind, path)
 
-    def _get(self, key: str) -> yaml.Node:
-        """Return the node under a key, which must be given."""
-        if key not in self._nodes:
-            raise self.error(f"key {key!r} is missing")
-        return self._nodes[key]
+    def _refusal(self, key: str, allowed: str) -> ConfigurationError:
+        """Return the error on a value of the wrong type."""
+        return self.error(f"{self.path(key)} is {shortened(self.value(key))}, must be {allowed}", key)
 
-
-def read_section(path: Path) -> tuple[Section, str]:
-    """Return the top-level mapping of a YAML file and the file's text; raises ScheduleError."""
-    try:
-        text = yaml_files.read_text(path)
-        node = yaml_files.compose(text)
-    except OSError as error:
-        raise ScheduleError(f"cannot read the schedule {path}: {error.strerror}") from error
-    except (yaml.YAMLError, ValueError) as error:
-        raise ScheduleError(f"{path} is not valid YAML: {yaml_files.reason(error)}") from error
-    if not isinstance(node, yaml.MappingNode):
-        raise ScheduleError(f"{path}: expected a mapping at the top level")
-    return Section(path, node), text
+    def _what(self, key: str) -> str:
+        """Return file, line and dotted path of a key."""
+        return f"{self.where(key)}: {self.path(key)}"

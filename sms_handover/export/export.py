@@ -47,6 +47,7 @@ def export(
     try:
         made = ParquetFormat(folder, info.path.name) if file_format == PARQUET else CsvFormat(folder)
         tables = Tables(folder, made)
+        tables.missing = info.missing
         if holds_run(info) and selection.everything and not by_topic:
             _export_run(bag, tables, selection.wanted(info.start_ns))
         else:

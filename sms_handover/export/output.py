@@ -23,6 +23,7 @@ class Tables:
         self.rows: dict[str, int] = {}
         self.skipped: dict[str, str] = {}
         self.left_out: Counter[str] = Counter()
+        self.missing: Sequence[str] = ()  # of the bag itself, in words
         self.folder, self._format = folder, file_format
         self._columns: dict[str, Sequence[Column]] = {}
         self._topics: dict[str, str] = {}

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Any
 
-from sms_handover.bag.files import bag_files, strict_scan
+from sms_handover.bag.files import scans_of, strict_scan
 from sms_handover.bag.info import BagInfo
-from sms_handover.bag.mcap.scan import FileScan, ScannedMessage, Source
+from sms_handover.bag.mcap.scan import ScannedMessage, Source
 from sms_handover.bag.schemas import types_of
 from sms_handover.errors import BagError
 from sms_handover.export.flatten import Flattener
@@ -27,8 +27,7 @@ def export_topics(info: BagInfo, tables: Tables, selection: Selection, progress:
     before = 0
     with ExitStack() as stack:
         topics = _TopicTables(tables, selection, stack)
-        for file in bag_files(info.path):
-            scan = FileScan(file)
+        for scan in scans_of(info.path):
             for found in strict_scan(scan, info.path):
                 if isinstance(found, Source):
                     topics.of(found)
@@ -36,7 +35,7 @@ def export_topics(info: BagInfo, tables: Tables, selection: Selection, progress:
                     topics.add(found)
                 if progress is not None:
                     progress(before + scan.place, info.size)
-            before += file.stat().st_size
+            before += scan.place
 
 
 class _TopicTable:

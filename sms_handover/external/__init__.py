@@ -1,1 +1,1 @@
-"""What a node of somebody else's imports to take the place of one of ours."""
+"""External nodes: what a node of another package imports to replace one of ours."""

@@ -1,4 +1,4 @@
-"""Runs a controller from outside the package as a node in the place of ours."""
+"""External controller: runs a controller of another package as the node 'controller'."""
 
 import inspect
 import sys
@@ -15,7 +15,7 @@ from sms_handover.model.robot_model import RobotModel
 from sms_handover.nodes.controller import Answering, AnsweringNode
 from sms_handover.ros.codecs.loop_messages import PoseCodec, Stamped
 from sms_handover.ros.node.graph_node import P
-from sms_handover.ros.node.message_filter import Read
+from sms_handover.ros.node.message_filter import Decode
 from sms_handover.ros.process.main import EXIT_OK, run_node
 from sms_handover.ros.reference.help import own_parameters_help
 from sms_handover.trajectory.schedule import Schedule
@@ -27,11 +27,10 @@ Make = Callable[[RobotModel, P], Controller]  # a controller for a robot, from i
 def run_controller(law: str, make: Make[P], group: type[P], args: Sequence[str] | None = None) -> int:
     """Run a controller as the node of the graph that answers states; return the exit code.
 
-    ``law`` is what reports call it. ``make`` gets the robot and the parameters: a frozen dataclass
-    ``group``, each field made by :func:`sms_handover.configuration.parameters.parameter` with a
-    default. They become ROS parameters of the node, checked as those of this package are. Everything
-    else is done here: matching, the start and end of a run, what to answer when, counts, diagnostics,
-    signals.
+    ``law`` is its name in reports. ``make`` gets the robot and the parameters: a frozen dataclass ``group``
+    whose fields are made by :func:`sms_handover.configuration.parameters.parameter` with a default. They
+    become ROS parameters of the node, checked like those of this package. The node does everything else:
+    matching, start and end of a run, which state to answer when, counts, diagnostics, signals.
     """
     arguments = list(sys.argv if args is None else args)
     if {"-h", "--help"} & set(arguments[1:]):
@@ -41,10 +40,9 @@ def run_controller(law: str, make: Make[P], group: type[P], args: Sequence[str] 
 
 
 class OwnControllerNode(AnsweringNode[P]):
-    """Gives a controller the states of the graph, with all that guides it, and publishes what it answers."""
+    """Passes the states and the guidance of the graph to a controller, and publishes its efforts."""
 
     def __init__(self, law: str, make: Make[P], group: type[P]) -> None:
-        """Declare the parameters; the controller is made when the node is configured."""
         self._law, self._make = law, make
         super().__init__(group, shipped=False)
         about = ParameterDescriptor(description="control law, as reports call it", read_only=True)
@@ -55,14 +53,14 @@ class OwnControllerNode(AnsweringNode[P]):
         """Return the name of the law."""
         return self._law
 
-    def guidance(self) -> dict[str, Read[Stamped[Any]]]:
+    def guidance(self) -> dict[str, Decode[Stamped[Any]]]:
         """Return also the targets of the tools."""
-        return {**super().guidance(), **dict.fromkeys(self._arms, self._pose_wire.checked)}
+        return {**super().guidance(), **dict.fromkeys(self._arms, self._pose_codec.checked)}
 
     def make_controller(self, schedule: Schedule) -> Answering:
         """Return the controller, guided as in one process."""
         robot = self.robot
-        self._pose_wire = PoseCodec(WORLD)
+        self._pose_codec = PoseCodec(WORLD)
         self._arms = {target_pose(arm): arm for arm in robot.arms}
         controller = CheckedController(self._make(robot, self.parameters), robot.joint_names)
         self._guided = GuidedController(controller, robot)
@@ -77,9 +75,9 @@ class OwnControllerNode(AnsweringNode[P]):
 
 
 class GuidedController:
-    """A controller whose guidance comes in parts: it gets them when all of one instant are there.
+    """A controller whose guidance arrives in parts: it is guided when all parts of one instant are there.
 
-    Before that, as at the start in real time, no effort acts.
+    Before that, as at the start in real time, the efforts are zero.
     """
 
     def __init__(self, controller: Controller, robot: RobotModel) -> None:
@@ -87,7 +85,7 @@ class GuidedController:
         self.reset()
 
     def reset(self) -> None:
-        """Go back to the start of a run."""
+        """Return to the start of a run."""
         self._controller.reset()
         self._phase: TaskPhase | None = None
         self._reference: JointReference | None = None
@@ -95,17 +93,17 @@ class GuidedController:
         self._guided_ns = -1
 
     def enter(self, phase: TaskPhase) -> None:
-        """Take the phase in force."""
+        """Set the phase in force."""
         self._phase = phase
         self._guide()
 
     def track(self, reference: JointReference) -> None:
-        """Take the joint reference."""
+        """Set the joint reference."""
         self._reference = reference
         self._guide()
 
     def aim(self, stamp_ns: int, arm: str, tool_in_world: Pose) -> None:
-        """Take the target of a tool."""
+        """Set the target of a tool."""
         self._targets[arm] = stamp_ns, tool_in_world
         self._guide()
 
@@ -116,7 +114,7 @@ class GuidedController:
         return self._controller.effort(stamp_ns, q, v)
 
     def _guide(self) -> None:
-        """Guide the controller once every part is of the same instant."""
+        """Guide the controller if all parts are of the same instant."""
         phase, reference = self._phase, self._reference
         if phase is None or reference is None or set(self._targets) != set(self._robot.arms):
             return

@@ -1,1 +1,1 @@
-"""Inverse kinematics with the base locked: residual, Levenberg-Marquardt, result with status."""
+"""Inverse kinematics (IK) with the base locked."""

@@ -17,7 +17,7 @@ _MAX_GROWTHS = 40  # [-] damping then exceeds any curvature, so the step is as g
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Where the solver has ended and how: joint angles (n,) rad, read-only, with the residual there."""
+    """Result of the solver: joint angles (n,) rad, read-only, with the residual there."""
 
     joint_position: Array
     residual: Residual
@@ -26,7 +26,7 @@ class Solution:
 
 
 def solve_ik(robot: RobotModel, request: IkRequest, parameters: IkParameters) -> IkResult:
-    """Return what :func:`find_joints` finds with the figures that tell how good the configuration is."""
+    """Return the result of :func:`find_joints` with measures of its quality."""
     found = find_joints(robot, request, parameters)
     q = found.joint_position
     return IkResult(
@@ -45,10 +45,9 @@ def find_joints(robot: RobotModel, request: IkRequest, parameters: IkParameters)
     """Return the joint angles that bring the tools to their targets, or come nearest from the seed.
 
     Iterates q <- clamp(q - J^T (J J^T + W_n)^-1 e) with W_n = (E + bias) 1 and E = e^T e / 2
-    [Sugihara2011]: the step (J^T J + W_n)^-1 J^T e, whose matrix is as large as there are joints, by one
-    that is as large as there are errors. A step that does not lower E is tried again with a larger
-    damping. Joints that the step would push through a limit are frozen at it for that iteration, so the
-    others make up for it. Always returns: the status tells how it ended.
+    [Sugihara2011], which equals the step (J^T J + W_n)^-1 J^T e but solves for as many unknowns as there are
+    errors. A step that does not lower E is repeated with a larger damping. Joints that the step would
+    push through a limit are frozen there for that iteration. The status tells how it ended.
     """
     problem = PoseResidual(robot, request.base_in_world, request.tool_in_world)
     q = frozen(robot.within_limits(request.seed))

@@ -1,4 +1,4 @@
-"""Parameters of the inverse-kinematics solver."""
+"""Parameters of the IK solver."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from sms_handover.configuration.parameters import parameter
 
 @dataclass(frozen=True)
 class IkParameters:
-    """When the solver stops and how it damps; the numbers are in ``config/ik.yaml``."""
+    """Stopping and damping of the solver; the numbers are in ``config/ik.yaml``."""
 
     position_tolerance: float = parameter("converged below this position error", unit="m", minimum=1e-12)
     orientation_tolerance: float = parameter(

@@ -1,4 +1,4 @@
-"""Pose residual of the tools and its Jacobian, with the base locked."""
+"""Residual of the tool poses and its Jacobian, with the base locked."""
 
 from collections.abc import Mapping
 from math import hypot, sqrt

@@ -1,1 +1,1 @@
-"""The launcher: starts the processes of a graph, watches the run, and ends them whatever happens."""
+"""The launcher: starts the processes of a graph, monitors the run, and ends them whatever happens."""

@@ -1,4 +1,4 @@
-"""Stands in for controller and trajectory: answers the plant with the commands of a recorded run."""
+"""Command replay: answers the plant with recorded commands, in place of controller and trajectory."""
 
 import struct
 from collections.abc import Iterator
@@ -28,16 +28,16 @@ from sms_handover.model.robot_model import RobotModel
 from sms_handover.ros.codecs.convert import header
 from sms_handover.ros.codecs.loop_messages import JointStateCodec, Stamped, StateCodec, decoded
 from sms_handover.ros.node.endpoints import CountedPublisher, Endpoints
-from sms_handover.ros.node.message_filter import MessageFilter, Read
-from sms_handover.ros.transport.inputs import Deliver
+from sms_handover.ros.node.message_filter import Decode, MessageFilter
+from sms_handover.ros.transport.inputs import OnSerialized
 from sms_handover.ros.transport.stamp_sync import StampSync
 from sms_handover.units import NS_PER_S
 
 PEERS = (PLANT, CONTROLLER)
 
-_MATCHING_PERIOD_S = 0.02  # [s] of wall time between two looks at who has matched
+_MATCHING_PERIOD_S = 0.02  # [s] of wall time between two checks of who has matched
 _STAMP = struct.Struct("<iI")  # seconds, nanoseconds
-_STAMP_AT = 4  # [byte] behind the encapsulation header
+_STAMP_AT = 4  # [byte] after the encapsulation header
 _STATE = (JOINT_STATES, BASE_ODOMETRY)
 
 
@@ -47,14 +47,14 @@ class CommandReplay:
     def __init__(
         self, node: Node, ticks: Iterator[RecordedTick], robot: RobotModel, reference_ns: int
     ) -> None:
-        """Make the endpoints on a node that has the name of the controller.
+        """Create the endpoints on a node with the name of the controller.
 
-        Each ``reference_ns`` the plant wants a phase. Where none was recorded, as at the end of a run in
-        real time, it gets one without grasp commands; and without a command the last one is held, which is
-        zero at first, as it is for a plant in real time.
+        Each ``reference_ns`` the plant needs a phase. Where none was recorded, as at the end of a run in
+        real time, it gets one without grasp commands. Where no command was recorded the last one, zero at
+        first, is held, as by a plant in real time.
         """
         self.deviation = LargestDeviation()
-        self.stamp_ns = -1  # of the last state that came
+        self.stamp_ns = -1  # of the latest state
         self.held = 0  # ticks without a recorded command
         self.done = False
         self._ticks = ticks
@@ -62,7 +62,7 @@ class CommandReplay:
         self._reference_ns = reference_ns
         zero = np.zeros(robot.n_joints)  # N m
         self._last_command = JointStateCodec(robot.joint_names, ("effort",)).pack(0, effort=zero)
-        self._wire = StateCodec(robot.joint_names, WORLD, BASE)
+        self._codec = StateCodec(robot.joint_names, WORLD, BASE)
         self._inputs: StampSync[bytes] = StampSync()
         self._endpoints = Endpoints(node, graph_topics(robot.arms), PEERS)
         self._command = self._endpoints.publisher(JOINT_COMMAND)
@@ -70,33 +70,30 @@ class CommandReplay:
         self._ready = self._endpoints.publisher(RUN_READY)
         self._answers: list[tuple[CountedPublisher, Any]] = []  # to the last state
         self.refusals = MessageFilter(node.get_logger().warning, lambda topic, error: None)
-        reads = dict(zip(_STATE, (self._wire.joints.checked, self._wire.odometry.checked), strict=True))
+        reads = dict(zip(_STATE, (self._codec.joints.checked, self._codec.odometry.checked), strict=True))
         for name, read in reads.items():
-            self._listen(name, self.refusals.guarding(name, partial(self._take, name), _as_it_came(read)))
-        self._listen(RUN_STATE, self.refusals.guarding(RUN_STATE, self._on_run_state, _run_state))
-        self._matching = node.create_timer(_MATCHING_PERIOD_S, self._look_for_plant)
+            self._subscribe(name, self.refusals.wrap(name, partial(self._on_state, name), _raw(read)))
+        self._subscribe(RUN_STATE, self.refusals.wrap(RUN_STATE, self._on_run_state, _run_state))
+        self._matching = node.create_timer(_MATCHING_PERIOD_S, self._check_matched)
 
     @property
     def unmatched(self) -> list[str]:
-        """Return in words what of the plant has not been found yet."""
+        """Which endpoints of the plant have not matched yet, in words."""
         return self._endpoints.unmatched
 
-    def _look_for_plant(self) -> None:
-        """Say that everybody is ready once the plant is there."""
+    def _check_matched(self) -> None:
         if not self._endpoints.unmatched:
             self._matching.cancel()
             self._ready.publish(String(data=CONTROLLER))
 
-    def _listen(self, name: str, deliver: Deliver) -> None:
-        """Hand every message of a topic to ``deliver``."""
+    def _subscribe(self, name: str, deliver: OnSerialized) -> None:
         self._endpoints.subscribe(name, lambda data: deliver(data, 0, b""), raw=True)
 
     def _on_run_state(self, message: RunState, sent_ns: int) -> None:
-        """Take notice of the end of the run."""
         self.done = self.done or message.state in (RunState.FINISHED, RunState.FAILED)
 
-    def _take(self, name: str, part: Stamped[bytes], sent_ns: int) -> None:
-        """Take one part of a state; one that has been answered is answered again, as the plant asks again."""
+    def _on_state(self, name: str, part: Stamped[bytes], sent_ns: int) -> None:
+        """Handle one part of a state; a state that the plant repeats gets the same answers again."""
         stamp, data = part
         if stamp == self.stamp_ns:
             if name == JOINT_STATES:
@@ -109,7 +106,7 @@ class CommandReplay:
             self._tick(stamp, state[JOINT_STATES], state[BASE_ODOMETRY])
 
     def _tick(self, stamp: int, joints: bytes, odometry: bytes) -> None:
-        """Answer one state, then compare it."""
+        """Answer one state, then compare it with the recorded one."""
         self.stamp_ns = stamp
         while self._next is not None and self._next.stamp_ns < stamp:
             self._next = next(self._ticks, None)
@@ -128,8 +125,8 @@ class CommandReplay:
         if (joints, odometry) == (tick.joint_states, tick.base_odometry):
             self.deviation.add_same()
         else:
-            recorded = self._wire.read(tick.joint_states, tick.base_odometry)
-            self.deviation.add(state_deviation(recorded, self._wire.read(joints, odometry)))
+            recorded = self._codec.read(tick.joint_states, tick.base_odometry)
+            self.deviation.add(state_deviation(recorded, self._codec.read(joints, odometry)))
 
     def _command_for(self, stamp: int, command: bytes | None) -> bytes:
         """Return the recorded command, or hold the last one where none was recorded."""
@@ -140,18 +137,16 @@ class CommandReplay:
         return command
 
     def _answer(self, publisher: CountedPublisher, message: Any) -> None:
-        """Publish an answer to this state, and keep it in case the plant asks again."""
         publisher.publish(message)
         self._answers.append((publisher, message))
 
 
-def _as_it_came(read: Read[Stamped[Any]]) -> Read[Stamped[bytes]]:
-    """Return what reads messages, and returns the stamp and the bytes of good ones."""
+def _raw(read: Decode[Stamped[Any]]) -> Decode[Stamped[bytes]]:
+    """Return a reader of the stamp and the unchanged bytes of valid messages."""
     return lambda data: (read(data)[0], data)
 
 
 def _run_state(data: bytes) -> RunState:
-    """Return the state of the run in a message; raises MessageError."""
     return decoded(data, RunState)
 
 

@@ -1,4 +1,4 @@
-"""An own ROS domain for every run, so that runs side by side never hear each other."""
+"""A ROS domain of its own for every run, so that concurrent runs never receive each other's messages."""
 
 import errno
 import socket
@@ -12,10 +12,10 @@ FIRST_DOMAIN, LAST_DOMAIN = 1, 101  # above 101 the ports of DDS meet the epheme
 
 _LOCALHOST, _EVERYWHERE = "127.0.0.1", ""  # addresses to bind to
 # The mapping of RTPS 2.2, 9.6.1: every domain has 250 ports from 7400 on; participant n of it receives at
-# 10 + 2 n and 11 + 2 n. Ports 2 to 9 of a domain are nobody's, so that one of them can stand for it.
+# 10 + 2 n and 11 + 2 n. Ports 2 to 9 of a domain are unused, so that one of them can stand for it.
 _FIRST_PORT, _PORTS = 7400, 250
 _RESERVATION, _PARTICIPANT, _PER_PARTICIPANT = 2, 10, 2
-_PARTICIPANTS_LOOKED_FOR = 8
+_PARTICIPANTS = 8  # whose ports are checked
 
 
 @dataclass(frozen=True)
@@ -28,15 +28,15 @@ class Reservation:
 
 @contextmanager
 def reservation(asked: int | None, *, shared: bool = False) -> Iterator[Reservation]:
-    """Hold a domain for as long as the context lasts; raises ConfigurationError if there is none.
+    """Hold a domain within the context; raises ConfigurationError if there is none.
 
-    It is held by a port of this machine, one for each domain, so that it holds between all users and
-    containers that share the network, and ends with the last process that has it open however that dies.
-    Without an ``asked`` domain the first is taken that no run holds and nobody takes part in. One that is
-    asked for to be ``shared``, by launchers that each start a part of one graph, is not held.
+    A domain is held by a port of this machine, so between all users and containers that share the network,
+    until the last process that has the port open ends, however it ends. Without an ``asked`` domain it is
+    the first that no run holds and that has no participant. One that is asked for to be ``shared``, by
+    launchers that each start a part of one graph, is not held.
     """
     if asked is not None and not 0 <= asked <= LAST_DOMAIN:
-        raise ConfigurationError(f"domain id is {asked}, allowed is 0 to {LAST_DOMAIN}")
+        raise ConfigurationError(f"domain id is {asked}, must be 0 to {LAST_DOMAIN}")
     if asked is not None and shared:
         yield Reservation(asked, ())
         return
@@ -62,24 +62,24 @@ def reservation(asked: int | None, *, shared: bool = False) -> Iterator[Reservat
 
 @contextmanager
 def reserved_domain(asked: int | None) -> Iterator[int]:
-    """Hold a domain as ``reservation`` does, for one that needs only its number."""
+    """Hold a domain as ``reservation`` does, and yield its number."""
     with reservation(asked) as reserved:
         yield reserved.domain
 
 
 def _is_used(domain: int) -> bool:
-    """Whether somebody takes part in a domain, who has not reserved it: any other ROS program."""
-    for number in range(_PARTICIPANTS_LOOKED_FOR):
+    """Whether a domain has participants, as of any other ROS program."""
+    for number in range(_PARTICIPANTS):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             if not _is_free(probe, _EVERYWHERE, domain, _PARTICIPANT + _PER_PARTICIPANT * number):
                 return True
     return False
 
 
-def _is_free(taker: socket.socket, address: str, domain: int, offset: int) -> bool:
-    """Bind a socket to a port of a domain; tell whether it was free. Raises ConfigurationError."""
+def _is_free(port: socket.socket, address: str, domain: int, offset: int) -> bool:
+    """Bind a socket to a port of a domain; return whether it was free. Raises ConfigurationError."""
     try:
-        taker.bind((address, _FIRST_PORT + _PORTS * domain + offset))
+        port.bind((address, _FIRST_PORT + _PORTS * domain + offset))
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
             return False

@@ -1,9 +1,8 @@
-"""Signals that ask for the end of a run, and output that nobody takes any more."""
+"""Interrupts: signals that ask for the end of a run, and output whose reader has ended."""
 
 import os
 import select
 import signal
-import sys
 from typing import Any
 
 _ALL = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
@@ -13,11 +12,11 @@ _OUTPUTS = (1, 2)  # file descriptors of standard output and standard error
 class Interrupts:
     """Counts the signals: the first asks for an orderly end, a second one, or SIGQUIT, for one at once.
 
-    Use it as a context manager; before and after it signals do what they did.
+    A context manager: before and after it signals do what they did.
     """
 
     def __init__(self) -> None:
-        self._count = self._told = 0
+        self._count = self._reported = 0
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> "Interrupts":
@@ -28,7 +27,6 @@ class Interrupts:
         return self
 
     def __exit__(self, *reason: object) -> None:
-        """Install what was there before."""
         for number, handler in self._before.items():
             signal.signal(number, handler)
 
@@ -42,18 +40,18 @@ class Interrupts:
         """Whether nothing is to be waited for."""
         return self._count > 1
 
-    def tell(self) -> None:
-        """Say what an interrupt does, once for each; the handler itself may not print into other output."""
-        if self._told < self._count:
-            self._told = self._count
-            print("\nending the run; once more to end it at once", file=sys.stderr)
+    def poll(self) -> list[str]:
+        """Return a line for the user if there was an interrupt since the last call."""
+        new = self._reported < self._count
+        self._reported = self._count
+        return ["ending the run; once more to end it at once"] if new else []
 
     def _on_signal(self, number: int, frame: object) -> None:
         self._count += 2 if number == signal.SIGQUIT else 1
 
 
 def let_go_of_closed_output() -> None:
-    """Send output to nowhere whose terminal was closed or whose reader has ended: the run is worth more."""
+    """Redirect output to /dev/null where its terminal or pipe was closed: the run goes on without it."""
     for output in _OUTPUTS:
         poll = select.poll()
         poll.register(output, select.POLLOUT)

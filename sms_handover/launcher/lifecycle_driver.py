@@ -1,6 +1,7 @@
-"""Takes the nodes of a graph through their lifecycle, all of them one state after the other."""
+"""Lifecycle driver: takes all nodes of a graph through their lifecycle, one state after the other."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
+from functools import partial
 from time import monotonic
 from typing import Any
 
@@ -15,20 +16,19 @@ _DOES = {_CONFIGURE: "configured", _ACTIVATE: "activated", _SHUTDOWN: "shut down
 _BEFORE = {_CONFIGURE: State.PRIMARY_STATE_UNCONFIGURED, _ACTIVATE: State.PRIMARY_STATE_INACTIVE}
 _AFTER = {_CONFIGURE: State.PRIMARY_STATE_INACTIVE, _ACTIVATE: State.PRIMARY_STATE_ACTIVE}
 
-_SILENCE_S = 2.0  # [s] of wall time without an answer after which a node is asked where it is
+_ANSWER_TIMEOUT_S = 2.0  # [s] of wall time without an answer after which a node is asked for its state
 
 
 class LifecycleDriver:
     """Configures every node, then activates every node, and in the end shuts them down.
 
-    Nothing blocks: :meth:`look` does what is due, and answers come by the executor of the node. A node
-    that fails in a transition tells why itself, and ends. The first answer of a service is lost if its node
-    has not found who asks within 100 ms (rmw_fastrtps); so one that is silent is asked for its state,
-    and for the transition again if it has not made it.
+    Nothing blocks: :meth:`poll` does what is due, and answers arrive through the executor of the node. A
+    node that fails in a transition reports why itself, and ends. The first answer of a service is lost if
+    its node has not discovered the client within 100 ms (rmw_fastrtps); so a node that does not answer is
+    asked for its state, and for the transition again if it has not made it.
     """
 
     def __init__(self, node: Node, names: Collection[str]) -> None:
-        """Prepare to drive the nodes of these names."""
         self._clients = {name: node.create_client(ChangeState, f"{name}/change_state") for name in names}
         self._states = {name: node.create_client(GetState, f"{name}/get_state") for name in names}
         self._done: dict[int, set[str]] = {transition: set() for transition in _DOES}
@@ -42,27 +42,26 @@ class LifecycleDriver:
 
     @property
     def waiting_for(self) -> str:
-        """Return in words which nodes are not active yet, and what of them is waited for; "" for none."""
+        """Which nodes are not active yet, and what is waited for, in words; "" for none."""
         if self._failed:
             return "; ".join(self._failed.values())
         transition = _ACTIVATE if self._have_all(_CONFIGURE) else _CONFIGURE
         missing = sorted(self._clients.keys() - self._done[transition])
         return f"{', '.join(missing)} to be {_DOES[transition]}" if missing else ""
 
-    def look(self) -> None:
+    def poll(self) -> None:
         """Ask for the transitions that are due towards the state ``active``."""
         if self.active:
             return
         transition = _ACTIVATE if self._have_all(_CONFIGURE) else _CONFIGURE
         self._ask(transition)
-        self._ask_the_silent(transition)
+        self._ask_again(transition)
 
     def shut_down(self) -> None:
-        """Ask every node to shut down, so that its process ends; those that are gone are left alone."""
+        """Ask every node that still runs to shut down, so that its process ends."""
         self._ask(_SHUTDOWN)
 
     def _have_all(self, transition: int) -> bool:
-        """Whether every node has done a transition."""
         return self._done[transition] >= self._clients.keys()
 
     def _ask(self, transition: int) -> None:
@@ -71,36 +70,28 @@ class LifecycleDriver:
             if (transition, name) not in self._asked_at and client.service_is_ready():
                 self._asked_at[transition, name] = monotonic()
                 request = ChangeState.Request(transition=Transition(id=transition))
-                client.call_async(request).add_done_callback(self._answer(name, transition))
+                client.call_async(request).add_done_callback(partial(self._on_answer, name, transition))
 
-    def _ask_the_silent(self, transition: int) -> None:
-        """Ask nodes that have not answered for a while where they are."""
+    def _ask_again(self, transition: int) -> None:
+        """Ask nodes that have not answered for a while for their state."""
         now = monotonic()
         for name in self._clients.keys() - self._done[transition]:
             client, asked_at = self._states[name], self._asked_at.get((transition, name), now)
-            if now - asked_at > _SILENCE_S and client.service_is_ready():
+            if now - asked_at > _ANSWER_TIMEOUT_S and client.service_is_ready():
                 self._asked_at[transition, name] = now
-                client.call_async(GetState.Request()).add_done_callback(self._state(name, transition))
+                client.call_async(GetState.Request()).add_done_callback(
+                    partial(self._on_state, name, transition)
+                )
 
-    def _answer(self, name: str, transition: int) -> Callable[[Any], None]:
-        """Return what takes the answer of a node that was asked for a transition."""
+    def _on_answer(self, name: str, transition: int, future: Any) -> None:
+        if future.result().success:
+            self._done[transition].add(name)
+        elif name not in self._done[transition]:
+            self._failed[name] = f"{name} could not be {_DOES[transition]}"
 
-        def on_answer(future: Any) -> None:
-            if future.result().success:
-                self._done[transition].add(name)
-            elif name not in self._done[transition]:
-                self._failed[name] = f"{name} could not be {_DOES[transition]}"
-
-        return on_answer
-
-    def _state(self, name: str, transition: int) -> Callable[[Any], None]:
-        """Return what takes the answer of a node that was asked where it is."""
-
-        def on_state(future: Any) -> None:
-            state = future.result().current_state.id
-            if state == _AFTER[transition]:
-                self._done[transition].add(name)
-            elif state == _BEFORE[transition] and name not in self._done[transition]:
-                self._asked_at.pop((transition, name), None)  # it has not heard of it
-
-        return on_state
+    def _on_state(self, name: str, transition: int, future: Any) -> None:
+        state = future.result().current_state.id
+        if state == _AFTER[transition]:
+            self._done[transition].add(name)
+        elif state == _BEFORE[transition] and name not in self._done[transition]:
+            self._asked_at.pop((transition, name), None)  # the request was lost

@@ -1,4 +1,4 @@
-"""What a node prints: in a file, which stays readable here even where it is moved or deleted."""
+"""The log of a node: what it prints, in a file that stays readable here even if it is moved or deleted."""
 
 import os
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import BinaryIO
 
 from sms_handover.errors import GraphError
 
-_LAST_LINES = 12  # shown when the process of the node died
+_LAST_LINES = 12  # shown when the process of the node has died
 _NO_ROOM = 64 * 1024  # [byte] on a disk with less than that left, a log that is cut short is no surprise
 
 
@@ -14,7 +14,7 @@ class NodeLog:
     """The log of one node; close it in the end."""
 
     def __init__(self, path: Path) -> None:
-        """Create the file; raises GraphError if that cannot be."""
+        """Create the file; raises GraphError if that fails."""
         self._path = path
         try:
             self.stream: BinaryIO = path.open("wb")  # for the process of the node
@@ -24,13 +24,13 @@ class NodeLog:
 
     @property
     def text(self) -> str:
-        """Return all that was printed so far."""
+        """All that was printed so far."""
         self._reader.seek(0)
         return self._reader.read().decode(errors="replace")
 
     @property
     def last_lines(self) -> str:
-        """Return the end of what was printed, and why it may be cut short."""
+        """The end of what was printed, and why it may be cut short."""
         lines = self.text.splitlines()[-_LAST_LINES:]
         disk = os.fstatvfs(self._reader.fileno())
         if disk.f_bavail * disk.f_frsize < _NO_ROOM:

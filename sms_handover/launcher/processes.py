@@ -1,20 +1,17 @@
-"""The processes of a graph: started together, watched, and ended whatever happens."""
+"""The processes of a graph: started together, monitored, and ended whatever happens."""
 
 import os
 import signal
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from time import monotonic
-from types import TracebackType
 
 from sms_handover.launcher.node_log import NodeLog
-from sms_handover.ros.process.launcher_process import LAUNCHER_PID
+from sms_handover.launcher.process_sessions import GRACE_S, SessionGuard, end_sessions
+from sms_handover.ros.process.launcher_process import launcher_environment
 
-_GRACE_S = 20.0  # [s] of wall time a process gets to end when asked to, before it is killed
 _WITHOUT_FOLDER = (  # python -P is new in 3.11
     "import sys; del sys.path[0]; from runpy import run_module; "
     "run_module(sys.argv.pop(1), run_name='__main__', alter_sys=True)"
@@ -44,41 +41,41 @@ class Death:
 class NodeProcesses:
     """One process per node, each in a session of its own, its output in ``<folder>/<node>.log``.
 
-    Use it as a context manager: leaving it ends every process that is still there.
+    A context manager: leaving it ends every process.
     """
 
     def __init__(
         self, log_folder: Path, environment: Mapping[str, str], inherited: Sequence[int] = ()
     ) -> None:
-        """Prepare; nothing is started yet. Every process keeps the ``inherited`` file descriptors open."""
+        """Start nothing yet; every process will keep the ``inherited`` file descriptors open."""
         self._folder, self._inherited = log_folder, inherited
-        self._environment = {**os.environ, **environment, LAUNCHER_PID: str(os.getpid())}
+        self._environment = {**os.environ, **environment, **launcher_environment()}
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
         self._logs: dict[str, NodeLog] = {}
+        self._guard: SessionGuard | None = None
 
     def __enter__(self) -> "NodeProcesses":
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """End every process that is still there."""
+    def __exit__(self, *error: object) -> None:
         self.end()
+        if self._guard is not None:
+            self._guard.close()
         for log in self._logs.values():
             log.close()
 
     def start(self, node: str, arguments: Sequence[str], program: Sequence[str] = ()) -> None:
         """Start a node or the container, of this package unless it is another ``program``.
 
-        Another program need not know of us; it is sent SIGTERM if this process is killed. Raises
-        GraphError if the log cannot be written.
+        Another program need not know of the launcher: a guard ends it, with all it has started, if this
+        process is killed. Raises GraphError if the log cannot be written.
         """
-        foreign = ("sms_handover.ros.process.launcher_process", *program)
-        module, *words = foreign if program else (f"sms_handover.nodes.{node}",)
-        command = [*as_program(module), *words, *arguments]
+        if program and self._guard is None:
+            self._guard = SessionGuard(self._inherited)
+        command = program or as_program(f"sms_handover.nodes.{node}")
         log = self._logs[node] = NodeLog(self._folder / f"{node}.log")
         self._processes[node] = subprocess.Popen(
-            command,
+            (*command, *arguments),
             stdin=subprocess.DEVNULL,
             stdout=log.stream,
             stderr=subprocess.STDOUT,
@@ -86,6 +83,8 @@ class NodeProcesses:
             start_new_session=True,
             pass_fds=self._inherited,
         )
+        if program and self._guard is not None:
+            self._guard.add(self._processes[node].pid)
 
     def text_of(self, node: str) -> str:
         """Return what a node has printed so far."""
@@ -93,7 +92,7 @@ class NodeProcesses:
 
     @property
     def ids(self) -> dict[str, int]:
-        """Return the process id of every node that was started."""
+        """The process id of every node that was started."""
         return {name: process.pid for name, process in self._processes.items()}
 
     def suspended(self) -> dict[str, int]:
@@ -114,23 +113,12 @@ class NodeProcesses:
         ]
 
     def end(self) -> None:
-        """End every process: ask it to, wake it if it is suspended, wait, and kill who does not end."""
-        alive = self._alive()
-        for number in (signal.SIGTERM, signal.SIGCONT):
-            for process in alive.values():
-                process.send_signal(number)
-        deadline = monotonic() + _GRACE_S
-        for process in alive.values():
-            with suppress(subprocess.TimeoutExpired):
-                process.wait(max(deadline - monotonic(), 0.01))
-        for name, process in self._alive().items():
-            print(f"node {name!r} did not end within {_GRACE_S:g} s and was killed", file=sys.stderr)
-            process.kill()
+        """End every process and all that it has started, also where the process itself has ended before."""
+        names = {process.pid: name for name, process in self._processes.items()}
+        for session in end_sessions(names, GRACE_S):
+            print(f"node {names[session]!r} did not end within {GRACE_S:g} s and was killed", file=sys.stderr)
+        for process in self._processes.values():
             process.wait()
-
-    def _alive(self) -> dict[str, "subprocess.Popen[bytes]"]:
-        """Return the processes that have not ended."""
-        return {name: process for name, process in self._processes.items() if process.poll() is None}
 
 
 def as_program(module: str) -> tuple[str, ...]:
@@ -141,7 +129,7 @@ def as_program(module: str) -> tuple[str, ...]:
 
 
 def _is_stopped(pid: int) -> bool:
-    """Whether a child is stopped now; what is told of it is left for others to ask."""
+    """Whether a child is stopped now; its status stays available to others who wait for it."""
     try:
         return os.waitid(os.P_PID, pid, os.WSTOPPED | os.WNOHANG | os.WNOWAIT) is not None
     except ChildProcessError:  # it has ended and was reaped

@@ -1,4 +1,4 @@
-"""What the output folder of a run holds, and who writes to it."""
+"""The output folder of a run: what it holds, and who writes to it."""
 
 import fcntl
 import os
@@ -16,7 +16,7 @@ _LATER_RUN = re.compile(rf"{BAG}_(\d+)")  # of a simulation that was reset
 def bags_of(path: Path) -> tuple[Path, ...]:
     """Return the bags in the output folder of a run, or ``path`` itself if it is a bag.
 
-    There is one, or if the simulation was reset one per run, in their order.
+    There is one bag, or one per run in their order if the simulation was reset.
     """
     if not (path / BAG).is_dir():
         return (path,)
@@ -43,10 +43,10 @@ def bag_of(path: Path) -> Path:
 
 @contextmanager
 def locked_logs(output: Path) -> Iterator[int]:
-    """Hold the lock of an output folder; yield the file descriptor that holds it.
+    """Lock an output folder; yield the file descriptor of the lock.
 
-    Every process of a run has it open, so that the folder is free when the last of them has ended.
-    Raises ConfigurationError while a run has it.
+    Every process of a run has it open, so that the folder is free when the last process has ended.
+    Raises ConfigurationError while another run holds it.
     """
     descriptor = os.open(output / LOGS, os.O_RDONLY | os.O_DIRECTORY)
     try:

@@ -1,34 +1,33 @@
-"""How long a launcher has waited, and for whom."""
+"""Timeouts of a launcher: for how long it has waited, for whom, and when it gives up."""
 
-import sys
 from collections.abc import Callable, Mapping
 from time import monotonic
 
 from sms_handover.errors import GraphError
 
-SUSPENDED_NOTICE_S = 5.0  # [s] of wall time that a node is suspended before that is told
-SUSPENDED_PATIENCE_S = 20.0  # [s] of wall time that a node is suspended before the run is given up
+SUSPENDED_NOTICE_S = 5.0  # [s] of wall time that a node is suspended before it is reported
+SUSPENDED_TIMEOUT_S = 20.0  # [s] of wall time that a node is suspended before the run is given up
 
-_LONGEST_LOOK_S = 1.0  # [s] of wall time between two looks; what is longer, the launcher itself was suspended
-_DELAY_S = 10.0  # [s] of wall time between two lines on what is waited for
+_LONGEST_STEP_S = 1.0  # [s] of wall time between two updates; for more, the launcher itself was suspended
+_NOTICE_PERIOD_S = 10.0  # [s] of wall time between two notices
 
 
 class ActiveTime:
-    """Wall time that counts only while this process looks.
+    """Wall time that counts only while this process runs.
 
     A launcher that was suspended, by Ctrl-Z or with the whole machine, has not waited in vain.
     """
 
     def __init__(self, clock: Callable[[], float] = monotonic) -> None:
         self._clock = clock
-        self._seen = clock()
+        self._last = clock()
         self.seconds = 0.0
 
-    def look(self) -> None:
-        """Count the time since the last look."""
+    def update(self) -> None:
+        """Count the time since the last update."""
         now = self._clock()
-        self.seconds += min(now - self._seen, _LONGEST_LOOK_S)
-        self._seen = now
+        self.seconds += min(now - self._last, _LONGEST_STEP_S)
+        self._last = now
 
 
 class SuspensionMonitor:
@@ -36,38 +35,39 @@ class SuspensionMonitor:
 
     def __init__(self) -> None:
         self._since: dict[str, float] = {}
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
 
-    def look(self, suspended: Mapping[str, int], seconds: float) -> None:
-        """Take the process ids, by name, of those that are suspended at a watched time.
+    def poll(self, suspended: Mapping[str, int], seconds: float) -> list[str]:
+        """Return a line for each node that has been suspended for 5 s, once, with the way out.
 
-        Who is suspended for 5 s is told, with the way out; after 20 s GraphError is raised.
+        ``suspended`` are process ids by name, ``seconds`` is active time. Raises GraphError after 20 s.
         """
         self._since = {name: self._since.get(name, seconds) for name in suspended}
-        self._told &= set(suspended)
+        self._reported &= set(suspended)
+        lines = []
         for name, since in self._since.items():
-            if seconds - since > SUSPENDED_PATIENCE_S:
+            if seconds - since > SUSPENDED_TIMEOUT_S:
                 raise GraphError(
-                    f"node {name!r} has been suspended for {SUSPENDED_PATIENCE_S:g} s (by SIGSTOP?)"
+                    f"node {name!r} has been suspended for {SUSPENDED_TIMEOUT_S:g} s (by SIGSTOP?)"
                 )
-            if seconds - since > SUSPENDED_NOTICE_S and name not in self._told:
-                self._told.add(name)
-                print(
-                    f"\nnode {name!r} is suspended; the run is given up after {SUSPENDED_PATIENCE_S:g} s; "
-                    f"'kill -CONT {suspended[name]}' lets it go on",
-                    file=sys.stderr,
+            if seconds - since > SUSPENDED_NOTICE_S and name not in self._reported:
+                self._reported.add(name)
+                lines.append(
+                    f"node {name!r} is suspended; the run is given up after {SUSPENDED_TIMEOUT_S:g} s; "
+                    f"'kill -CONT {suspended[name]}' lets it go on"
                 )
+        return lines
 
 
 class WaitNotice:
-    """Tells what something that has not begun waits for: after a while, and again when the reason changes."""
+    """Reports why a run has not begun: after a while, and again when the reason changes."""
 
     def __init__(self) -> None:
-        self._told, self._next_s = "", _DELAY_S
+        self._reason, self._next_s = "", _NOTICE_PERIOD_S
 
-    def note(self, seconds: float, reason: str) -> str:
-        """Return a line for the user, "" for none; ``seconds`` is how long it has been waited for."""
-        if seconds < self._next_s or reason == self._told:
-            return ""
-        self._told, self._next_s = reason, seconds + _DELAY_S
-        return f"the run has not begun after {seconds:.0f} s: {reason}"
+    def poll(self, seconds: float, reason: str) -> list[str]:
+        """Return a line for the user if one is due; ``seconds`` is how long the run has been waited for."""
+        if seconds < self._next_s or reason == self._reason:
+            return []
+        self._reason, self._next_s = reason, seconds + _NOTICE_PERIOD_S
+        return [f"the run has not begun after {seconds:.0f} s: {reason}"]

@@ -1,7 +1,6 @@
 """Message definitions by type name: schema text, type hash, and (de)serialisation without ROS.
 
-The standard types are those of Jazzy; every other type is read from its ``.msg`` file, so our own
-messages and those of a user's package are recorded alike.
+The standard types are those of Jazzy; every other type is read from its ``.msg`` file.
 """
 
 import os
@@ -24,7 +23,7 @@ _ROS2_SYNTAX = 2
 
 @dataclass(frozen=True)
 class Schema:
-    """What a bag stores of a type: ``text`` as rosbag2 concatenates it, ``type_hash`` as RIHS01."""
+    """The schema of a type in a bag: ``text`` as rosbag2 concatenates it, ``type_hash`` as RIHS01."""
 
     type: str
     text: str
@@ -32,30 +31,21 @@ class Schema:
 
 
 class MessageTypes:
-    """The types known so far; more are found on demand in the source tree and the prefixes."""
+    """The known types; others are looked up on demand in the source tree and the prefixes."""
 
     def __init__(self, roots: Iterable[Path] | None = None) -> None:
         """Look for ``<package>/msg/<Type>.msg`` under ``roots``, by default :func:`definition_roots`."""
         self._roots = tuple(definition_roots() if roots is None else roots)
         self._store = get_typestore(Stores.ROS2_JAZZY)
 
-    def learn(self, type_name: str, text: str) -> None:
-        """Take the definition of a type, and of those it is made of, from the schema text of a bag."""
-        try:
-            definitions = get_types_from_msg(text, type_name)
-            known = self._store.fielddefs
-            self._register({name: value for name, value in definitions.items() if name not in known})
-        except TypesysError as error:
-            raise BagError(f"the schema of {type_name} is not readable: {_one_line(error)}") from error
-
     def schema(self, type_name: str) -> Schema:
-        """Return the schema of a type; raises BagError if it has no readable definition."""
+        """Return the schema of a type; raises BagError without a readable definition."""
         self.require(type_name)
         text, _ = self._store.generate_msgdef(type_name, ros_version=_ROS2_SYNTAX)
         return Schema(type_name, text, self._store.hash_rihs01(type_name))
 
     def stamped(self, type_name: str) -> bool:
-        """Whether a message of this type begins with a time: a Header or a Time comes first."""
+        """Whether a message of this type begins with a Header or a Time."""
         self.require(type_name)
         fields = self._store.fielddefs[type_name][1]
         return bool(fields) and fields[0][1][1] in (_TIME, _HEADER)
@@ -70,7 +60,7 @@ class MessageTypes:
         return bytes(self._store.serialize_cdr(message, message.__msgtype__))
 
     def deserialize(self, data: bytes | memoryview, type_name: str) -> Any:
-        """Return the message object in CDR bytes; raises BagError if they are not of this type."""
+        """Return the message in CDR bytes; raises BagError if they are not of this type."""
         self.require(type_name)
         try:
             return self._store.deserialize_cdr(data, type_name)
@@ -78,7 +68,7 @@ class MessageTypes:
             raise BagError(f"a message does not decode as {type_name}: {error}") from error
 
     def require(self, type_name: str) -> None:
-        """Make sure that a type and all it is made of are known, or raise BagError."""
+        """Look up a type and its nested types; raises BagError if one is unknown."""
         pending, found = [type_name], {}
         while pending:
             name = pending.pop()
@@ -91,7 +81,6 @@ class MessageTypes:
         self._register(found)
 
     def _register(self, definitions: dict[str, Any]) -> None:
-        """Add definitions, if there are any, to the known ones."""
         if definitions:
             self._store.register(definitions)
 
@@ -116,27 +105,21 @@ class MessageTypes:
 
 
 def definition_roots() -> tuple[Path, ...]:
-    """Return the ``share`` folders that hold message definitions, nearest first.
-
-    These are those of every ROS workspace (AMENT_PREFIX_PATH), then of the interpreter's environment.
-    """
+    """Return the ``share`` folders of the ROS workspaces (AMENT_PREFIX_PATH), then of the interpreter."""
     prefixes = [prefix for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix]
     prefixes.append(sysconfig.get_path("data"))
     return tuple(Path(prefix) / "share" for prefix in prefixes)
 
 
 def _source_interfaces() -> Path:
-    """Return where our interface package is when this module runs from the source tree."""
     return Path(__file__).resolve().parent.parent.parent / "interfaces"
 
 
 def _one_line(error: Exception) -> str:
-    """Return the text of an error without line breaks, cut to a readable length."""
     return " ".join(str(error).split())[:200]
 
 
 def _nested_types(field: Any) -> list[str]:
-    """Return the names of the message types that a parsed field is made of."""
     _, content = field
     if isinstance(content, str):
         return [content]

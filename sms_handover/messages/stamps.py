@@ -1,4 +1,4 @@
-"""Read the time stamp of a message straight from its CDR bytes."""
+"""Stamps of messages, read from their CDR bytes."""
 
 import struct
 
@@ -14,8 +14,7 @@ _SIZE = 12  # [byte] up to the end of the stamp
 def stamp_ns(data: bytes) -> int:
     """Return the stamp in nanoseconds of a message that begins with a Header or a Time.
 
-    Whether a type does is told by ``MessageTypes.stamped``. Raises BagError on bytes that are
-    too short or not plain CDR.
+    See ``MessageTypes.stamped``. Raises BagError on bytes that are too short or not plain CDR.
     """
     if len(data) < _SIZE or data[0] != 0 or data[1] > 1:
         raise BagError(f"a message of {len(data)} bytes does not begin with a time stamp in plain CDR")

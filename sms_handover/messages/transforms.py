@@ -1,4 +1,4 @@
-"""Make the messages of ``/tf``, for a bag that viewers show without our robot model."""
+"""Transforms as messages of ``/tf``, for viewers that do not know the robot model."""
 
 import re
 import struct
@@ -12,7 +12,7 @@ from sms_handover.units import NS_PER_S
 
 _STAMP = struct.Struct("<iI")  # seconds, nanoseconds
 _NUMBERS = struct.Struct("<7d")  # translation, rotation
-_MARK_NS = 1_234_567_890_123_456_789  # [ns] a stamp that no name or number of a template looks like
+_MARK_NS = 1_234_567_890_123_456_789  # [ns] a stamp unlike any name or number of the prototype
 
 TF_TYPE = "tf2_msgs/msg/TFMessage"
 
@@ -36,21 +36,20 @@ def transforms_cdr(types: MessageTypes, transforms: Sequence[Transform], stamp_n
 
 
 class TransformsCodec:
-    """Packs TFMessages for one list of frames: the layout is fixed, only stamps and numbers change."""
+    """Packs TFMessages for one list of frames: only stamps and numbers change."""
 
     def __init__(self, types: MessageTypes, frames: Sequence[tuple[str, str]]) -> None:
-        """Fix the frames, each a parent and a child."""
         rows = np.arange(1.0, 1.0 + 7 * len(frames)).reshape(-1, 7)
         marked = [Pose(row[:3], row[3:]) for row in rows]
         named = [(parent, child, pose) for (parent, child), pose in zip(frames, marked, strict=True)]
-        self._template = transforms_cdr(types, named, _MARK_NS)
-        self._numbers_at = [self._template.index(row.tobytes()) for row in rows]
+        self._prototype = transforms_cdr(types, named, _MARK_NS)
+        self._numbers_at = [self._prototype.index(row.tobytes()) for row in rows]
         mark = _STAMP.pack(*divmod(_MARK_NS, NS_PER_S))
-        self._stamps_at = [m.start() for m in re.finditer(re.escape(mark), self._template)]
+        self._stamps_at = [m.start() for m in re.finditer(re.escape(mark), self._prototype)]
 
     def pack(self, stamp_ns: int, poses: Sequence[Pose]) -> bytes:
         """Return the bytes of one TFMessage with the poses of all frames at one stamp."""
-        buffer = bytearray(self._template)
+        buffer = bytearray(self._prototype)
         stamp = divmod(stamp_ns, NS_PER_S)
         for at in self._stamps_at:
             _STAMP.pack_into(buffer, at, *stamp)
@@ -60,7 +59,6 @@ class TransformsCodec:
 
 
 def _transform(types: MessageTypes, pose: Pose) -> object:
-    """Return a pose as a Transform message."""
     x, y, z = pose.position.tolist()
     qx, qy, qz, qw = pose.quaternion_xyzw.tolist()
     return types.make(

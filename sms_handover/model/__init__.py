@@ -1,1 +1,1 @@
-"""The robot: its description, the Pinocchio model made from it, and the quantities it conserves."""
+"""Model of the robot: its description, the Pinocchio model, and conserved quantities."""

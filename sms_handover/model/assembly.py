@@ -1,13 +1,13 @@
-"""How parts make an arm, and arms and a spacecraft make the robot; all of it checked when it is made."""
+"""Assembly of parts to arms, and of arms and a spacecraft to the robot, checked when it is made."""
 
 from collections import Counter
 from dataclasses import dataclass
 from re import fullmatch
 
-from sms_handover.errors import RobotDescriptionError, UnknownNameError
+from sms_handover.errors import RobotDescriptionError
 from sms_handover.frames import joint_name
 from sms_handover.model.parts import Floats, Gripper, Inertia, JointDescription, LinkDescription, Origin
-from sms_handover.model.validation import positive_vector, vector
+from sms_handover.model.validation import vector
 
 
 def link_name(arm: str, number: int) -> str:
@@ -35,35 +35,26 @@ class ArmDescription:
     gripper: Gripper
 
     def __post_init__(self) -> None:
-        """Check that the name can be part of a topic and that the parts pair up and carry it."""
         if not fullmatch(r"[a-z][a-z0-9_]*", self.name):
             raise RobotDescriptionError(
-                f"arm name is {self.name!r}, allowed are lower-case letters, digits and _, a letter first"
+                f"arm name is {self.name!r}, must be lower-case letters, digits and _, a letter first"
             )
         if not self.joints:
-            raise RobotDescriptionError(f"{self.name}: has 0 joints, allowed is at least 1")
+            raise RobotDescriptionError(f"{self.name}: has 0 joints, must be >= 1")
         if len(self.joints) != len(self.links):
             counts = f"{len(self.joints)} joints and {len(self.links)} links"
-            raise RobotDescriptionError(f"{self.name}: has {counts}, allowed are equal numbers")
-        names = [joint.name for joint in self.joints] + [link.name for link in self.links]
-        names.append(self.gripper.name)
-        numbers = range(1, len(self.joints) + 1)
-        allowed = [joint_name(self.name, number) for number in numbers]
-        allowed += [link_name(self.name, number) for number in numbers]
-        allowed.append(gripper_name(self.name))
-        for name, expected in zip(names, allowed, strict=True):
+            raise RobotDescriptionError(f"{self.name}: has {counts}, must be equal numbers")
+        parts = [(self.gripper.name, gripper_name(self.name))]
+        for number, (joint, link) in enumerate(zip(self.joints, self.links, strict=True), start=1):
+            parts += (joint.name, joint_name(self.name, number)), (link.name, link_name(self.name, number))
+        for name, expected in parts:
             if name != expected:
-                raise RobotDescriptionError(f"{self.name}: a part is named {name!r}, allowed is {expected!r}")
+                raise RobotDescriptionError(f"{self.name}: a part is named {name!r}, must be {expected!r}")
 
     @property
     def mass(self) -> float:
         """Mass in kg of links and gripper."""
         return sum(link.inertia.mass for link in self.links) + self.gripper.mass
-
-    @property
-    def rotor_inertia(self) -> Floats:
-        """Reflected rotor inertia of every joint, kg m^2."""
-        return tuple(joint.rotor_inertia for joint in self.joints)
 
 
 @dataclass(frozen=True)
@@ -75,7 +66,7 @@ class Panel:
 
     def __post_init__(self) -> None:
         vector(self.xyz, 3, "panel xyz", "m")
-        positive_vector(self.size, 3, "panel size", "m")
+        vector(self.size, 3, "panel size", "m", above=0.0)
 
 
 @dataclass(frozen=True)
@@ -87,7 +78,7 @@ class Base:
     panels: tuple[Panel, ...] = ()
 
     def __post_init__(self) -> None:
-        positive_vector(self.size, 3, f"{self.inertia.body}: size", "m")
+        vector(self.size, 3, f"{self.inertia.body}: size", "m", above=0.0)
 
 
 @dataclass(frozen=True)
@@ -99,21 +90,13 @@ class RobotDescription:
     arms: tuple[ArmDescription, ...]
 
     def __post_init__(self) -> None:
-        """Check that there is an arm and that arm names differ."""
         if not self.arms:
-            raise RobotDescriptionError("the robot has 0 arms, allowed is at least 1")
+            raise RobotDescriptionError("the robot has 0 arms, must be >= 1")
         name, count = Counter(arm.name for arm in self.arms).most_common(1)[0]
         if count > 1:
-            raise RobotDescriptionError(f"arm name {name!r} is given {count} times, allowed is once")
+            raise RobotDescriptionError(f"arm name {name!r} is given {count} times")
 
     @property
     def mass(self) -> float:
         """Total mass in kg."""
         return self.base.inertia.mass + sum(arm.mass for arm in self.arms)
-
-    def arm(self, name: str) -> ArmDescription:
-        """Return the arm of a name; raises UnknownNameError."""
-        for arm in self.arms:
-            if arm.name == name:
-                return arm
-        raise UnknownNameError("arm", name, [arm.name for arm in self.arms])

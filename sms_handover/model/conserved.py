@@ -1,4 +1,4 @@
-"""What a free-floating robot conserves, and the energy it exchanges with its motors."""
+"""Conserved quantities of a free-floating robot, and its kinetic energy."""
 
 from dataclasses import dataclass
 

@@ -1,119 +1,81 @@
-"""Reading a robot description from its YAML files."""
+"""Description of a robot, read from its YAML files."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from sms_handover.configuration.package_files import config_file
-from sms_handover.configuration.parameters import read_yaml
+from sms_handover.configuration.sections import Section
+from sms_handover.configuration.values import ROBOT, with_values
+from sms_handover.configuration.yaml_reader import read_yaml
+from sms_handover.errors import RobotDescriptionError
 from sms_handover.frames import BASE
-from sms_handover.model.arm_file import override_limits, read_arm_file
+from sms_handover.model.arm_file import override_limits, read_arm_file, read_origin
 from sms_handover.model.assembly import ArmDescription, Base, Panel, RobotDescription, gripper_name
-from sms_handover.model.parts import (
-    Floats,
-    Gripper,
-    Inertia,
-    JointDescription,
-    LinkDescription,
-    Origin,
-    box_moments,
-)
-from sms_handover.model.sections import at, naming, read_list, read_origin, read_section, read_text, unknown
-from sms_handover.model.validation import number, positive, positive_vector, vector
-
-__all__ = [
-    "ArmDescription",
-    "Base",
-    "Gripper",
-    "Inertia",
-    "JointDescription",
-    "LinkDescription",
-    "Origin",
-    "Panel",
-    "RobotDescription",
-    "load_robot",
-]
+from sms_handover.model.parts import Floats, Gripper, Inertia, box_moments
 
 _UNIFORM_BOX = "uniform_box"
 
 
-def load_robot(path: Path | None = None) -> RobotDescription:
+def load_robot(path: Path | None = None, values: Sequence[str] = ()) -> RobotDescription:
     """Return the checked robot that a file describes, by default the shipped ``config/robot.yaml``.
 
-    The path of an arm's own description file is relative to the robot file. Raises
-    RobotDescriptionError on a key or value that no robot can have and ConfigurationError on a file
-    that cannot be read; each message names the file.
+    ``values`` of it are set by dotted path, e.g. ``robot.base.mass:=300``. The path of an arm's own
+    description file is relative to the robot file. Raises RobotDescriptionError on a key or value that
+    no robot can have and ConfigurationError on a file that cannot be read; each names file and line.
     """
     path = config_file("robot.yaml") if path is None else path
-    document = read_yaml(path)
-    with naming(path):
-        root = read_section(document, "robot", ("name", "base", "arms"))
-        name = read_text(root["name"], at(root, "name", "name"))
-        base = _base(root["base"])
-        arms = read_list(root["arms"], "arms")
-    described = tuple(_arm(item, index, path) for index, item in enumerate(arms))
-    with naming(path):
-        return RobotDescription(name, base, described)
+    root = Section(with_values(read_yaml(path), ROBOT, values), path, RobotDescriptionError)
+    root.only(("name", "base", "arms"))
+    name, base = root.text("name"), _base(root.section("base"))
+    arms = tuple(_arm(item, path.parent) for item in root.sections("arms"))
+    with root.located("arms"):
+        return RobotDescription(name, base, arms)
 
 
-def _base(value: object) -> Base:
+def _base(section: Section) -> Base:
     """Return the spacecraft."""
-    section = read_section(value, "base", ("mass", "size", "com", "inertia"), optional=("panels",))
-    mass = positive(section["mass"], at(section, "mass", "base: mass"), "kg")
-    size = positive_vector(section["size"], 3, at(section, "size", "base: size"), "m")
-    com = vector(section["com"], 3, at(section, "com", "base: com"), "m")
-    panels = tuple(
-        _panel(item, f"base: panels[{index}]")
-        for index, item in enumerate(read_list(section.get("panels", []), "base: panels"))
-    )
-    return Base(Inertia(BASE, mass, com, _base_moments(section["inertia"], mass, size)), size, panels)
+    section.only(("mass", "size", "com", "inertia"), optional=("panels",))
+    mass, size = section.number("mass", "kg", above=0.0), section.vector("size", 3, "m", above=0.0)
+    com, moments = section.vector("com", 3, "m"), _base_moments(section, mass, size)
+    with section.located("inertia"):
+        inertia = Inertia(BASE, mass, com, moments)
+    panels = section.sections("panels") if "panels" in section else ()
+    return Base(inertia, size, tuple(map(_panel, panels)))
 
 
-def _base_moments(value: object, mass: float, size: Floats) -> Floats:
+def _base_moments(section: Section, mass: float, size: Floats) -> Floats:
     """Return the six moments given, or those of a uniform box."""
-    if isinstance(value, str):
-        if value != _UNIFORM_BOX:
-            raise unknown("inertia", value, [_UNIFORM_BOX], "base: inertia")
+    if isinstance(section.value("inertia"), str):
+        section.name("inertia", "inertia", [_UNIFORM_BOX])
         return box_moments(mass, size)
-    return vector(value, 6, "base: inertia", "kg m^2")
+    return section.vector("inertia", 6, "kg m^2")
 
 
-def _panel(value: object, where: str) -> Panel:
+def _panel(section: Section) -> Panel:
     """Return one solar panel."""
-    section = read_section(value, where, ("xyz", "size"))
-    xyz = vector(section["xyz"], 3, at(section, "xyz", f"{where}: xyz"), "m")
-    return Panel(xyz, positive_vector(section["size"], 3, at(section, "size", f"{where}: size"), "m"))
+    section.only(("xyz", "size"))
+    return Panel(section.vector("xyz", 3, "m"), section.vector("size", 3, "m", above=0.0))
 
 
-def _arm(value: object, index: int, path: Path) -> ArmDescription:
+def _arm(section: Section, folder: Path) -> ArmDescription:
     """Return one arm: its own description file, with what the robot file adds or overrides."""
-    keys = ("name", "description", "mount", "gripper", "rotor_inertia")
-    with naming(path):
-        section = read_section(value, f"arms[{index}]", keys, optional=("limits",))
-        name = read_text(section["name"], at(section, "name", f"arms[{index}]: name"))
-        file = path.parent / read_text(
-            section["description"], at(section, "description", f"{name}: description")
-        )
-    joints, links, flange = read_arm_file(file, name)
-    with naming(path):
-        rotor = vector(
-            section["rotor_inertia"],
-            len(joints),
-            at(section, "rotor_inertia", f"{name}: rotor_inertia"),
-            "kg m^2",
-        )
+    section.only(("name", "description", "mount", "gripper", "rotor_inertia"), optional=("limits",))
+    name = section.text("name")
+    joints, links, flange = read_arm_file(folder / section.text("description"), name)
+    rotor = section.vector("rotor_inertia", len(joints), "kg m^2")
+    with section.located("rotor_inertia"):
         joints = [replace(joint, rotor_inertia=kg_m2) for joint, kg_m2 in zip(joints, rotor, strict=True)]
-        joints = override_limits(section.get("limits", {}), joints, f"{name}: limits")
-        mount = read_origin(section["mount"], at(section, "mount", f"{name}: mount"))
-        gripper = _gripper(section["gripper"], gripper_name(name))
+    if "limits" in section:
+        joints = override_limits(section.section("limits"), joints)
+    mount, gripper = read_origin(section.section("mount")), _gripper(section.section("gripper"), name)
+    with section.located("name"):
         return ArmDescription(name, mount, tuple(joints), tuple(links), flange, gripper)
 
 
-def _gripper(value: object, name: str) -> Gripper:
+def _gripper(section: Section, arm: str) -> Gripper:
     """Return the gripper of an arm."""
-    section = read_section(value, name, ("mass", "radius", "length"))
-    return Gripper(
-        name,
-        number(section["mass"], at(section, "mass", f"{name}: mass"), "kg"),
-        number(section["radius"], at(section, "radius", f"{name}: radius"), "m"),
-        number(section["length"], at(section, "length", f"{name}: length"), "m"),
-    )
+    section.only(("mass", "radius", "length"))
+    mass = section.number("mass", "kg", above=0.0)
+    radius, length = (section.number(key, "m", above=0.0) for key in ("radius", "length"))
+    return Gripper(gripper_name(arm), mass, radius, length)

@@ -1,4 +1,4 @@
-"""The links of the robot as a tree of transforms, as viewers want them."""
+"""Link tree: the links of the robot as a tree of transforms."""
 
 import pinocchio as pin
 

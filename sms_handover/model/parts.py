@@ -1,7 +1,4 @@
-"""The parts of an arm as plain values; every part that exists has been checked.
-
-Numbers are in SI units and radians; tuples keep the parts comparable and immutable.
-"""
+"""Parts of a robot as plain values, checked when they are made; in SI units and radians."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,8 +8,7 @@ from sms_handover.model.validation import (
     check_position_limits,
     check_unit_axis,
     moment_matrix,
-    not_negative,
-    positive,
+    number,
     vector,
 )
 from sms_handover.types import Array, read_only
@@ -35,7 +31,7 @@ def cylinder_moments(mass: float, radius: float, length: float) -> Floats:
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a frame lies in its parent: ``xyz`` (3,) m and ``rpy`` (3,) rad about fixed x, y, z."""
+    """The pose of a frame in its parent: ``xyz`` (3,) m and ``rpy`` (3,) rad about fixed x, y, z."""
 
     xyz: Floats
     rpy: Floats
@@ -59,8 +55,7 @@ class Inertia:
     moments: Floats
 
     def __post_init__(self) -> None:
-        """Check that the inertia is physical."""
-        positive(self.mass, f"{self.body}: mass", "kg")
+        number(self.mass, f"{self.body}: mass", "kg", above=0.0)
         vector(self.com, 3, f"{self.body}: com", "m")
         vector(self.moments, 6, f"{self.body}: inertia", "kg m^2")
         check_moments(self.moments, f"{self.body}: inertia")
@@ -92,9 +87,9 @@ class JointDescription:
         vector(self.axis, 3, f"{self.name}: axis")
         check_unit_axis(self.axis, f"{self.name}: axis")
         check_position_limits(self.lower, self.upper, f"{self.name}: position limit")
-        positive(self.velocity, f"{self.name}: velocity limit", "rad/s")
-        positive(self.effort, f"{self.name}: effort limit", "N m")
-        not_negative(self.rotor_inertia, f"{self.name}: rotor inertia", "kg m^2")
+        number(self.velocity, f"{self.name}: velocity limit", "rad/s", above=0.0)
+        number(self.effort, f"{self.name}: effort limit", "N m", above=0.0)
+        number(self.rotor_inertia, f"{self.name}: rotor inertia", "kg m^2", minimum=0.0)
 
 
 @dataclass(frozen=True)
@@ -106,7 +101,7 @@ class LinkDescription:
     radius: float
 
     def __post_init__(self) -> None:
-        positive(self.radius, f"{self.name}: radius", "m")
+        number(self.radius, f"{self.name}: radius", "m", above=0.0)
 
 
 @dataclass(frozen=True)
@@ -122,9 +117,9 @@ class Gripper:
     length: float
 
     def __post_init__(self) -> None:
-        positive(self.mass, f"{self.name}: mass", "kg")
-        positive(self.radius, f"{self.name}: radius", "m")
-        positive(self.length, f"{self.name}: length", "m")
+        number(self.mass, f"{self.name}: mass", "kg", above=0.0)
+        number(self.radius, f"{self.name}: radius", "m", above=0.0)
+        number(self.length, f"{self.name}: length", "m", above=0.0)
 
     @property
     def inertia(self) -> Inertia:
@@ -134,5 +129,5 @@ class Gripper:
 
     @property
     def tool(self) -> Origin:
-        """Where the tool frame lies in the frame of the flange."""
+        """The tool frame in the frame of the flange."""
         return Origin((0.0, 0.0, self.length), (0.0, 0.0, 0.0))

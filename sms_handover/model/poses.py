@@ -1,4 +1,4 @@
-"""Conversions between :class:`Pose` values, Pinocchio's SE3 and roll-pitch-yaw."""
+"""Poses converted to and from Pinocchio's SE3 and roll-pitch-yaw."""
 
 import numpy as np
 import pinocchio as pin

@@ -1,4 +1,4 @@
-"""Dynamics and kinematics of the arms with the reaction of the unactuated base eliminated."""
+"""Reduced dynamics and kinematics: the reaction of the unactuated base is eliminated."""
 
 from dataclasses import dataclass
 
@@ -38,7 +38,7 @@ def reduced_dynamics(robot: RobotModel, q: Array, v: Array) -> ReducedDynamics:
 
 
 def reduced_inverse_dynamics(robot: RobotModel, q: Array, v: Array, joint_acceleration: Array) -> Array:
-    """Return the joint efforts u (n,) N m that bring about joint accelerations (n,) rad/s^2 on a free base.
+    """Return the joint efforts u (n,) N m that give joint accelerations (n,) rad/s^2 on a free base.
 
     The same as H* q_m'' + c*, but without forming H*: a base that did not accelerate would need the
     wrench f_b = H_bm q_m'' + c_b; it has none, so it accelerates by a_b = -H_b^-1 f_b, and

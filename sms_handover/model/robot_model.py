@@ -1,6 +1,6 @@
-"""The Pinocchio model of the free-floating robot, with maps from names to indices."""
+"""Robot model: the free-floating robot in Pinocchio, with maps from names to indices."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
@@ -10,7 +10,8 @@ import pinocchio as pin
 
 from sms_handover.errors import RobotDescriptionError, UnknownNameError
 from sms_handover.frames import tool_frame
-from sms_handover.model.description import RobotDescription, load_robot
+from sms_handover.model.assembly import RobotDescription
+from sms_handover.model.description import load_robot
 from sms_handover.model.poses import pose_of, se3_of, twist_of
 from sms_handover.model.urdf import to_urdf
 from sms_handover.types import BASE_NQ, BASE_NV, Array, Pose, Twist, read_only
@@ -23,7 +24,7 @@ class RobotModel:
 
     The configuration is q = (base position, base quaternion x y z w, n joint angles), the
     velocity v = (base twist in ``base_link`` axes, n joint rates). There is no gravity. An instance
-    owns Pinocchio's work space, so it is not to be shared between threads.
+    owns Pinocchio's workspace and must not be shared between threads.
     """
 
     def __init__(self, description: RobotDescription) -> None:
@@ -33,7 +34,7 @@ class RobotModel:
         self.pin = pin.buildModelFromXML(self.urdf, pin.JointModelFreeFlyer())
         self.pin.gravity.setZero()
         self.data = self.pin.createData()
-        self.base_solver = eigenpy.LLT(BASE_NV)  # work space too: Cholesky of a matrix of the base's size
+        self.base_solver = eigenpy.LLT(BASE_NV)  # workspace too: Cholesky of (6, 6)
         self.joint_names: tuple[str, ...] = tuple(self.pin.names[2:])
         self.n_joints = len(self.joint_names)
         if self.pin.nv != BASE_NV + self.n_joints or self.pin.nq != BASE_NQ + self.n_joints:
@@ -50,9 +51,9 @@ class RobotModel:
         self._apply_rotor_inertia()
 
     @classmethod
-    def load(cls, path: Path | None = None) -> "RobotModel":
-        """Return the model of a robot description file, by default the shipped one."""
-        return cls(load_robot(path))
+    def load(cls, path: Path | None = None, values: Sequence[str] = ()) -> "RobotModel":
+        """Return the model of a robot description file, by default the shipped one (see load_robot)."""
+        return cls(load_robot(path, values))
 
     @property
     def mass(self) -> float:
@@ -76,11 +77,11 @@ class RobotModel:
         return np.concatenate([base_in_world.position, base_in_world.quaternion_xyzw, joint_position])
 
     def limited(self, effort: Array) -> Array:
-        """Return joint efforts (n,) N m, each limited to what its joint can give."""
+        """Return joint efforts (n,) N m clamped to the limits."""
         return np.minimum(np.maximum(effort, self._least_effort), self.effort_limit)
 
     def within_limits(self, joint_position: Array) -> Array:
-        """Return joint angles (n,) rad, each brought inside the limits of its joint."""
+        """Return joint angles (n,) rad clamped to the limits."""
         return np.minimum(np.maximum(joint_position, self.lower), self.upper)
 
     def tools_in_world(
@@ -97,16 +98,6 @@ class RobotModel:
             for arm in (self.arms if arms is None else arms)
         }
 
-    def links_in_world(self, base_in_world: Pose, joint_position: Array) -> dict[str, Pose]:
-        """Return the pose in ``world`` of every link of the description, for a transform tree."""
-        pin.forwardKinematics(self.pin, self.data, self.configuration(base_in_world, joint_position))
-        pin.updateFramePlacements(self.pin, self.data)
-        return {
-            frame.name: pose_of(self.data.oMf[index])
-            for index, frame in enumerate(self.pin.frames)
-            if frame.type == pin.FrameType.BODY
-        }
-
     def tool_motion(self, q: Array, v: Array, arm: str) -> tuple[Pose, Twist]:
         """Return pose and twist of a tool: of its origin, in the axes of ``world``."""
         pin.forwardKinematics(self.pin, self.data, q, v)
@@ -119,7 +110,7 @@ class RobotModel:
         return pose_of(se3_of(base_in_world) * pin.exp6(pin.Motion(twist_base_in_base * duration)))
 
     def _arm_slices(self) -> dict[str, slice]:
-        """Return where each arm's joints lie in the joint arrays; they are contiguous in a tree."""
+        """Return the slice of each arm in the joint arrays; in a tree its joints are contiguous."""
         slices = {}
         for arm in self.description.arms:
             indices = [self.joint_index(joint.name) for joint in arm.joints]

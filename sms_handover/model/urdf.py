@@ -1,6 +1,6 @@
-"""The robot description as URDF text, for Pinocchio and for every tool that draws a robot.
+"""URDF text of a robot description, for Pinocchio and for viewers.
 
-Numbers keep full double precision. Rotor inertia has no place in URDF; it stays in the description.
+Numbers keep full double precision. URDF has no rotor inertia.
 """
 
 from collections.abc import Iterable, Sequence
@@ -92,14 +92,14 @@ def _moving(root: ET.Element, parent: str, joint: JointDescription, link: LinkDe
 
 
 def _connect(joint: ET.Element, parent: str, child: str, origin: Origin) -> None:
-    """Say which links a joint connects, and where its frame lies in the parent."""
+    """Add parent and child of a joint, and its frame in the parent."""
     _origin(joint, origin)
     ET.SubElement(joint, "parent", link=parent)
     ET.SubElement(joint, "child", link=child)
 
 
 def _box(link: ET.Element, size: Sequence[float], origin: Origin, colour: str, *, solid: bool) -> None:
-    """Add a box to what is drawn and, if it is solid, to what collides."""
+    """Add a box to the visuals and, if solid, to the collision shapes."""
     for element in _shapes(link, origin, colour, solid=solid):
         ET.SubElement(element, "box", size=_numbers(size))
 

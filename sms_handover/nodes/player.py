@@ -25,7 +25,7 @@ from sms_handover.ros.codecs.convert import time_message
 from sms_handover.ros.parameters import declare, reject_unknown
 from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, RunnableNode, Stop, run_node
 from sms_handover.terminal.keyboard import Key, Keyboard
-from sms_handover.terminal.status_line import StatusLine
+from sms_handover.terminal.progress import Progress
 from sms_handover.terminal.streams import printable
 from sms_handover.units import NS_PER_S
 
@@ -70,7 +70,7 @@ class PlayerNode(RunnableNode):
         self._clock_publisher = self.create_publisher(Clock, CLOCK, _CLOCK_DEPTH) if options.clock else None
         if self._clock_publisher:
             self.create_timer(1.0 / options.clock, self._publish_clock)
-        self._line = StatusLine()
+        self._progress = Progress()
         self._blocked_since = 0.0
         self._stopped = Event()
         offer_services(self, self._schedule, self._stopped.set)
@@ -85,7 +85,7 @@ class PlayerNode(RunnableNode):
             try:
                 self._play(executor, stop, keyboard)
             finally:
-                self._line.stay()
+                self._progress.stay()
             print(closing_line(self._schedule, monotonic_ns()))
             missing = self._unacknowledged(stop)
         if missing:
@@ -94,7 +94,7 @@ class PlayerNode(RunnableNode):
             print(f"{self._left_out} messages of the bag were not played, see above", file=sys.stderr)
         if stop.asked:
             return EXIT_STOPPED
-        return EXIT_LOSS if missing or self._left_out else EXIT_OK
+        return EXIT_LOSS if missing or self._left_out or self._info.missing else EXIT_OK
 
     def _advertise(self) -> dict[TopicKey, BagPublisher]:
         """Return the publishers of the topics to play; report those that cannot be played."""
@@ -110,6 +110,8 @@ class PlayerNode(RunnableNode):
         overrides = read_overrides(Path(options.qos_overrides)) if options.qos_overrides else {}
         renamed = {absolute(old): new for old, new in (rule.split(":=") for rule in options.rename)}
         publishers, skipped = make_publishers(self, chosen, overrides, renamed)
+        for text in info.missing:
+            print(f"not played: {text}", file=sys.stderr)
         for (topic, _), reason in skipped.items():
             _report_left_out(topic, reason)
         self._left_out = sum(item.message_count for item in chosen if (item.name, item.type) in skipped)
@@ -155,14 +157,14 @@ class PlayerNode(RunnableNode):
             executor.spin_once(timeout_sec=self._idle_s())
             for key in keyboard.pressed():
                 self._on_key(key)
-            if self._line.due:
+            if self._progress.due:
                 self._show()
         self._publish_clock()
         self._show()
 
     def _show(self) -> None:
         """Show the progress."""
-        self._line.show(progress_line(self._schedule, self._source.span, monotonic_ns()))
+        self._progress.show(progress_line(self._schedule, self._source.span, monotonic_ns()))
 
     def _send(self) -> None:
         """Publish what is due, for one burst at most."""
@@ -186,8 +188,7 @@ class PlayerNode(RunnableNode):
         self._blocked_since = self._blocked_since or now
         if now - self._blocked_since > _BLOCKED_S:
             self._blocked_since = now
-            self._line.stay()
-            print(f"waiting for a subscriber of {topic} that takes no messages", file=sys.stderr)
+            self._progress.print(f"waiting for a subscriber of {topic} that takes no messages")
 
     def _idle_s(self) -> float:
         """Read ahead if there is time; return how long to wait for events."""

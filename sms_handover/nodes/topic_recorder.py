@@ -23,7 +23,7 @@ from sms_handover.ros.parameters import declare, reject_unknown
 from sms_handover.ros.process.main import EXIT_FAILED, EXIT_LOSS, EXIT_OK, RunnableNode, Stop, run_node
 from sms_handover.ros.qos import serves, stored, weakest
 from sms_handover.ros.transport.direct import DirectInputs
-from sms_handover.terminal.status_line import StatusLine
+from sms_handover.terminal.progress import Progress
 from sms_handover.terminal.streams import printable
 
 _POLL_S = 0.005  # [s] of wall time between polls for messages
@@ -56,7 +56,7 @@ class TopicRecorderNode(RunnableNode):
         self._not_recorded: set[tuple[str, ...]] = set()  # topic and what of it
         self._end_ns: int | None = None  # of wall time; what is sent later is not recorded
         self._inputs = DirectInputs(self)
-        self._line = StatusLine()
+        self._progress = Progress()
         self.create_timer(_DISCOVERY_S, self.discover_topics)
 
     @property
@@ -78,7 +78,7 @@ class TopicRecorderNode(RunnableNode):
         finally:
             self._writer.close()
             self._inputs.destroy()
-            self._line.stay()
+            self._progress.stay()
         for topic, count in self.recorded.items():
             print(f"{count:10d}  {topic}")
         print(f"{sum(self.recorded.values()):10d}  messages in {self._writer.folder}")
@@ -121,7 +121,7 @@ class TopicRecorderNode(RunnableNode):
         try:
             self._writer.add_topic(name, type_name, profiles)
         except BagError as error:
-            print(f"no definition of {name} in the bag: {error}", file=sys.stderr)
+            self._progress.print(f"no definition of {name} in the bag: {error}")
             metadata = {"offered_qos_profiles": qos_text([profile.to_rosbag2() for profile in profiles])}
             schema = Schema(id=0, name=type_name, encoding="", data=b"")
             self._writer.add_source(name, Source(name, "cdr", schema, metadata))
@@ -130,8 +130,7 @@ class TopicRecorderNode(RunnableNode):
         """Report once that something of a topic is not recorded."""
         if what not in self._not_recorded:
             self._not_recorded.add(what)
-            self._line.stay()
-            print(f"not recorded: {printable(name)}: {reason}", file=sys.stderr)
+            self._progress.print(f"not recorded: {printable(name)}: {reason}")
 
     def _on_message(self, name: str, data: bytes, sent_ns: int, publisher: bytes) -> None:
         """Record one message, unless it was sent after the end."""
@@ -141,9 +140,9 @@ class TopicRecorderNode(RunnableNode):
     def _poll(self) -> None:
         """Take the messages that have arrived and show the progress."""
         self._inputs.poll()
-        if self._line.due:
+        if self._progress.due:
             counts = self.recorded
-            self._line.show(f"{sum(counts.values())} messages of {len(counts)} topics")
+            self._progress.show(f"{sum(counts.values())} messages of {len(counts)} topics")
 
     def _drain(self) -> None:
         """Take the messages that are on the way."""

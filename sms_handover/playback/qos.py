@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from sms_handover.bag.qos import Durability, History, Reliability, profiles_of
-from sms_handover.configuration.parameters import read_yaml
+from sms_handover.configuration.checks import check_number
+from sms_handover.configuration.yaml_reader import read_yaml
 from sms_handover.errors import ConfigurationError, UnknownNameError
 from sms_handover.units import NS_PER_S
 
@@ -91,7 +92,7 @@ def with_policies(offer: Offer, policies: Mapping[str, Any], where: str) -> Offe
         elif name in _DURATIONS:
             changes[_DURATIONS[name]] = _duration_ns(value, f"{where}: {name}")
         elif name == "depth":
-            changes[name] = _whole(value, f"{where}: depth")
+            changes[name] = _count(value, f"{where}: depth")
         elif name not in _IGNORED:
             raise UnknownNameError("policy", str(name), (*_POLICIES, *_DURATIONS, "depth"), where)
     return replace(offer, **changes)
@@ -112,17 +113,15 @@ def _duration_ns(value: object, where: str) -> int | None:
     """Return a duration of ``sec`` and ``nsec`` in ns, None if infinite or unset."""
     if not isinstance(value, dict) or not {"sec", "nsec"} <= value.keys():
         raise ConfigurationError(f"{where} is {value!r}, must be a mapping with sec and nsec")
-    seconds, nanoseconds = (_whole(value[key], f"{where}.{key}") for key in ("sec", "nsec"))
+    seconds, nanoseconds = (_count(value[key], f"{where}.{key}") for key in ("sec", "nsec"))
     if seconds >= _INFINITE_FROM_S or (seconds, nanoseconds) == (0, 0):
         return None
     return seconds * NS_PER_S + nanoseconds
 
 
-def _whole(value: object, where: str) -> int:
-    """Return a non-negative integer."""
-    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise ConfigurationError(f"{where} is {value!r}, must be an integer >= 0")
-    return value
+def _count(value: object, where: str) -> int:
+    """Return a whole number that is not negative."""
+    return int(check_number(value, where, minimum=0, whole=True))
 
 
 def _strongest(strong: E, found: list[E]) -> E:

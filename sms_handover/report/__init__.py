@@ -1,1 +1,1 @@
-"""A report of recorded runs: one HTML page that needs nothing but a browser."""
+"""Report of recorded runs: one self-contained HTML page."""

@@ -1,4 +1,4 @@
-"""The 3D view of the runs that can be shown in one."""
+"""Animation of the runs in 3D, of those whose bags have what it needs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,14 +12,14 @@ from sms_handover.scene.scene import Scene, make_scene
 
 @dataclass(frozen=True)
 class Animation:
-    """A page that plays runs, '' if there is none to play; and why others are not in it, one line each."""
+    """A page that plays runs, '' if there are none; and one line for each run that it leaves out."""
 
     html: str
     left_out: tuple[str, ...]
 
 
 def animation(runs: Sequence[RecordedRun]) -> Animation:
-    """Return the animation of every run whose bag tells what the robot and the deputy look like."""
+    """Return the animation of every run whose bag describes the robot and the deputy."""
     scenes: dict[str, Scene] = {}
     left_out: list[str] = []
     for run in runs:

@@ -1,4 +1,4 @@
-"""What the head of a report says of each run."""
+"""Cards at the head of a report, one per run."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from sms_handover.units import ns_to_seconds
 
 @dataclass(frozen=True)
 class Verdict:
-    """A short statement, and whether it is good news; None if it cannot be told."""
+    """A short statement, and whether it is good; None if that is unknown."""
 
     text: str
     good: bool | None
@@ -20,7 +20,7 @@ class Verdict:
 
 @dataclass(frozen=True)
 class RunCard:
-    """One run: its looks, its length in s, when it was started, and how it went."""
+    """One run: its style, its duration in s, its start, and its verdicts."""
 
     style: RunStyle
     duration: float
@@ -31,7 +31,7 @@ class RunCard:
 
 
 def run_card(run: RecordedRun, style: RunStyle) -> RunCard:
-    """Return the card of a run."""
+    """Return the card of a run, with the loss ledger as text."""
     ticks, ledger = run.data.tick_ns, run.info.ledger
     return RunCard(
         style=style,
@@ -44,7 +44,6 @@ def run_card(run: RecordedRun, style: RunStyle) -> RunCard:
 
 
 def _grasps(run: RecordedRun) -> Verdict:
-    """Tell how many grasp commands succeeded."""
     count, total = succeeded(run.data.grasp_events)
     if not total:
         return Verdict("no grasp command recorded", None)
@@ -52,13 +51,13 @@ def _grasps(run: RecordedRun) -> Verdict:
 
 
 def _decisions(run: RecordedRun) -> tuple[Verdict, ...]:
-    """Tell how many warnings and errors the nodes told of, if there were any."""
+    """Return the number of warnings and errors that the nodes reported, if there were any."""
     words = graver_in_words(run.data.run_events)
     return (Verdict(words, good=False),) if words else ()
 
 
 def _recording(ledger: Ledger | None) -> Verdict:
-    """Whether messages are known to be missing."""
+    """Return how many messages are known to be missing."""
     if ledger is None:
         return Verdict("recorded without a loss ledger", None)
     lost = sum(max(topic.missing, topic.lost or 0) for topic in ledger.topics)

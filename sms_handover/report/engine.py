@@ -1,4 +1,4 @@
-"""The libraries behind the page: templates that escape every text, and plotly's script."""
+"""Template engine and plotting library of the page: jinja2, which escapes every text, and plotly."""
 
 from importlib import import_module
 from importlib.resources import files
@@ -11,7 +11,7 @@ _WEB = "web"
 
 
 def render(template: str, **values: object) -> str:
-    """Return a template of ``web/`` filled in; every value is escaped, a name that is missing is an error."""
+    """Return a rendered template of ``web/``; every value is escaped, a missing name is an error."""
     jinja2 = _needed("jinja2")
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader(_PACKAGE, _WEB),
@@ -24,17 +24,17 @@ def render(template: str, **values: object) -> str:
 
 
 def web_file(name: str) -> str:
-    """Return the text of a style sheet or script of ``web/``."""
+    """Return a style sheet or script of ``web/``."""
     return (files(_PACKAGE) / _WEB / name).read_text(encoding="utf-8")
 
 
 def plotly_script() -> str:
-    """Return plotly.js, about 5 MB, in the version of the installed plotly package."""
+    """Return plotly.js, about 5 MB, from the installed plotly package."""
     return str(_needed("plotly.offline").get_plotlyjs())
 
 
 def _needed(module: str) -> Any:
-    """Return a module that only reports need; raises MissingDependencyError if it is not installed."""
+    """Return an optional module; raises MissingDependencyError if it is not installed."""
     try:
         return import_module(module)
     except ModuleNotFoundError as error:

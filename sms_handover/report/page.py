@@ -1,9 +1,8 @@
-"""Put a report of recorded runs together as one HTML page."""
+"""Page of a report: recorded runs as one HTML document."""
 
 from collections.abc import Sequence
 
 from sms_handover import __version__
-from sms_handover.analysis.comparison import compare
 from sms_handover.analysis.highlights import highlights
 from sms_handover.analysis.table import figure_sections
 from sms_handover.errors import ConfigurationError
@@ -13,7 +12,7 @@ from sms_handover.report.engine import plotly_script, render, web_file
 from sms_handover.report.page_data import page_data
 from sms_handover.report.plots import plot_groups
 from sms_handover.report.provenance import compared_parameters, compared_versions, schedule_difference
-from sms_handover.report.recorded_run import RecordedRun, common_tolerance
+from sms_handover.report.recorded_run import RecordedRun, common_tolerance, compare_recorded
 from sms_handover.report.security import content_security_policy, inline_scripts
 from sms_handover.report.styles import run_styles
 
@@ -21,7 +20,7 @@ _SCRIPTS = ("data.js", "theme.js", "plot.js", "link.js", "main.js")
 
 
 def report_page(runs: Sequence[RecordedRun]) -> str:
-    """Return the report of recorded runs as one HTML document that loads nothing from anywhere.
+    """Return the report of recorded runs as one self-contained HTML document.
 
     Raises ConfigurationError if there is no run, or two have the same name.
     """
@@ -29,12 +28,8 @@ def report_page(runs: Sequence[RecordedRun]) -> str:
     if not runs:
         raise ConfigurationError("a report needs at least one run")
     if len(set(names)) < len(names):
-        raise ConfigurationError(f"every run of a report needs a name of its own, these are {names}")
-    comparison = compare(
-        {run.name: run.data for run in runs},
-        laws={run.name: run.law for run in runs},
-        loops={run.name: run.loop for run in runs},
-    )
+        raise ConfigurationError(f"runs of a report must have different names, these are {names}")
+    comparison = compare_recorded(runs)
     styles = run_styles(names, [run.law for run in runs])
     infos, data = [run.info for run in runs], [run.data for run in runs]
     groups = plot_groups(data)
@@ -62,6 +57,5 @@ def report_page(runs: Sequence[RecordedRun]) -> str:
 
 
 def _title(names: Sequence[str]) -> str:
-    """Return the heading of the page."""
     *others, last = names
     return f"{', '.join(others)} and {last}, side by side" if others else last

@@ -1,4 +1,4 @@
-"""What the scripts of the page need: plots, phases and events as JSON values."""
+"""Data of the page for its scripts: plots, phases and events as JSON values."""
 
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
@@ -18,7 +18,7 @@ PageData = dict[str, Any]
 
 
 def page_data(runs: Sequence[RunData], styles: Sequence[RunStyle], groups: Sequence[PlotGroup]) -> PageData:
-    """Return the values that the scripts read; texts in it come from bags and are data, never markup."""
+    """Return the values that the scripts read; texts from bags are data, never markup."""
     first = runs[0]
     names = [style.name for style in styles]
     return {
@@ -34,12 +34,11 @@ def page_data(runs: Sequence[RunData], styles: Sequence[RunStyle], groups: Seque
 
 
 def _plot(plot: Plot) -> PageData:
-    """Return one plot."""
     return {
         "key": plot.key,
         "unit": plot.unit,
         "series": list(plot.series),
-        "size": plot.size,
+        "magnitude": plot.magnitude,
         "lines": [
             {
                 "run": line.run,
@@ -53,12 +52,12 @@ def _plot(plot: Plot) -> PageData:
 
 
 def packed(values: Array) -> str:
-    """Return numbers as base64 of little-endian float32: seven digits are more than a screen shows."""
+    """Return numbers as base64 of little-endian float32, whose seven digits are enough for a screen."""
     return b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii")
 
 
 def _events(runs: Sequence[RunData], names: Sequence[str]) -> list[PageData]:
-    """Return what came of each grasp command; one of several runs comes once, and says where they differ."""
+    """Return the outcome of each grasp command, once for all runs, naming the runs where they differ."""
     statuses: dict[tuple[int, str], dict[str, GraspStatus]] = {}
     for run, name in zip(runs, names, strict=True):
         for event in run.grasp_events:
@@ -75,7 +74,7 @@ def _events(runs: Sequence[RunData], names: Sequence[str]) -> list[PageData]:
 
 
 def _run_events(runs: Sequence[RunData], names: Sequence[str]) -> list[PageData]:
-    """Return the warnings and errors that nodes have told of, each with its run if there are several."""
+    """Return the warnings and errors that nodes reported, each with its run if there are several."""
     return [
         {
             "time": ns_to_seconds(event.stamp_ns),
@@ -89,7 +88,7 @@ def _run_events(runs: Sequence[RunData], names: Sequence[str]) -> list[PageData]
 
 
 def _outcome(statuses: Mapping[str, GraspStatus]) -> str:
-    """Return the outcome of a grasp command in every run in which it was given."""
+    """Return the outcome of a grasp command in every run that issued it."""
     if len(set(statuses.values())) == 1:
         return next(iter(statuses.values())).value
     return ", ".join(f"{status.value} in {name}" for name, status in statuses.items())

@@ -1,4 +1,4 @@
-"""What the report draws over time: signals of all runs in the same plot, thinned."""
+"""Plots of the report: signals of all runs over time, decimated."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -15,13 +15,13 @@ from sms_handover.run_data import RunData
 from sms_handover.types import Array
 from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
 
-TRANSIENT_S = 4.0  # [s] after the beginning of a phase that is drawn in more detail than the rest
-POINTS = 600  # most points of a line in each stretch of time, a transient or the rest of a phase
+TRANSIENT_S = 4.0  # [s] at the beginning of a phase that is drawn in more detail than the rest
+POINTS = 600  # largest number of points of a line in each section: a transient or the rest of a phase
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """One line of a plot: ``time`` (N,) s and ``values`` (N,) of a run, by its place, and of a series."""
+    """One line of a plot: ``time`` (N,) s and ``values`` (N,); run and series are given by index."""
 
     run: int
     series: int
@@ -31,10 +31,10 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Plot:
-    """One plot over time; ``series`` names the lines that each run has in it, one name if there is one.
+    """One plot over time; ``series`` has the names of the lines of each run.
 
-    ``lines`` is empty if no run has recorded it. ``size`` tells that all values are lengths, so
-    that they may be drawn on a logarithmic scale.
+    ``lines`` is empty if no run recorded the signal. A plot of a ``magnitude`` may have a logarithmic
+    scale, because no value is negative.
     """
 
     key: str
@@ -42,12 +42,12 @@ class Plot:
     unit: str
     series: tuple[str, ...]
     lines: tuple[Line, ...]
-    size: bool
+    magnitude: bool
 
 
 @dataclass(frozen=True)
 class PlotGroup:
-    """Plots under one heading, with a sentence on what they show."""
+    """Plots under one heading, with a sentence about them."""
 
     title: str
     text: str
@@ -56,101 +56,101 @@ class PlotGroup:
 
 @dataclass(frozen=True)
 class _Kind:
-    """How a signal becomes a plot: ``factor`` turns SI into ``unit``; ``size`` draws lengths of rows."""
+    """How to plot a signal: ``factor`` converts SI into ``unit``; ``magnitude`` plots the norm of a row."""
 
     key: str
     title: str
     factor: float
     unit: str
-    size: bool = False
+    magnitude: bool = False
 
 
 _TOOL = (
-    _Kind("position_error", "Position error of the tool of {arm}", MM_PER_M, "mm", size=True),
-    _Kind("orientation_error", "Orientation error of the tool of {arm}", DEG_PER_RAD, "deg", size=True),
+    _Kind("position_error", "Position error of the tool of {arm}", MM_PER_M, "mm", magnitude=True),
+    _Kind("orientation_error", "Orientation error of the tool of {arm}", DEG_PER_RAD, "deg", magnitude=True),
 )
 _JOINTS = (
     _Kind("joint_torque", "Joint torques of {arm}", 1.0, "N m"),
-    _Kind("joint_error", "Joint errors of {arm}, present less desired", DEG_PER_RAD, "deg"),
+    _Kind("joint_error", "Joint errors of {arm}, actual minus desired", DEG_PER_RAD, "deg"),
 )
 _BASE = (
     _Kind("base_displacement", "Displacement of the base", MM_PER_M, "mm"),
     _Kind("base_rotation", "Rotation of the base, as a rotation vector", DEG_PER_RAD, "deg"),
-    _Kind("base_speed", "Speed of the base", MM_PER_M, "mm/s", size=True),
-    _Kind("base_turn_rate", "Turn rate of the base", DEG_PER_RAD, "deg/s", size=True),
+    _Kind("base_speed", "Speed of the base", MM_PER_M, "mm/s", magnitude=True),
+    _Kind("base_turn_rate", "Turn rate of the base", DEG_PER_RAD, "deg/s", magnitude=True),
 )
 _PHYSICS = (
-    _Kind("linear_momentum", "Linear momentum", 1.0, "kg m/s", size=True),
-    _Kind("angular_momentum", "Angular momentum about the centre of mass", 1.0, "kg m²/s", size=True),
+    _Kind("linear_momentum", "Linear momentum", 1.0, "kg m/s", magnitude=True),
+    _Kind("angular_momentum", "Angular momentum about the centre of mass", 1.0, "kg m²/s", magnitude=True),
     _Kind("energy", "Kinetic energy and work of the torques", 1.0, "J"),
     _Kind("energy_residual", "Energy gained beyond the work done", 1.0, "J"),
 )
 
 
 def plot_groups(runs: Sequence[RunData]) -> tuple[PlotGroup, ...]:
-    """Return everything that is drawn of the runs."""
+    """Return all plots of the runs."""
     found = [signals.signals_of(run) for run in runs]
     arms = tuple(dict.fromkeys(arm for run in runs for arm in run.arms))
-    stretches = [_stretches(run) for run in runs]
+    cuts = [_cuts(run) for run in runs]
 
     def plots(kinds: Sequence[_Kind], names: Sequence[str]) -> tuple[Plot, ...]:
-        return tuple(_plot(kind, name, found, stretches) for kind in kinds for name in names)
+        return tuple(_plot(kind, name, found, cuts) for kind in kinds for name in names)
 
     return (
         PlotGroup(
             "Tools",
-            "How far each tool is from its target. A step of the target shows as a jump.",
+            "Distance and angle between each tool and its target. A step of the target shows as a jump.",
             plots(_TOOL, arms),
         ),
         PlotGroup(
             "Joints",
-            "What each joint gave, and how far it was from its reference.",
+            "Torque of each joint, and its deviation from the reference.",
             plots(_JOINTS, arms),
         ),
         PlotGroup(
             "Base",
-            "How the free base answers: it moves with every motion of an arm, and must come to rest.",
+            "Motion of the free base: it reacts to every motion of an arm, and must come to rest.",
             plots(_BASE, [""]),
         ),
         PlotGroup(
             "Conservation",
-            "Nothing pushes the robot from outside, so momenta stay zero and energy is the work of the "
-            "joints; what is left is rounding.",
+            "No external force acts on the robot, so the momenta stay zero and the energy equals the work of "
+            "the joints; the residuals are rounding errors.",
             plots(_PHYSICS, [""]),
         ),
     )
 
 
 def _plot(
-    kind: _Kind, arm: str, found: Sequence[Mapping[str, Signal]], stretches: Sequence[Sequence[float]]
+    kind: _Kind, arm: str, found: Sequence[Mapping[str, Signal]], cuts: Sequence[Sequence[float]]
 ) -> Plot:
-    """Return the plot of one kind of signal, of an arm or of the robot."""
+    """Return the plot of one kind of signal, for an arm or for the robot."""
     key = f"{arm}/{kind.key}" if arm else kind.key
     series: tuple[str, ...] = ()
     lines: list[Line] = []
-    for place, (signals_of_run, cuts) in enumerate(zip(found, stretches, strict=True)):
+    for place, (signals_of_run, cuts_of_run) in enumerate(zip(found, cuts, strict=True)):
         signal = signals_of_run.get(key)
         if signal is None or np.all(np.isnan(signal.values)):
             continue
-        labels = ("",) if kind.size else tuple(_short(label, arm) for label in signal.labels)
-        values = lengths(signal.values)[:, np.newaxis] if kind.size else signal.values
+        labels = ("",) if kind.magnitude else tuple(_short(label, arm) for label in signal.labels)
+        values = lengths(signal.values)[:, np.newaxis] if kind.magnitude else signal.values
         series = series or labels
         for column, label in enumerate(labels):
             if label in series:
-                time, thinned = thin(signal.time, kind.factor * values[:, column], cuts)
+                time, thinned = thin(signal.time, kind.factor * values[:, column], cuts_of_run)
                 lines.append(Line(place, series.index(label), time, thinned))
-    return Plot(key, kind.title.format(arm=arm), kind.unit, series, tuple(lines), kind.size)
+    return Plot(key, kind.title.format(arm=arm), kind.unit, series, tuple(lines), kind.magnitude)
 
 
 def thin(time: Array, values: Array, cuts: Sequence[float]) -> tuple[Array, Array]:
-    """Return a series with few points in each stretch between ``cuts`` in s, so that all keep their shape."""
+    """Return a series decimated per section between ``cuts`` (s), so that each keeps its shape."""
     edges = [0, *np.searchsorted(time, cuts).tolist(), len(time)]
     parts = [decimate(time[begin:end], values[begin:end], POINTS) for begin, end in itertools.pairwise(edges)]
     return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
 
 
-def _stretches(run: RunData) -> list[float]:
-    """Return the times in s at which a transient begins or has passed."""
+def _cuts(run: RunData) -> list[float]:
+    """Return the times in s at which a transient begins or ends."""
     cuts: list[float] = []
     for span in phase_spans(run):
         begin, end = ns_to_seconds(span.start_ns), ns_to_seconds(span.end_ns)
@@ -159,5 +159,5 @@ def _stretches(run: RunData) -> list[float]:
 
 
 def _short(label: str, arm: str) -> str:
-    """Return the name of a series without the arm, which the title names."""
+    """Return the name of a series without the arm, which the title has."""
     return label.removeprefix(f"{arm}_").replace("_", " ")

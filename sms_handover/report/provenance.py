@@ -1,4 +1,4 @@
-"""What recordings were made with, side by side, and in which of it they differ."""
+"""Provenance of recordings side by side: versions, parameters, schedules, and where they differ."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -11,15 +11,15 @@ from sms_handover.bag.info import BagInfo
 NOT_RECORDED = "-"
 EVERY_NODE = "every node"
 
-_WHERE_RECORDED = {("recorder", "folder")}  # tells where the bag was put, not how the run was made
-_START = "start"  # of a run, never the same
-_HASH_LENGTH = 12  # [characters] of a hash that a reader sees
-_SHARED_BY = 2  # [nodes] from which on a parameter is one of the graph, not of a node
+_WHERE_RECORDED = {("recorder", "folder")}  # where the bag was stored, not how the run was made
+_START = "start"  # of a run, always different
+_HASH_LENGTH = 12  # [characters] of a hash that are shown
+_SHARED_BY = 2  # [nodes] smallest number that can share a parameter
 
 
 @dataclass(frozen=True)
 class ComparedValue:
-    """One item of the provenance of every run; '-' where a bag does not tell."""
+    """One item of the provenance of every run; '-' where a bag lacks it."""
 
     group: str
     name: str
@@ -45,7 +45,7 @@ def compared_versions(infos: Sequence[BagInfo]) -> tuple[ComparedValue, ...]:
 
 
 def compared_parameters(infos: Sequence[BagInfo]) -> tuple[ComparedValue, ...]:
-    """Return the parameters of all nodes of every bag; those that all nodes share come once, first."""
+    """Return the parameters of all nodes of every bag; those that all nodes share come first, once."""
     runs = [info.parameters for info in infos]
     shared = [_shared(parameters) for parameters in runs]
     common = [name for name in shared[0] if all(name in each for each in shared)] if shared else []
@@ -60,7 +60,7 @@ def compared_parameters(infos: Sequence[BagInfo]) -> tuple[ComparedValue, ...]:
 
 
 def schedule_difference(infos: Sequence[BagInfo], names: Sequence[str]) -> str:
-    """Return how the schedules of later bags differ from that of the first, '' if they do not."""
+    """Return the difference of each later schedule from the first, '' if they are the same."""
     texts = [(info.schedule_text or "").splitlines() for info in infos]
     lines: list[str] = []
     for text, name in zip(texts[1:], names[1:], strict=True):
@@ -69,7 +69,7 @@ def schedule_difference(infos: Sequence[BagInfo], names: Sequence[str]) -> str:
 
 
 def _shared(parameters: Mapping[str, Mapping[str, object]]) -> dict[str, object]:
-    """Return the parameters that every node has, with the same value in all of them."""
+    """Return the parameters that every node has with the same value."""
     nodes = list(parameters.values())
     if len(nodes) < _SHARED_BY:
         return {}
@@ -81,16 +81,16 @@ def _shared(parameters: Mapping[str, Mapping[str, object]]) -> dict[str, object]
 
 
 def _text(value: object) -> str:
-    """Return the value of a parameter as it would stand in a YAML file."""
+    """Return the value of a parameter as in a YAML file."""
     return json.dumps(value, ensure_ascii=False, default=str)
 
 
 def _hash(text: str | None) -> str:
-    """Return what tells one text from another."""
+    """Return a short hash of a text, '-' for None."""
     return NOT_RECORDED if text is None else f"sha256 {sha256(text.encode()).hexdigest()[:_HASH_LENGTH]}"
 
 
 def _readable(name: str) -> str:
-    """Return the name of an item of a provenance record for people."""
+    """Return the name of an item of a provenance record for display."""
     package = name.removeprefix("version.")
     return package if package != name else name.replace("_", " ")

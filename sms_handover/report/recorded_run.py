@@ -1,10 +1,12 @@
-"""A recorded run with everything that a report tells of it."""
+"""Recorded run: its arrays and what its bag says about it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from sms_handover.analysis.clearance import TaskTexts
+from sms_handover.analysis.comparison import Comparison, compare
 from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.run.loop_record import LoopRecord, read_loop
 from sms_handover.bag.run.reader import read_run
@@ -20,7 +22,7 @@ _TOLERANCES = ("grasp_position_tolerance", "grasp_angle_tolerance", "grasp_speed
 
 @dataclass(frozen=True, eq=False)
 class RecordedRun:
-    """The arrays of a run under a name, and what its bag says of itself."""
+    """The arrays of a run under a name, and the description of its bag."""
 
     name: str
     data: RunData
@@ -28,17 +30,26 @@ class RecordedRun:
 
     @cached_property
     def loop(self) -> LoopRecord:
-        """Return the course of the run in wall time, read from the bag when it is first asked for."""
+        """Return the wall-clock record of the run, read from the bag on first use."""
         return read_loop(self.info.path)
 
     @property
+    def texts(self) -> TaskTexts | None:
+        """What the run was made with, None if the bag does not carry it or carries something else."""
+        urdf, schedule = self.info.urdf_text, self.info.schedule_text
+        if urdf is None or schedule is None:
+            return None
+        texts = TaskTexts(urdf, schedule)
+        return texts if texts.fit(self.data) else None
+
+    @property
     def law(self) -> str:
-        """Return the control law that the bag tells of, 'unknown' if it tells of none."""
+        """Return the control law in the bag, 'unknown' if there is none."""
         return str(self.info.parameters.get(CONTROLLER, {}).get("law", UNKNOWN_LAW))
 
     @property
     def tolerance(self) -> GraspTolerance | None:
-        """Return how near a grasp had to be, None if the bag does not tell."""
+        """Return the grasp tolerance, None if the bag lacks it."""
         plant = self.info.parameters.get(PLANT, {})
         values = [plant.get(name) for name in _TOLERANCES]
         numbers = [float(value) for value in values if isinstance(value, int | float)]
@@ -46,16 +57,26 @@ class RecordedRun:
 
 
 def read_recorded(name: str, bag: Path) -> RecordedRun:
-    """Return the run in a bag; raises ConfigurationError if the bag cannot be used or is not ours."""
+    """Return the run in a bag; raises ConfigurationError if the bag is damaged or holds no run."""
     try:
         run = RecordedRun(name, read_run(bag), read_info(bag))
-        _ = run.info.parameters, run.info.ledger  # parsed when asked for: what is broken is told now
+        _ = run.info.parameters, run.info.ledger  # parsed on first use: raise their errors here
     except BagError as error:
         raise ConfigurationError(str(error)) from error
     return run
 
 
+def compare_recorded(runs: Sequence[RecordedRun]) -> Comparison:
+    """Return the comparison of recorded runs, with all that their bags carry."""
+    return compare(
+        {run.name: run.data for run in runs},
+        laws={run.name: run.law for run in runs},
+        loops={run.name: run.loop for run in runs},
+        texts={run.name: run.texts for run in runs if run.texts},
+    )
+
+
 def common_tolerance(runs: Sequence[RecordedRun]) -> GraspTolerance | None:
-    """Return how near a grasp had to be if that was the same in all runs, else None."""
+    """Return the grasp tolerance if it was the same in all runs, else None."""
     found = {run.tolerance for run in runs}
     return found.pop() if len(found) == 1 else None

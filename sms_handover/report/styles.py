@@ -1,18 +1,18 @@
-"""How the lines of a run look: NMPC solid, PID dashed, and no two runs alike."""
+"""Line styles of the runs: NMPC solid, PID dashed, and no two runs alike."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sms_handover.analysis.comparison import NMPC, PID
 
-DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")  # as plotly names them
-COLOURS = 6  # those of report.css
-_OF_LAW = {NMPC: 0, PID: 1}  # the place of a law's dash
+DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")  # plotly's names
+COLOURS = 6  # number of them in report.css
+_OF_LAW = {NMPC: 0, PID: 1}  # index of a law's dash
 
 
 @dataclass(frozen=True)
 class RunStyle:
-    """The looks of a run: ``colour`` counts from 0, ``dash`` is a word that plotly knows."""
+    """The line style of a run: ``colour`` is an index from 0, ``dash`` one of plotly's names."""
 
     name: str
     law: str
@@ -21,7 +21,7 @@ class RunStyle:
 
 
 def run_styles(names: Sequence[str], laws: Sequence[str]) -> tuple[RunStyle, ...]:
-    """Return the looks of every run; the first under a law gets the dash of that law."""
+    """Return the line style of every run; the first under a law gets the dash of that law."""
     places: list[int | None] = [
         _OF_LAW.get(law) if law not in laws[:place] else None for place, law in enumerate(laws)
     ]

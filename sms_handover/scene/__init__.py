@@ -1,1 +1,1 @@
-"""What a run looks like: shapes and poses over time, for pictures and for a page that plays them."""
+"""Scene of a run: shapes and poses over time, for figures and for the 3D page."""

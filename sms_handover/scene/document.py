@@ -1,4 +1,4 @@
-"""A scene as JSON values, for the scripts of the page."""
+"""JSON document of a scene, for the scripts of the page."""
 
 import base64
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ Document = dict[str, object]
 
 
 def scene_document(name: str, scene: Scene) -> Document:
-    """Return a whole scene under the name of its run."""
+    """Return a whole scene with the name of its run."""
     blocks = [scene.link_in_world, scene.deputy_in_world[:, None]]
     blocks += [scene.target_in_world[arm][:, None] for arm in scene.arms]
     return {
@@ -31,7 +31,7 @@ def scene_document(name: str, scene: Scene) -> Document:
 def still_document(
     name: str, shapes: Sequence[Shape], links: Sequence[str], arms: Sequence[str], deputy_size: Array
 ) -> Document:
-    """Return what does not change: which bodies there are, in the order of their poses, and their shapes."""
+    """Return the static part: the bodies, in the order of their poses, and their shapes."""
     return {
         "name": name,
         "arms": list(arms),
@@ -42,20 +42,19 @@ def still_document(
 
 
 def moving_document(stamp_ns: Stamps, poses: Array) -> Document:
-    """Return instants (T,) and the poses of all bodies (T, bodies, 7), these in single precision."""
+    """Return instants (T,) and, in single precision, the poses of all bodies (T, bodies, 7)."""
     return {"times": _base64(stamp_ns / NS_PER_S, "<f8"), "poses": _base64(poses, "<f4")}
 
 
 def task_document(phases: Sequence[TaskPhase], events: Sequence[GraspEvent]) -> Document:
-    """Return where phases begin, and what came of grasp commands."""
+    """Return the starts of the phases and the outcomes of the grasp commands."""
     return {
         "phases": [{"name": phase.name, "start": ns_to_seconds(phase.stamp_ns)} for phase in phases],
-        "events": [{"time": ns_to_seconds(event.stamp_ns), "text": _told(event)} for event in events],
+        "events": [{"time": ns_to_seconds(event.stamp_ns), "text": _outcome(event)} for event in events],
     }
 
 
 def _shape(shape: Shape) -> Document:
-    """Return a shape."""
     return {
         "link": shape.link,
         "kind": shape.kind,
@@ -65,8 +64,8 @@ def _shape(shape: Shape) -> Document:
     }
 
 
-def _told(event: GraspEvent) -> str:
-    """Return what came of a grasp command in one line."""
+def _outcome(event: GraspEvent) -> str:
+    """Return the outcome of a grasp command in one line."""
     command = event.command
     what = f"{command.arm} lets go"
     if command.action is not GraspAction.RELEASE:
@@ -77,5 +76,5 @@ def _told(event: GraspEvent) -> str:
 
 
 def _base64(values: npt.ArrayLike, kind: str) -> str:
-    """Return numbers as base64 of their little-endian bytes."""
+    """Return numbers as base64 of their bytes."""
     return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

@@ -1,4 +1,4 @@
-"""Where every link of a described robot is, frame by frame."""
+"""Links of a robot described by URDF text: their poses, frame by frame."""
 
 import numpy as np
 import pinocchio as pin
@@ -11,10 +11,10 @@ from sms_handover.types import Array
 
 
 class DescribedRobot:
-    """A floating robot read from URDF text alone, as a bag carries it."""
+    """A free-floating robot built from URDF text alone, as a bag contains it."""
 
     def __init__(self, urdf: str) -> None:
-        """Read the text; raises RobotDescriptionError if it describes no robot."""
+        """Parse the text; raises RobotDescriptionError if it describes no robot."""
         try:
             self.pin = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
         except (ValueError, RuntimeError) as error:
@@ -24,7 +24,7 @@ class DescribedRobot:
 
     @property
     def arms(self) -> tuple[str, ...]:
-        """Return the arms: every link that is a tool frame belongs to one."""
+        """Return the names of the arms, one per link that is a tool frame."""
         ending = tool_frame("")
         return tuple(link.removesuffix(ending) for link in self.links if link.endswith(ending))
 
@@ -52,7 +52,7 @@ class DescribedRobot:
         return poses
 
     def _configuration_index(self, joint: str) -> int:
-        """Return where a joint's angle lies in the configuration."""
+        """Return the index of a joint's angle in the configuration."""
         if joint not in self.joint_names:
             raise UnknownNameError("joint", joint, self.joint_names, "robot description")
         return int(self.pin.joints[self.pin.getJointId(joint)].idx_q)

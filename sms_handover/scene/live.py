@@ -1,4 +1,4 @@
-"""A scene that grows while a graph runs, for any number of pages that look at it."""
+"""Live scene: it grows while a graph runs, for any number of viewers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ from sms_handover.scene.shapes import read_shapes
 from sms_handover.types import Array, GraspEvent, TaskPhase
 from sms_handover.units import NS_PER_S
 
-_MOST_FRAMES = 45_000  # [-] kept: half an hour at 25 per s, 30 MB
+_MOST_FRAMES = 45_000  # [-] half an hour at 25 per s, 30 MB
 
 
 @dataclass(frozen=True, eq=False)
 class LiveFrame:
-    """One instant: joints (n,) rad by name, and poses (7,) in ``world``, those of the targets per arm."""
+    """One instant: joints (n,) rad by name, and poses (7,) in ``world``; targets per arm."""
 
     stamp_ns: int
     joint_names: tuple[str, ...]
@@ -31,19 +31,19 @@ class LiveFrame:
 
 @dataclass(frozen=True)
 class Seen:
-    """How much of a live scene somebody has: of which run, and how many of its frames."""
+    """How much of a live scene a viewer has: the number of the run, and of its frames."""
 
     run: int = 0
     frames: int = 0
 
 
 class LiveScene:
-    """Takes what a graph publishes and hands out what is new; one thread may add while others read."""
+    """Collects what a graph publishes and hands out what is new; one thread may add while others read."""
 
     def __init__(self, urdf: str, deputy_size: Array, frame_rate: float = FRAME_RATE) -> None:
-        """Describe what there is to see; raises RobotDescriptionError, ConfigurationError."""
+        """Describe robot and deputy; raises RobotDescriptionError, ConfigurationError."""
         if not frame_rate > 0.0:
-            raise ConfigurationError(f"frame rate is {frame_rate:g} 1/s, it must be positive")
+            raise ConfigurationError(f"frame rate is {frame_rate:g} 1/s, it must be > 0")
         self._robot = DescribedRobot(urdf)
         self.arms = self._robot.arms
         self.joint_names = self._robot.joint_names
@@ -52,13 +52,13 @@ class LiveScene:
         self._step_ns = round(NS_PER_S / frame_rate)
         self._changed = Condition()
         self._run = 0
-        self._begin()
+        self._reset()
 
     def add(self, frame: LiveFrame) -> None:
-        """Take an instant, if one is due; a stamp that goes back begins another run."""
+        """Add an instant if one is due; a stamp that goes back starts another run."""
         with self._changed:
             if self._stamps and frame.stamp_ns < self._stamps[-1]:
-                self._begin()
+                self._reset()
             if self._stamps and frame.stamp_ns < self._stamps[-1] + self._step_ns:
                 return
             links = self._robot.poses(
@@ -66,28 +66,28 @@ class LiveScene:
             )[0]
             targets = [frame.target_in_world[arm] for arm in self.arms]
             if len(self._stamps) == _MOST_FRAMES:
-                self._forget_half()
+                self._drop_half()
             self._stamps.append(frame.stamp_ns)
             self._poses.append(np.vstack([links, frame.deputy_in_world, *targets]))
             self._changed.notify_all()
 
-    def enter(self, phase: TaskPhase) -> None:
-        """Take notice of the phase in force; only where it begins counts."""
+    def set_phase(self, phase: TaskPhase) -> None:
+        """Set the current phase; only its start is kept."""
         with self._changed:
             if phase.stamp_ns == 0 and self._stamps and self._stamps[-1] > 0:
-                self._begin()  # its first frame is still to come
+                self._reset()  # its first frame is still to come
             if not self._phases or self._phases[-1].index != phase.index:
                 self._phases.append(phase)
 
-    def tell(self, event: GraspEvent) -> None:
-        """Take notice of what came of a grasp command."""
+    def add_event(self, event: GraspEvent) -> None:
+        """Add the outcome of a grasp command."""
         with self._changed:
             self._events.append(event)
 
-    def news(self, seen: Seen, timeout: float) -> tuple[Document, Seen] | None:
-        """Return what is new to somebody who has ``seen``, whole if another run has begun.
+    def updates(self, seen: Seen, timeout: float) -> tuple[Document, Seen] | None:
+        """Return what is new since ``seen``, the whole scene if another run has started.
 
-        Waits up to ``timeout`` s for it; None if nothing has come.
+        Waits up to ``timeout`` s; None if there is nothing new.
         """
         with self._changed:
             if not self._changed.wait_for(lambda: self._stamps and self._seen != seen, timeout):
@@ -102,18 +102,18 @@ class LiveScene:
 
     @property
     def _seen(self) -> Seen:
-        """Return what somebody has who has everything."""
+        """Return the state of a viewer that is up to date."""
         return Seen(self._run, len(self._stamps))
 
-    def _begin(self) -> None:
-        """Forget the run so far."""
+    def _reset(self) -> None:
+        """Start another run, without frames."""
         self._run += 1
         self._stamps: list[int] = []
         self._poses: list[Array] = []
         self._phases: list[TaskPhase] = []
         self._events: list[GraspEvent] = []
 
-    def _forget_half(self) -> None:
-        """Forget the older half of the frames; everybody gets the rest anew."""
+    def _drop_half(self) -> None:
+        """Drop the older half of the frames; every viewer gets the rest again."""
         self._run += 1
         del self._stamps[: _MOST_FRAMES // 2], self._poses[: _MOST_FRAMES // 2]

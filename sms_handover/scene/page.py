@@ -1,4 +1,4 @@
-"""A page that shows runs in 3D: one file that needs no network and can stand in a frame of another page."""
+"""Page that shows runs in 3D: one self-contained file that also works in a frame of another page."""
 
 import json
 import re
@@ -10,7 +10,7 @@ from sms_handover.errors import ConfigurationError
 from sms_handover.scene.document import Document, scene_document
 from sms_handover.scene.scene import Scene
 
-STREAM = "stream"  # relative to the page: where a live one gets its frames
+STREAM = "stream"  # address of the frames of a live page, relative to the page
 
 _PARTS = {
     "style": "page.css",
@@ -24,12 +24,12 @@ _PARTS = {
 
 
 def animation_html(scenes: Mapping[str, Scene], *, title: str = "Handover", start: float = 0.0) -> str:
-    """Return a page that plays ``scenes``, by the name of each run; it shows ``start`` (s) at first.
+    """Return a page that plays ``scenes``, by the name of each run, beginning at ``start`` (s).
 
-    Of several runs the first is solid and the others are translucent over it; they can also be put side
-    by side. In a frame the page sends ``{type: "time", t}`` to the page around it whenever its time
-    changes, and takes the same message, as well as ``{type: "theme", theme: "light" | "dark"}``.
-    Raises ConfigurationError if there is no scene.
+    Of several runs the first is solid and the others are translucent; they can also be shown side by
+    side. In a frame the page sends ``{type: "time", t}`` to its parent whenever its time changes, and
+    accepts the same message, as well as ``{type: "theme", theme: "light" | "dark"}``. Raises
+    ConfigurationError if there is no scene.
     """
     if not scenes:
         raise ConfigurationError("there is no run to show: give at least one")
@@ -37,12 +37,11 @@ def animation_html(scenes: Mapping[str, Scene], *, title: str = "Handover", star
 
 
 def live_html(*, title: str = "Handover") -> str:
-    """Return a page that shows a run while it goes on; it gets the frames from where it came from."""
+    """Return a page that shows a run live; it gets the frames from the server of the page."""
     return _page(title, {"stream": STREAM})
 
 
 def _page(title: str, data: Document) -> str:
-    """Put the parts of the page together."""
     folder = files("sms_handover.scene") / "web"
     parts = {name: (folder / file).read_text(encoding="utf-8") for name, file in _PARTS.items()}
     parts["data"] = json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")

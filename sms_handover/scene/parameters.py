@@ -7,7 +7,7 @@ from sms_handover.configuration.parameters import parameter
 
 @dataclass(frozen=True)
 class ViewerParameters:
-    """How a running graph is shown; the values are in ``config/viewer.yaml``."""
+    """Parameters of the live view; their values are in ``config/viewer.yaml``."""
 
     port: int = parameter("port of the page on this machine; 0: any free one", minimum=0, maximum=65_535)
     frame_rate: float = parameter(

@@ -1,23 +1,20 @@
-"""The scene of a recorded run, from what its bag carries and nothing else."""
+"""Scene of a recorded run, from its bag alone."""
 
 from pathlib import Path
 
-import yaml
-
 from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.run.reader import read_run
-from sms_handover.configuration.yaml_reader import load
-from sms_handover.errors import BagError
-from sms_handover.model.validation import positive_vector
+from sms_handover.errors import BagError, ScheduleError
 from sms_handover.scene.scene import FRAME_RATE, Scene, make_scene
-from sms_handover.types import Array, read_only
+from sms_handover.trajectory.schedule_text import deputy_size
+from sms_handover.types import Array
 
 
 def read_scene(path: Path, frame_rate: float = FRAME_RATE) -> Scene:
     """Return the scene of the bag at ``path``, its folder or its file.
 
     Raises BagError if the bag cannot be read, holds no run, or lacks the robot description or the
-    schedule that says how large the deputy is.
+    schedule with the size of the deputy.
     """
     info = read_info(path)
     if info.urdf_text is None:
@@ -26,11 +23,8 @@ def read_scene(path: Path, frame_rate: float = FRAME_RATE) -> Scene:
 
 
 def deputy_size_in(info: BagInfo) -> Array:
-    """Return the edges (3,) m of the deputy that the schedule in a bag describes; raises BagError."""
+    """Return the edges (3,) m of the deputy from the schedule in a bag; raises BagError."""
     try:
-        size = load(info.schedule_text or "")["deputy"]["size"]
-        return read_only(positive_vector(size, 3, "deputy: size", "m"))
-    except (yaml.YAMLError, KeyError, TypeError, ValueError) as error:
-        raise BagError(
-            f"{info.path} carries no schedule that says how large the deputy is: {error}"
-        ) from error
+        return deputy_size(info.schedule_text or "")
+    except ScheduleError as error:
+        raise BagError(f"{info.path} carries no schedule with the size of the deputy: {error}") from error

@@ -1,4 +1,4 @@
-"""A run as a moving scene: shapes, and where everything is at a number of instants."""
+"""Scene of a run: shapes, and the poses of everything at a number of instants."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,12 +20,12 @@ FRAME_RATE = 25.0  # [1/s] every second reference period of the shipped paramete
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What there is to see at each of T instants; every pose is a row (7,) in ``world``.
+    """Everything visible at each of T instants; every pose is a row (7,) in ``world``.
 
     ``stamp_ns`` (T,) is simulation time; ``link_in_world`` (T, L, 7) is in the order of ``links``;
     ``deputy_size`` (3,) m are the edges of the deputy and ``deputy_in_world`` (T, 7) is its centre;
-    ``target_in_world`` has (T, 7) per arm. What was not recorded is NaN. ``phases`` has one entry for
-    each beginning of a phase.
+    ``target_in_world`` has (T, 7) per arm. What was not recorded is NaN. ``phases`` has one entry per
+    start of a phase.
     """
 
     shapes: tuple[Shape, ...]
@@ -40,7 +40,6 @@ class Scene:
     grasp_events: tuple[GraspEvent, ...]
 
     def __post_init__(self) -> None:
-        """Make every array read-only and the mapping immutable."""
         self.stamp_ns.setflags(write=False)
         for name in ("link_in_world", "deputy_size", "deputy_in_world"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
@@ -59,10 +58,10 @@ class Scene:
 def make_scene(run: RunData, urdf: str, deputy_size: Array, frame_rate: float = FRAME_RATE) -> Scene:
     """Return the scene of a run at about ``frame_rate`` instants per s of simulation time.
 
-    Each instant is a stamp at which both the state and the references were recorded, so every pose is
-    the recorded one, or follows from the state recorded then, and none is interpolated. Raises
-    ConfigurationError where there is no such stamp, the rate is not positive, or the description does
-    not fit the run.
+    Each instant is a stamp at which both the state and the references were recorded, so every pose is a
+    recorded one or follows from the recorded state, and none is interpolated. Raises ConfigurationError
+    if there is no such stamp, or the rate is not positive, and UnknownNameError if the description lacks
+    a joint of the run.
     """
     stamps = frame_stamps(run, frame_rate)
     robot = DescribedRobot(urdf)
@@ -83,9 +82,9 @@ def make_scene(run: RunData, urdf: str, deputy_size: Array, frame_rate: float = 
 
 
 def frame_stamps(run: RunData, frame_rate: float) -> Stamps:
-    """Return the recorded stamps nearest below an even grid in time, the first and the last included."""
+    """Return the latest recorded stamps not after an even grid in time, the first and the last included."""
     if not (isfinite(frame_rate) and frame_rate > 0.0):
-        raise ConfigurationError(f"frame rate is {frame_rate:g} 1/s, it must be positive")
+        raise ConfigurationError(f"frame rate is {frame_rate:g} 1/s, it must be > 0")
     recorded = np.intersect1d(run.tick_ns, run.reference_ns)
     if not recorded.size:
         raise ConfigurationError("the run has no stamp with both a state and a reference: nothing to show")
@@ -97,6 +96,5 @@ def frame_stamps(run: RunData, frame_rate: float) -> Stamps:
 
 
 def _beginnings(phases: tuple[TaskPhase, ...]) -> list[TaskPhase]:
-    """Return the first entry of each phase."""
     pairs = zip((None, *phases), phases, strict=False)
     return [phase for before, phase in pairs if before is None or before.index != phase.index]

@@ -1,4 +1,4 @@
-"""Serves a live scene to browsers on this machine: the page, and its frames as server-sent events."""
+"""Server of a live scene to browsers on this machine: the page, and its frames as server-sent events."""
 
 import json
 from collections.abc import Callable
@@ -11,22 +11,22 @@ from sms_handover.scene.document import Document
 from sms_handover.scene.live import LiveScene, Seen
 from sms_handover.scene.page import STREAM, live_html
 
-_HOST = "127.0.0.1"  # a page for this machine alone: nobody is asked who he is
-_NAMES = ("127.0.0.1", "localhost")  # by which a browser here asks, at any port, as one may be forwarded
-_LOOK_S = 1.0  # [s] of wall time after which a silent stream sends a sign of life
+_HOST = "127.0.0.1"  # this machine only, so there is no authentication
+_NAMES = ("127.0.0.1", "localhost")  # accepted hosts in a request; any port, as one may be forwarded
+_KEEP_ALIVE_S = 1.0  # [s] of wall time after which an idle stream sends an event
 
-FindScene = Callable[[], LiveScene | str]  # the scene, or what is still waited for
+FindScene = Callable[[], LiveScene | str]  # the scene, or a message about what it waits for
 
 
 class SceneServer:
-    """Serves from threads of its own until it is closed."""
+    """Serves in its own threads until it is closed."""
 
     def __init__(self, find: FindScene, port: int, title: str) -> None:
-        """Begin to serve on ``port``, 0 for any free one; raises ConfigurationError if it is taken."""
+        """Start on ``port``, 0 for any free one; raises ConfigurationError if it is in use."""
         page = live_html(title=title).encode()
 
         class Handler(_Handler):
-            """Answers for this server."""
+            """Handler of this server."""
 
             scene = staticmethod(find)
             content = page
@@ -42,19 +42,19 @@ class SceneServer:
         Thread(target=self._server.serve_forever, daemon=True).start()
 
     def close(self) -> None:
-        """Serve no longer."""
+        """Stop serving."""
         self._server.shutdown()
         self._server.server_close()
 
 
 class _Handler(BaseHTTPRequestHandler):
-    """Answers the two requests there are."""
+    """Handles the two requests: page and stream."""
 
     scene: FindScene
     content: bytes
 
     def do_GET(self) -> None:
-        """Send the page, or frames as they come; nothing to a page of a site that lets its name lead here."""
+        """Send the page or the stream; reject other host names, which a site could point to this machine."""
         name, _, _ = self.headers.get("Host", "").rpartition(":")
         if name not in _NAMES:
             self.send_error(403, f"ask for {_HOST}")
@@ -65,42 +65,39 @@ class _Handler(BaseHTTPRequestHandler):
             self._head("text/event-stream")
             try:
                 self._stream()
-            except OSError:  # the browser has gone
+            except OSError:  # the browser disconnected
                 return
         else:
             self.send_error(404)
 
     def log_message(self, format: str, *arguments: object) -> None:
-        """Say nothing: requests are no news."""
+        """Do not log requests."""
 
     def _head(self, kind: str) -> None:
-        """Begin an answer."""
         self.send_response(200)
         self.send_header("Content-Type", kind)
         self.send_header("Cache-Control", "no-store")
         self.end_headers()
 
     def _stream(self) -> None:
-        """Send what is new, whenever something is."""
+        """Send updates as they come."""
         before, seen = None, Seen()
         while True:
             scene = self.scene()
             if isinstance(scene, str):
                 self._send("waiting", {"text": scene})
-                sleep(_LOOK_S)
+                sleep(_KEEP_ALIVE_S)
                 continue
             if scene is not before:
                 before, seen = scene, Seen()
-            news = scene.news(seen, _LOOK_S)
-            if news is None:
-                self._send("waiting", {"text": "" if seen.frames else "Waiting for a run to begin"})
+            update = scene.updates(seen, _KEEP_ALIVE_S)
+            if update is None:
+                self._send("waiting", {"text": "" if seen.frames else "Waiting for a run to start"})
                 continue
-            document, now = news
+            document, seen = update
             self._send("scene" if "shapes" in document else "frames", document)
-            seen = now
 
     def _send(self, event: str, document: Document) -> None:
-        """Send one event."""
         text = json.dumps(document, allow_nan=False, separators=(",", ":"))
         self.wfile.write(f"event: {event}\ndata: {text}\n\n".encode())
         self.wfile.flush()

@@ -1,4 +1,4 @@
-"""The shapes that a robot description draws, each in the frame of its link."""
+"""Shapes of a robot description: solids, each in the frame of its link."""
 
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -25,9 +25,9 @@ class Shape:
 
 
 def read_shapes(model: pin.Model, urdf: str) -> tuple[Shape, ...]:
-    """Return the visual shapes of a description; ``model`` is Pinocchio's reading of the same text.
+    """Return the visual shapes of a description; ``model`` is Pinocchio's model of the same text.
 
-    Raises RobotDescriptionError on a shape that is neither a box nor a cylinder.
+    Raises RobotDescriptionError for a shape that is neither a box nor a cylinder.
     """
     try:
         drawn = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.VISUAL)
@@ -37,7 +37,7 @@ def read_shapes(model: pin.Model, urdf: str) -> tuple[Shape, ...]:
 
 
 def _shape(model: pin.Model, item: Any) -> Shape:
-    """Return one of Pinocchio's geometry objects, which it places in the joint above the link."""
+    """Return a geometry object, which Pinocchio places relative to the parent joint, in its link's frame."""
     frame = model.frames[item.parentFrame]
     pose_in_link = pose_of(frame.placement.actInv(item.placement))
     red, green, blue, opacity = (float(part) for part in item.meshColor)
@@ -45,12 +45,9 @@ def _shape(model: pin.Model, item: Any) -> Shape:
     solid = item.geometry
     name = type(solid).__name__
     if name == "Box":
-        return Shape(
-            frame.name, "box", tuple(2.0 * float(half) for half in solid.halfSide), pose_in_link, rgba
-        )
+        size = tuple(2.0 * float(half) for half in solid.halfSide)
+        return Shape(frame.name, "box", size, pose_in_link, rgba)
     if name == "Cylinder":
-        size = (float(solid.radius), 2.0 * float(solid.halfLength))
+        size = float(solid.radius), 2.0 * float(solid.halfLength)
         return Shape(frame.name, "cylinder", size, pose_in_link, rgba)
-    raise RobotDescriptionError(
-        f"link {frame.name!r} is drawn as a {name}, only boxes and cylinders can be shown"
-    )
+    raise RobotDescriptionError(f"link {frame.name!r} is drawn as a {name}, it must be a box or a cylinder")

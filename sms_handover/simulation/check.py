@@ -1,4 +1,4 @@
-"""Everything that can be wrong with a scenario, found before anything moves."""
+"""Check of a whole scenario before anything moves."""
 
 from sms_handover.control.controller import check_stability
 from sms_handover.graph.topics import CONTROLLER
@@ -17,10 +17,12 @@ def check_scenario(scenario: Scenario) -> tuple[PhasePrediction, ...]:
     """
     parameters, robot, schedule = scenario.parameters, scenario.robot, scenario.schedule
     make_plant(robot, schedule, parameters.common, parameters.plant)
-    if CONTROLLER in parameters.common.external:
-        return check_feasibility(scenario)
-    make_controller(robot, schedule, parameters.common, parameters.controller)
-    predictions = check_feasibility(scenario)
+    ours = CONTROLLER not in parameters.common.external
+    if ours:
+        make_controller(robot, schedule, parameters.common, parameters.controller)
+    predictions = check_feasibility(robot, schedule, parameters.ik, parameters.plant.grasp_tolerance)
+    if not ours:
+        return predictions
     gains = gains_by_phase(schedule, parameters.controller)
     for one, end in zip(gains, predictions, strict=True):
         q = robot.configuration(end.base_in_world, end.joint_position)

@@ -1,22 +1,23 @@
-"""Whether a schedule can be carried out, worked out before anything moves."""
+"""Feasibility of a schedule, checked before anything moves."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
 from sms_handover.errors import ScheduleError
 from sms_handover.ik.levenberg_marquardt import solve_ik
+from sms_handover.ik.parameters import IkParameters
 from sms_handover.model.poses import pose_distance
 from sms_handover.model.reduced import base_twist_per_joint_rate
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.plant.deputy import MasslessDeputy
+from sms_handover.plant.deputy import GraspTolerance, MasslessDeputy
 from sms_handover.plant.grasping import answer
-from sms_handover.simulation.scenario import Scenario
 from sms_handover.simulation.wiring import initial_joints
 from sms_handover.trajectory.generator import goal_in_world
-from sms_handover.trajectory.schedule import GraspFrameTarget, JointTarget, Phase, ToolTarget
-from sms_handover.types import Array, GraspStatus, IkRequest, Pose, Twist, read_only
+from sms_handover.trajectory.schedule import GraspFrameTarget, JointTarget, Phase, Schedule, ToolTarget
+from sms_handover.types import Array, GraspStatus, IkRequest, Pose, Twist, freeze
 from sms_handover.units import DEG_PER_RAD, MM_PER_M
 
 _PATH_STEPS = 64  # [-] midpoint steps along a joint path; their error is far below a grasp tolerance
@@ -26,12 +27,13 @@ _SETTLED_OUT_OF_REACH = 1e-4  # [m, rad] the same where only the size of a miss 
 _RESTARTS = 10  # [-] random configurations tried where the present one does not lead to the target
 _WORTH_FOLLOWING = 0.9  # [-] share of the best error energy below which a restart is followed up
 _SEED = 20250101  # [-] so that a schedule always gets the same verdict
+ANY_GRASP = GraspTolerance(inf, inf, inf)
 _AT_REST = Twist(np.zeros(3), np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False)
 class PhasePrediction:
-    """Where a phase will end: joint angles (n,) rad, base pose, and how far the base has turned.
+    """The end of a phase: joint angles (n,) rad, base pose, and rotation of the base.
 
     ``base_rotation_angle`` in rad is counted from the start of the run. ``restarts`` is how many random
     configurations were tried before one led to the targets; a run has only the first try, so anything
@@ -45,8 +47,7 @@ class PhasePrediction:
     restarts: int
 
     def __post_init__(self) -> None:
-        """Copy the array and make it read-only."""
-        object.__setattr__(self, "joint_position", read_only(self.joint_position))
+        freeze(self, "joint_position")
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,15 +65,17 @@ class _Rest:
         return sum(position**2 + angle**2 for position, angle in self.missed.values())
 
 
-def check_feasibility(scenario: Scenario) -> tuple[PhasePrediction, ...]:
+def check_feasibility(
+    robot: RobotModel, schedule: Schedule, ik: IkParameters, tolerance: GraspTolerance = ANY_GRASP
+) -> tuple[PhasePrediction, ...]:
     """Return where each phase will end; raises ScheduleError where a target or a grasp is out of reach.
 
     Assumes that a phase ends at rest, at its targets, on a straight path in joint space, at zero
     momentum: the base's displacement then follows from the joint path alone, whatever its timing.
     A grasp is checked at the tool pose that the phase before ends at. Poses on the way to a target
-    are not checked.
+    are not checked. Without a ``tolerance`` every grasp holds.
     """
-    return _Walk(scenario).predictions()
+    return _Walk(robot, schedule, ik, tolerance).predictions()
 
 
 def base_after(robot: RobotModel, base_in_world: Pose, start: Array, end: Array) -> Pose:
@@ -89,17 +92,16 @@ def base_after(robot: RobotModel, base_in_world: Pose, start: Array, end: Array)
 
 
 class _Walk:
-    """A walk through the phases from rest to rest."""
+    """Goes through the phases from rest to rest."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(
+        self, robot: RobotModel, schedule: Schedule, ik: IkParameters, tolerance: GraspTolerance
+    ) -> None:
         """Begin at the start of the schedule."""
-        self._robot, self._schedule = scenario.robot, scenario.schedule
-        self._ik = scenario.parameters.ik
-        self._tolerance = scenario.parameters.plant.grasp_tolerance
-        deputy = self._schedule.deputy
+        self._robot, self._schedule, self._ik, self._tolerance = robot, schedule, ik, tolerance
+        deputy = schedule.deputy
         self._deputy = MasslessDeputy(deputy.deputy_in_world, deputy.grasp_frames)
-        self._base = self._schedule.base_in_world
-        self._joints = initial_joints(self._robot, self._schedule)
+        self._base, self._joints = schedule.base_in_world, initial_joints(robot, schedule)
 
     def predictions(self) -> tuple[PhasePrediction, ...]:
         """Return the prediction of every phase."""

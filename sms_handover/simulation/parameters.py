@@ -29,6 +29,10 @@ class CommonParameters:
     )
     robot: str = parameter("path of the robot description; empty: the package's robot.yaml")
     schedule: str = parameter("path of the task schedule; empty: the package's handover.yaml")
+    values: tuple[str, ...] = parameter(
+        "values of robot, deputy and schedule by dotted path that replace those of the files, such as "
+        "robot.base.mass:=300 or schedule.phases.carry.duration:=12"
+    )
 
     dynamics: str = parameter(
         "what works out the equations of motion; pinocchio: its algorithms; compiled: the same equations as "

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sms_handover.graph.events import RunEvent
+from sms_handover.graph.message_constants import CONSTANTS
 from sms_handover.model.conserved import ConservedQuantities
 from sms_handover.run_data import RunData
 from sms_handover.types import (
@@ -21,8 +22,6 @@ from sms_handover.types import (
 )
 
 N = TypeVar("N", bound=np.generic)
-
-IK_STATUS_NUMBER: Mapping[IkStatus, int] = {status: number for number, status in enumerate(IkStatus)}
 
 
 class RunRecorder:
@@ -82,7 +81,7 @@ class RunRecorder:
         for index, arm in enumerate(self._arms):
             _put(targets_in_world[arm], self._poses[0, index, row])
         if ik is not None:
-            self._ik_status[row] = IK_STATUS_NUMBER[ik]
+            self._ik_status[row] = CONSTANTS[ik]
         self._phases.append(phase)
         self._period += 1
 

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TypeVar
 
 from sms_handover.configuration.package_files import config_file
-from sms_handover.configuration.parameters import EVERY_NODE, build, read_parameter_files, read_yaml
-from sms_handover.configuration.yaml_reader import line_in
+from sms_handover.configuration.parameters import EVERY_NODE, build, read_parameter_files
+from sms_handover.configuration.sections import Section
+from sms_handover.configuration.values import DOCUMENTS, written
 from sms_handover.control.parameters import ControllerParameters
 from sms_handover.errors import UnknownNameError
 from sms_handover.graph.topics import CONTROLLER, IK, NODES, PLANT, PLAYER, TOPIC_RECORDER, TRAJECTORY, VIEWER
@@ -60,7 +61,7 @@ def load_parameters(overrides: Overrides | None = None, files: Sequence[Path] = 
     known = (COMMON, PLANT, TRAJECTORY, IK, CONTROLLER)
     for node in overrides:
         if node not in known:
-            raise UnknownNameError("node", node, known, "parameter overrides")
+            raise UnknownNameError("node", node, (*known, *DOCUMENTS), "parameter overrides")
 
     for path in files:
         _reject_misspelt(path)
@@ -88,26 +89,34 @@ def _reject_misspelt(path: Path) -> None:
 
     A file may have sections for nodes of others, so only what looks like a slip is refused.
     """
-    document = read_yaml(path)
-    for section in map(str, document):
+    document = Section.read(path)
+    for section in document.keys:
         if section not in _SECTIONS and get_close_matches(section, _SECTIONS, n=1, cutoff=_SLIP):
-            raise UnknownNameError("node", section, _SECTIONS, f"{path}{line_in(document, section)}")
+            raise UnknownNameError("node", section, _SECTIONS, document.where(section))
 
 
 def load_scenario(overrides: Overrides | None = None, files: Sequence[Path] = ()) -> Scenario:
-    """Return the scenario that parameters, robot description and schedule make, all checked."""
-    parameters = load_parameters(overrides, files)
+    """Return the scenario that parameters, robot description and schedule make, all checked.
+
+    ``overrides`` maps ``robot``, ``deputy`` and ``schedule`` to values by dotted path too, such as
+    ``{"robot": {"arms.arm_a.gripper.mass": 0.9}}``.
+    """
+    of_nodes = {node: dict(values) for node, values in (overrides or {}).items()}
+    values = [text for document in DOCUMENTS for text in written(document, of_nodes.pop(document, {}))]
+    if values:
+        of_nodes.setdefault(COMMON, {})["values"] = values
+    parameters = load_parameters(of_nodes, files)
     robot = load_robot_model(parameters.common)
     schedule = load_task(parameters.common, robot)
-    return Scenario(parameters, robot, schedule, overrides or {})
+    return Scenario(parameters, robot, schedule, of_nodes)
 
 
 def load_robot_model(common: CommonParameters) -> RobotModel:
     """Return the model of the robot that the parameters name."""
-    return RobotModel.load(Path(common.robot) if common.robot else None)
+    return RobotModel.load(Path(common.robot) if common.robot else None, common.values)
 
 
 def load_task(common: CommonParameters, robot: RobotModel) -> Schedule:
     """Return the schedule that the parameters name, checked against the robot."""
     path = Path(common.schedule) if common.schedule else config_file("handover.yaml")
-    return load_schedule(path, robot, common.reference_ns)
+    return load_schedule(path, robot, common.reference_ns, common.values)

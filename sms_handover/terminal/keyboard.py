@@ -1,4 +1,4 @@
-"""Keys from a terminal without waiting for Enter; the terminal is always left as it was found."""
+"""Keyboard: keys from a terminal without waiting for Enter; its settings are always restored."""
 
 import os
 import select
@@ -6,9 +6,9 @@ import signal
 import sys
 import termios
 import tty
-from contextlib import AbstractContextManager, suppress
+from contextlib import suppress
 from enum import Enum
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any
 
 
@@ -22,18 +22,17 @@ class Key(Enum):
 
 
 _APPLICATION_MODE = (b"\x1bO", b"\x1b[")  # some terminals send ESC O A instead of ESC [ A
-_MOST = 256  # [byte] read at once
+_READ_SIZE = 256  # [byte]
 
 
-class Keyboard(AbstractContextManager["Keyboard"]):
-    """The keys pressed on standard input; none if that is no terminal, or not ours to read.
+class Keyboard:
+    """The keys pressed on standard input; none if it is no terminal or another process group owns it.
 
-    While it is entered the terminal hands over single keys and does not echo them. It is put back on
-    leaving, whatever happened in between, and while the process is stopped (Ctrl-Z).
+    Within the context the terminal delivers single keys and does not echo them. Its settings are restored
+    on leaving, whatever happened in between, and while the process is stopped (Ctrl-Z).
     """
 
     def __init__(self, *, wanted: bool = True) -> None:
-        """Look at standard input; nothing is changed yet."""
         self._found: list[Any] | None = None
         self._stop_handler: Any = None
         self._fd = _terminal() if wanted else None
@@ -44,21 +43,15 @@ class Keyboard(AbstractContextManager["Keyboard"]):
         return self._fd is not None
 
     def __enter__(self) -> "Keyboard":
-        """Take single keys from now on."""
         if self._fd is not None:
-            self._take()
+            self._set_up()
             self._stop_handler = signal.signal(signal.SIGTSTP, self._on_stop)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         if self._stop_handler is not None:
             signal.signal(signal.SIGTSTP, self._stop_handler)
-        self._give_back()
+        self._restore()
 
     def pressed(self) -> list[Key]:
         """Return the keys pressed since the last call."""
@@ -72,37 +65,35 @@ class Keyboard(AbstractContextManager["Keyboard"]):
         return keys
 
     def _read(self) -> bytes:
-        """Return the bytes that wait; none in the background, and never any once the terminal is gone."""
+        """Return the pending bytes; none in the background or after the terminal was closed."""
         if self._fd is None or _terminal() is None:
             return b""
         if self._found is None:  # stopped, then continued in the background, and in the foreground again
-            self._take()
+            self._set_up()
         if not select.select([self._fd], [], [], 0)[0]:
             return b""
         try:
-            data = os.read(self._fd, _MOST)
+            data = os.read(self._fd, _READ_SIZE)
         except OSError:
             data = b""
         if not data:
             self._fd = None
         return data.replace(*_APPLICATION_MODE)
 
-    def _take(self) -> None:
-        """Have the terminal hand over single keys."""
+    def _set_up(self) -> None:
         if self._fd is not None:
             self._found = termios.tcgetattr(self._fd)
             tty.setcbreak(self._fd, termios.TCSANOW)
 
-    def _give_back(self) -> None:
-        """Put the terminal back as it was found."""
+    def _restore(self) -> None:
         if self._found is not None:
             with suppress(termios.error):  # it may be gone
                 termios.tcsetattr(sys.stdin.fileno(), termios.TCSANOW, self._found)
             self._found = None
 
     def _on_stop(self, number: int, frame: FrameType | None) -> None:
-        """Stop as Ctrl-Z asks, with the terminal as it was; take it again when the process goes on."""
-        self._give_back()
+        """Stop as Ctrl-Z asks, with the terminal restored; set it up again when the process continues."""
+        self._restore()
         signal.signal(signal.SIGTSTP, signal.SIG_DFL)
         os.kill(os.getpid(), signal.SIGTSTP)
         signal.signal(signal.SIGTSTP, self._on_stop)

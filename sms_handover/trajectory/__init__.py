@@ -1,1 +1,1 @@
-"""The task schedule and what it makes of it: phases, target poses, joint references."""
+"""Trajectory of a task: schedule, phases, target poses, joint references."""

@@ -1,4 +1,4 @@
-"""The trajectory generator: from the schedule and the present state to targets and joint reference."""
+"""Generator of the trajectory: schedule and current state to targets and joint reference."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -31,18 +31,18 @@ from sms_handover.types import (
     RobotState,
     TaskPhase,
     Twist,
+    freeze,
     frozen,
-    read_only,
 )
 from sms_handover.units import ns_to_seconds
 
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """What the arms shall do at one instant.
+    """Targets of the arms at one instant.
 
     Arms led by their tool have pose and twist in ``world``; ``joint_position`` and ``joint_velocity``
-    (n,) hold the desired joints of the others, and the present ones for arms led by their tool.
+    (n,) have the desired joints of the others, and the current ones of arms led by their tool.
     """
 
     stamp_ns: int
@@ -52,21 +52,18 @@ class Targets:
     joint_velocity: Array
 
     def __post_init__(self) -> None:
-        """Make arrays and mappings immutable."""
         object.__setattr__(self, "tool_in_world", MappingProxyType(dict(self.tool_in_world)))
         object.__setattr__(self, "tool_twist_in_world", MappingProxyType(dict(self.tool_twist_in_world)))
-        object.__setattr__(self, "joint_position", read_only(self.joint_position))
-        object.__setattr__(self, "joint_velocity", read_only(self.joint_velocity))
+        freeze(self, "joint_position", "joint_velocity")
 
 
 class TrajectoryGenerator:
-    """Walks through a schedule; each reference period it gives targets, an IK request and a reference.
+    """Follows a schedule; each reference period it gives targets, an IK request and a reference.
 
-    Inverse kinematics is not solved here but asked for, because it is a service of its own.
+    Inverse kinematics is solved by the caller: in the graph it is a service.
     """
 
     def __init__(self, robot: RobotModel, schedule: Schedule, parameters: TrajectoryParameters) -> None:
-        """Set up at the start of the schedule."""
         self._robot = robot
         self._schedule = schedule
         self._progress = TaskProgress(schedule, parameters)
@@ -75,13 +72,13 @@ class TrajectoryGenerator:
         self.reset()
 
     def reset(self) -> None:
-        """Go back to the start of the schedule."""
+        """Return to the start of the schedule."""
         self._progress.reset()
         self._joints_at_start: Array = np.zeros(self._robot.n_joints)
         self._tools_at_start: Mapping[str, Pose] = {}
 
     def targets(self, state: RobotState, deputy_in_world: Pose) -> tuple[TaskPhase, Targets]:
-        """Return the phase in force and the targets of the arms; enters a new phase when it is due."""
+        """Return the current phase and the targets of the arms; starts the next phase when it is due."""
         stage = self._progress.at(state.stamp_ns)
         if stage.begins:
             self._joints_at_start = state.joint_position
@@ -90,36 +87,36 @@ class TrajectoryGenerator:
 
     @property
     def awaits_grasps(self) -> bool:
-        """Whether a command has been given of which it is not known yet what came of it."""
+        """Whether the outcome of a command is still unknown."""
         return self._progress.awaits_grasps
 
     def grasped(self, events: Iterable[GraspEvent]) -> None:
-        """Take what came of the commands that were given last."""
+        """Record outcomes of grasp commands."""
         self._progress.grasped(events)
 
     def solved(self, *, converged: bool) -> None:
-        """Take how inverse kinematics ended for the targets that were given last."""
+        """Record whether IK converged for the latest targets."""
         self._progress.solved(converged=converged)
 
     def take_decisions(self) -> tuple[RunEvent, ...]:
-        """Return what has been decided about the task since this was asked last."""
+        """Return the decisions about the task since the last call."""
         return self._progress.take_decisions()
 
     def ik_request(self, state: RobotState, targets: Targets) -> IkRequest:
-        """Return what to ask of inverse kinematics: the base locked where it is, the present joints as seed.
+        """Return the IK request: the base locked at its pose, the current joints as seed.
 
-        Arms that are led by their joints take part with their desired joints.
+        Arms led by their joints have their desired joints there.
         """
         return IkRequest(state.base_in_world, targets.joint_position, targets.tool_in_world)
 
     def reference(
         self, state: RobotState, targets: Targets, joint_position: Array
     ) -> tuple[JointReference, Mapping[str, Pose]]:
-        """Return the joint reference for the joint angles that inverse kinematics found.
+        """Return the joint reference for the joint angles of IK, and the target pose of every tool.
 
-        Also returns the target pose of every tool, for arms led by their joints the one that these
-        joints give. The joint rates bring about the desired tool twists with the reaction of
-        the base accounted for: the damped inverse of the generalised Jacobian [Umetani1989].
+        For arms led by their joints that is the pose at these joints. The joint rates give the desired
+        tool twists including the reaction of the base: the damped inverse of the generalised Jacobian
+        [Umetani1989].
         """
         robot, led = self._robot, targets.tool_in_world
         others = [arm for arm in robot.arms if arm not in led]
@@ -153,7 +150,7 @@ class TrajectoryGenerator:
         return Targets(state.stamp_ns, poses, twists, frozen(position), frozen(velocity))
 
     def _resolve_rates(self, state: RobotState, targets: Targets, velocity: Array) -> Array:
-        """Return the joint rates with those of tool-led arms solved for from the desired twists."""
+        """Return the joint rates, those of tool-led arms resolved from the desired twists."""
         robot = self._robot
         led = [arm for arm in robot.arms if arm in targets.tool_twist_in_world]
         jacobian = generalized_jacobian(robot, state.q, *led)
@@ -171,7 +168,7 @@ class TrajectoryGenerator:
 def goal_in_world(
     target: ToolTarget | GraspFrameTarget, deputy: DeputyDescription, deputy_in_world: Pose
 ) -> Pose:
-    """Return the pose in ``world`` that a tool shall reach, with the deputy where it is."""
+    """Return the target pose of a tool in ``world`` for a pose of the deputy."""
     if isinstance(target, ToolTarget):
         return target.tool_in_world
     frame = deputy.grasp_frames[target.grasp_frame]
@@ -179,7 +176,7 @@ def goal_in_world(
 
 
 def _joint_motion(start: Array, end: Array, progress: Progress) -> tuple[Array, Array]:
-    """Return joint position and velocity on the straight way between two joint configurations."""
+    """Return joint position and velocity on the straight line between two configurations."""
     return start + progress.fraction * (end - start), progress.rate * (end - start)
 
 

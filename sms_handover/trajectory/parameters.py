@@ -8,7 +8,7 @@ from sms_handover.trajectory.time_law import TIME_LAWS
 
 @dataclass(frozen=True)
 class TrajectoryParameters:
-    """How targets are approached; the numbers are in ``config/trajectory.yaml``."""
+    """Parameters of the generator; the numbers are in ``config/trajectory.yaml``."""
 
     time_law: str = parameter(
         "step: the target jumps when a phase begins; quintic: it moves there from rest to rest",

@@ -1,4 +1,4 @@
-"""A path from one pose to another: a straight line for the origin, the shortest turn for the axes."""
+"""Pose path: a straight line for the origin, the shortest rotation for the axes."""
 
 from dataclasses import dataclass
 

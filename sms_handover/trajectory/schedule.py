@@ -1,4 +1,4 @@
-"""The task schedule as values: who goes where, when, and who holds the deputy."""
+"""Schedule of a task as values: targets of every arm over time, and grasps."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,35 +6,34 @@ from enum import Enum
 from types import MappingProxyType
 
 from sms_handover.model.deputy import DeputyDescription
-from sms_handover.types import Array, GraspCommand, Pose, read_only
+from sms_handover.types import Array, GraspCommand, Pose, freeze, read_only
 
 
 @dataclass(frozen=True)
 class Hold:
-    """Keep the joint angles the arm has when the phase begins."""
+    """Hold the joint angles from the start of the phase."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointTarget:
-    """Go to joint angles (joints of the arm,) rad."""
+    """Move to joint angles (joints of the arm,) rad."""
 
     position: Array
 
     def __post_init__(self) -> None:
-        """Copy the array and make it read-only."""
-        object.__setattr__(self, "position", read_only(self.position))
+        freeze(self, "position")
 
 
 @dataclass(frozen=True, eq=False)
 class ToolTarget:
-    """Bring the tool to a pose in ``world``."""
+    """Move the tool to a pose in ``world``."""
 
     tool_in_world: Pose
 
 
 @dataclass(frozen=True, eq=False)
 class GraspFrameTarget:
-    """Bring the tool to a pose relative to a grasp frame of the deputy, wherever the deputy is."""
+    """Move the tool to a pose relative to a grasp frame of the deputy."""
 
     grasp_frame: str
     tool_in_grasp_frame: Pose
@@ -44,7 +43,7 @@ ArmTarget = Hold | JointTarget | ToolTarget | GraspFrameTarget
 
 
 class MissAction(Enum):
-    """What happens when a grasp command of a phase does not succeed; the value is the word in the file."""
+    """What to do when a grasp of a phase does not succeed; the value is the word in the file."""
 
     CONTINUE = "continue"
     ABORT = "abort"
@@ -53,7 +52,7 @@ class MissAction(Enum):
 
 @dataclass(frozen=True)
 class OnMiss:
-    """What a phase does about a grasp that misses, and for a retry how often at most."""
+    """What to do when a grasp misses, and the most retries."""
 
     action: MissAction = MissAction.CONTINUE
     retries: int = 0
@@ -61,7 +60,7 @@ class OnMiss:
 
 @dataclass(frozen=True, eq=False)
 class Phase:
-    """One phase: its time span, the target of every arm, and what happens at its first instant.
+    """One phase: its time span, the target of every arm, and the commands at its start.
 
     ``motion_ns`` is how long a smooth time law takes to reach the targets; ``gains`` has, per
     control law, the gains that differ from the controller's own while the phase lasts.
@@ -83,7 +82,7 @@ class Phase:
 
 @dataclass(frozen=True, eq=False)
 class Schedule:
-    """A whole task: where everything starts and the phases in the order of time.
+    """A whole task: the initial state, and the phases in order.
 
     ``initial_joints`` has the joint angles per arm. ``text`` is the file as read, for the record.
     """
@@ -95,7 +94,6 @@ class Schedule:
     text: str
 
     def __post_init__(self) -> None:
-        """Copy the arrays and make them and the mapping immutable."""
         joints = {arm: read_only(values) for arm, values in self.initial_joints.items()}
         object.__setattr__(self, "initial_joints", MappingProxyType(joints))
 
@@ -105,6 +103,6 @@ class Schedule:
         return self.phases[-1].end_ns
 
     def phase_index(self, stamp_ns: int) -> int:
-        """Return the index of the phase in force at a time; after the end it is the last one."""
+        """Return the index of the phase at a time; after the end it is the last one."""
         started = [index for index, phase in enumerate(self.phases) if phase.start_ns <= stamp_ns]
         return started[-1]

@@ -1,4 +1,4 @@
-"""Where in the schedule a run is, with phases that are done again or given up."""
+"""Progress of a task in its schedule, with phases that are repeated or fail."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ Figures = tuple[float, float, str]  # value, limit, unit
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """What is in force at one instant: the phase, when it began, its targets, whether it begins now."""
+    """The state of the task at one instant: phase, its start and targets, whether it begins now."""
 
     task: TaskPhase
     phase: Phase
@@ -27,7 +27,7 @@ class Stage:
 
 @dataclass
 class _Issue:
-    """The commands that a phase has given, and what has become known of them."""
+    """The commands of a phase, and their outcomes so far."""
 
     index: int
     commands: tuple[GraspCommand, ...]
@@ -35,33 +35,32 @@ class _Issue:
 
     @property
     def answered(self) -> bool:
-        """Whether it is known of every command what came of it."""
+        """Whether the outcome of every command is known."""
         return len(self.answers) == len(self.commands)
 
     @property
     def missed(self) -> list[GraspEvent]:
-        """Return what came of those commands that did not succeed."""
+        """Outcomes of the commands that did not succeed."""
         return [event for event in self.answers.values() if event.status is not GraspStatus.SUCCEEDED]
 
 
 class TaskProgress:
-    """Walks through a schedule; what came of grasps and of inverse kinematics decides how it goes on.
+    """Follows a schedule, depending on the outcomes of grasps and of inverse kinematics.
 
-    A grasp that misses leads to what ``on_miss`` of its phase says. A retry does the phase before again,
-    from where the robot is, then the phase itself with those of its commands that have not
-    succeeded; all that follows is later by that time. A phase that is given up holds the joints, and the
-    task ends ``failure_hold`` later. Decisions fall on reference periods, so a run depends on nothing else.
+    A miss is handled as ``on_miss`` of its phase says. A retry repeats the phase before, from where the
+    robot is, then the phase itself with those of its commands that have not succeeded; everything later
+    shifts by that time. A phase that fails holds the joints, and the task ends ``failure_hold`` later.
+    Decisions are made on reference periods, so that a run depends on nothing else.
     """
 
     def __init__(self, schedule: Schedule, parameters: TrajectoryParameters) -> None:
-        """Set up at the start of the schedule."""
         self._schedule = schedule
         self._most_ik_failures = parameters.ik_failures
         self._failure_hold_ns = seconds_to_ns(parameters.failure_hold)
         self.reset()
 
     def reset(self) -> None:
-        """Go back to the start of the schedule."""
+        """Return to the start of the schedule."""
         phases = self._schedule.phases
         self._shift_ns = 0
         self._end_ns = self._schedule.end_ns
@@ -76,27 +75,27 @@ class TaskProgress:
 
     @property
     def awaits_grasps(self) -> bool:
-        """Whether a command has been given of which it is not known yet what came of it."""
+        """Whether the outcome of a command is still unknown."""
         return any(not issue.answered for issue in self._issues)
 
     def grasped(self, events: Iterable[GraspEvent]) -> None:
-        """Take what came of commands; in real time that may be after the next phase has begun."""
+        """Record outcomes of commands; in real time perhaps after the next phase has begun."""
         for event in events:
             issue = next((i for i in self._issues if event.command in i.commands and not i.answered), None)
             if issue is not None:
                 issue.answers[event.command] = event
 
     def solved(self, *, converged: bool) -> None:
-        """Take how inverse kinematics ended for the targets that were given last."""
+        """Record whether IK converged for the latest targets."""
         self._ik_failures = 0 if converged else self._ik_failures + 1
 
     def take_decisions(self) -> tuple[RunEvent, ...]:
-        """Return what has been decided since this was asked last."""
+        """Return the decisions since the last call."""
         taken, self._decisions = tuple(self._decisions), []
         return taken
 
     def at(self, stamp_ns: int) -> Stage:
-        """Return what is in force at a time; decides first what follows from what was taken since."""
+        """Return the stage at a time, after deciding on the outcomes recorded since the last call."""
         if not self._failed:
             self._decide(stamp_ns)
         if self._failed and self._now:
@@ -122,7 +121,7 @@ class TaskProgress:
         return commands
 
     def _decide(self, stamp_ns: int) -> None:
-        """Decide about grasps that did not succeed, and about targets that cannot be reached."""
+        """Decide on grasps that did not succeed, and on targets that are not reached."""
         if self._now is None:
             return
         index = self._now[0]
@@ -136,24 +135,24 @@ class TaskProgress:
             self._fail(stamp_ns, index, IK_FAILED, detail, figures)
 
     def _on_answers(self, stamp_ns: int, issue: "_Issue") -> None:
-        """Do what a phase says about its commands that did not succeed, if there are any."""
+        """Apply the policy of a phase if any of its commands did not succeed."""
         index, missed = issue.index, issue.missed
         if not missed:
             return
         phase, what = self._schedule.phases[index], _in_words(missed[0])
         policy, done = phase.on_miss, self._retries[index]
-        can_be_mended = any(event.status is GraspStatus.MISSED for event in missed)
+        can_be_retried = any(event.status is GraspStatus.MISSED for event in missed)
         if policy.action is MissAction.CONTINUE:
-            self._tell(stamp_ns, index, GRASP_MISSED, Severity.WARNING, f"{what}; the task goes on")
-        elif policy.action is MissAction.RETRY and can_be_mended and done < policy.retries:
+            self._report(stamp_ns, index, GRASP_MISSED, Severity.WARNING, f"{what}; the task continues")
+        elif policy.action is MissAction.RETRY and can_be_retried and done < policy.retries:
             before = self._schedule.phases[index - 1]
             self._retries[index] += 1
             self._due[index] = tuple(event.command for event in missed)
-            self._take_back()
+            self._restore_due()
             self._shift_ns = stamp_ns - before.start_ns
             self._end_ns = self._schedule.end_ns + self._shift_ns
-            detail = f"{what}; phase {before.name!r} is done again"
-            self._tell(
+            detail = f"{what}; phase {before.name!r} is repeated"
+            self._report(
                 stamp_ns,
                 index,
                 PHASE_RETRIED,
@@ -165,20 +164,20 @@ class TaskProgress:
             detail = f"{what}; the joints are held"
             self._fail(stamp_ns, index, GRASP_FAILED, detail, (done + 1, policy.retries + 1, "misses"))
 
-    def _take_back(self) -> None:
-        """Have the commands of later phases, begun before it was known that a grasp missed, due again."""
+    def _restore_due(self) -> None:
+        """Make the commands of later phases due again that began before the miss was known."""
         for later in self._issues:
             succeeded = {c for c, e in later.answers.items() if e.status is GraspStatus.SUCCEEDED}
             self._due[later.index] = tuple(c for c in later.commands if c not in succeeded)
         self._issues.clear()
 
     def _fail(self, stamp_ns: int, index: int, kind: str, detail: str, figures: Figures) -> None:
-        """Give the task up."""
+        """End the task as failed."""
         self._failed = True
         self._end_ns = stamp_ns + self._failure_hold_ns
-        self._tell(stamp_ns, index, kind, Severity.ERROR, detail, figures)
+        self._report(stamp_ns, index, kind, Severity.ERROR, detail, figures)
 
-    def _tell(
+    def _report(
         self,
         stamp_ns: int,
         index: int,
@@ -187,7 +186,7 @@ class TaskProgress:
         detail: str,
         figures: Figures = (nan, nan, ""),
     ) -> None:
-        """Note a decision."""
+        """Record a decision."""
         phase, (value, limit, unit) = self._schedule.phases[index].name, figures
         self._decisions.append(
             RunEvent(stamp_ns, TRAJECTORY, kind, severity, detail, phase, float(value), float(limit), unit)
@@ -195,6 +194,6 @@ class TaskProgress:
 
 
 def _in_words(event: GraspEvent) -> str:
-    """Return what came of a command as a sentence."""
+    """Return the outcome of a command in words."""
     command = event.command
     return f"{command.action.value} by {command.arm} {event.status.value} ({event.detail})"

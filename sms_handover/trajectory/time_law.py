@@ -1,4 +1,4 @@
-"""Scalar time laws: how much of a motion is done, and how fast, as a function of time."""
+"""Time laws: progress of a motion and its rate as a function of time."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

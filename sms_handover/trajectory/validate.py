@@ -1,31 +1,31 @@
-"""Checks of a schedule that need no robot motion: times, names, and who holds the deputy when."""
+"""Validation of a schedule without robot motion: times, names, and who holds the deputy when."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
+from sms_handover.configuration.sections import Section
 from sms_handover.errors import ScheduleError
 from sms_handover.trajectory.schedule import GraspFrameTarget, Phase
 from sms_handover.types import GraspAction, GraspCommand
 from sms_handover.units import ns_to_seconds
 
 
-def check_phases(path: Path, phases: Sequence[Phase], lines: Sequence[int], period_ns: int) -> None:
-    """Raise ScheduleError, naming line and phase, where the phases cannot be carried out in order.
+def check_phases(phases: Sequence[Phase], sections: Sequence[Section], period_ns: int) -> None:
+    """Raise ScheduleError with line and phase where the phases cannot be carried out in order.
 
     Phases begin and end on a reference period, names are unique, and at every instant at
     most one arm holds the deputy: no grasp while it is held, no release by an arm that does not hold it.
-    The arm that holds it is not sent to a grasp frame, which would run away from it.
+    The arm that holds it is not sent to a grasp frame, which would move with that arm.
     """
     holder = ""
     names: set[str] = set()
-    for phase, line in zip(phases, lines, strict=True):
-        where = f"{path}:{line}: phase {phase.name!r}"
+    for phase, section in zip(phases, sections, strict=True):
+        where = f"{section.where()}: phase {phase.name!r}"
         if phase.name in names:
             raise ScheduleError(f"{where} has the name of an earlier phase")
         names.add(phase.name)
         if phase.end_ns % period_ns:
             raise ScheduleError(
-                f"{where} ends at {ns_to_seconds(phase.end_ns):g} s, which is not a multiple of the "
+                f"{where} ends at {ns_to_seconds(phase.end_ns):g} s, must be a multiple of the "
                 f"reference period of {ns_to_seconds(period_ns):g} s"
             )
         for command in phase.commands:
@@ -39,17 +39,18 @@ def check_phases(path: Path, phases: Sequence[Phase], lines: Sequence[int], peri
 
 
 def _holder_after(command: GraspCommand, holder: str, where: str) -> str:
-    """Return who holds the deputy after a command that succeeds."""
+    """Return the holder of the deputy after a command that succeeds."""
     if command.action is GraspAction.RELEASE:
         if holder != command.arm:
-            raise ScheduleError(f"{where}: {command.arm} releases the deputy, but {_who(holder)} holds it")
+            other = holder or "no arm"
+            raise ScheduleError(f"{where}: {command.arm} releases the deputy, but {other} holds it")
         return ""
     if command.action is GraspAction.TRANSFER:
         if command.from_arm == command.arm:
             raise ScheduleError(f"{where}: a transfer from {command.arm} to itself")
         if holder != command.from_arm:
             raise ScheduleError(
-                f"{where}: a transfer from {command.from_arm}, but {_who(holder)} holds the deputy"
+                f"{where}: a transfer from {command.from_arm}, but {holder or 'no arm'} holds the deputy"
             )
     elif holder:
         raise ScheduleError(
@@ -57,8 +58,3 @@ def _holder_after(command: GraspCommand, holder: str, where: str) -> str:
             "would close a kinematic chain, use a transfer"
         )
     return command.arm
-
-
-def _who(holder: str) -> str:
-    """Return the holder in words."""
-    return holder or "no arm"

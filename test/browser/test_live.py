@@ -82,7 +82,7 @@ def test_it_waits_then_follows_what_comes(
     page = visit.page
     page.get_by_text("Waiting for the robot").wait_for()
     found[0] = live
-    page.get_by_text("Waiting for a run to begin").wait_for()
+    page.get_by_text("Waiting for a run to start").wait_for()
     play(live, run, scene, slice(0, 4))
     wait_until(page, f"player.t === {scene.stamp_ns[3] / 1e9}")
     assert page.locator("#trouble").is_hidden()

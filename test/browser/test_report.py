@@ -182,7 +182,7 @@ def test_pointing_at_one_plot_shows_values_and_time_in_all(opened: Open) -> None
     visit = opened()
     page = visit.page
     box = frame_of(page, "arm_a/position_error")
-    until(page, "plots.inSight.has(plots.plots[1])")
+    until(page, "plots.visible.has(plots.plots[1])")
     page.mouse.move(box["x"] + 250, box["middle"])
     for place in (0, 1):
         label = f"plots.plots[{place}].frame.querySelector('.hoverlayer .legend')"
@@ -230,11 +230,13 @@ def test_runs_and_lines_can_be_hidden(opened: Open) -> None:
     assert page.evaluate("plots.plots[5].frame.querySelectorAll('.scatterlayer .trace').length") == 7
 
 
-def test_sizes_can_be_drawn_on_a_logarithmic_scale(opened: Open) -> None:
+def test_magnitudes_can_be_drawn_on_a_logarithmic_scale(opened: Open) -> None:
     visit = opened()
     visit.page.locator("#logarithmic").check()
     settle(visit.page)
-    kinds = visit.page.evaluate("plots.plots.map((plot) => [plot.plot.size, plot.frame.layout.yaxis.type])")
+    kinds = visit.page.evaluate(
+        "plots.plots.map((plot) => [plot.plot.magnitude, plot.frame.layout.yaxis.type])"
+    )
     assert kinds == [[size, "log" if size else "linear"] for size, _ in kinds]
     assert [size for size, _ in kinds].count(True) == 8
     assert visit.errors == []

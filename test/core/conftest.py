@@ -9,11 +9,11 @@ import pytest
 
 from sms_handover.model.poses import pose_of
 from sms_handover.model.reduced import reduced_dynamics
-from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
+from sms_handover.model.robot_model import BASE_NV, RobotModel
 from sms_handover.run_data import RunData
 from sms_handover.simulation.scenario import Overrides, Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
-from sms_handover.types import Array, Pose, RobotState, Twist
+from sms_handover.types import Array, Pose, RobotState
 
 from .report_bags import write_handovers
 
@@ -70,8 +70,7 @@ class Draw:
     def state(self, speed: float = 1.0) -> RobotState:
         """Return a state."""
         v = self.v(speed)
-        twist = Twist(v[:3], v[3:BASE_NV])
-        return RobotState.of(0, self.pose(), twist, self.joints(), v[BASE_NV:], np.zeros(v.size - BASE_NV))
+        return RobotState(0, self.q(), v, np.zeros(v.size - BASE_NV))
 
 
 def slope(steps: list[float], errors: list[float]) -> float:
@@ -87,8 +86,7 @@ def distance(robot: RobotModel, a: tuple[Array, Array], b: tuple[Array, Array]) 
 
 def state_of(robot: RobotModel, q: Array, v: Array, stamp_ns: int = 0) -> RobotState:
     """Return a state from configuration and velocity."""
-    pose, twist = Pose(q[:3], q[3:BASE_NQ]), Twist(v[:3], v[3:BASE_NV])
-    return RobotState.of(stamp_ns, pose, twist, q[BASE_NQ:], v[BASE_NV:], np.zeros(robot.n_joints))
+    return RobotState(stamp_ns, q, v, np.zeros(robot.n_joints))
 
 
 def row_distance(a: Array, b: Array) -> tuple[float, float]:

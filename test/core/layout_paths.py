@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from sms_handover.bag.files import bag_files
+from sms_handover.bag.files import files_of
 from sms_handover.configuration.package_files import config_file
 
 FOXGLOVE = config_file("layouts/foxglove.json")
@@ -26,7 +26,7 @@ Messages = Mapping[str, tuple[str, Any]]  # by topic: type and last message
 def last_messages(bag: Path) -> Messages:
     """Return the last message of every topic in a bag, as a library decodes it that knows nothing of us."""
     found: dict[str, tuple[str, Any]] = {}
-    for file in bag_files(bag):
+    for file in files_of(bag).files:
         with file.open("rb") as stream:
             reader = make_reader(stream, decoder_factories=[DecoderFactory()])
             for schema, channel, _, message in reader.iter_decoded_messages():

@@ -42,5 +42,5 @@ def play(live: LiveScene, run: Any, scene: Scene, rows: slice = slice(None)) -> 
     """Add some instants of a run to a live scene, with its phases and grasps."""
     for frame in frames(run, scene)[rows]:
         phase = [phase for phase in scene.phases if phase.stamp_ns <= frame.stamp_ns][-1]
-        live.enter(replace(phase, stamp_ns=frame.stamp_ns))
+        live.set_phase(replace(phase, stamp_ns=frame.stamp_ns))
         live.add(frame)

@@ -1,8 +1,11 @@
 """A terminal with a Python program in it, as a user has one."""
 
+import fcntl
 import os
 import pty
+import re
 import select
+import struct
 import subprocess
 import sys
 import termios
@@ -13,15 +16,18 @@ from typing import Any
 
 DEADLINE_S = 60.0  # s of wall time after which a test that waits has failed; nothing is measured by it
 
+_CODE = re.compile(r"\x1b\[([0-9;?]*)([A-Za-z])|(.)", re.DOTALL)
 _TAKE_TERMINAL = "import fcntl, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0)\n"
 
 
 class Terminal:
     """A new terminal, which is that of the program alone."""
 
-    def __init__(self, program: str, **environment: str) -> None:
+    def __init__(self, program: str, columns: int = 80, **environment: str) -> None:
         """Start a program, given as Python text."""
         self._master, slave = pty.openpty()
+        fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("4H", 24, columns, 0, 0))
+        self._columns = columns
         self._slave = slave
         self.found = self.settings
         self.process = subprocess.Popen(
@@ -32,7 +38,7 @@ class Terminal:
             start_new_session=True,
             env={**os.environ, **environment},
         )
-        self.text = ""
+        self.text, self._closed = "", False
 
     def __enter__(self) -> "Terminal":
         """Return the terminal."""
@@ -45,8 +51,9 @@ class Terminal:
         if self.process.poll() is None:
             self.process.kill()
         self.process.wait()
-        os.close(self._master)
-        os.close(self._slave)
+        if not self._closed:
+            os.close(self._master)
+            os.close(self._slave)
 
     @property
     def settings(self) -> list[Any]:
@@ -57,6 +64,32 @@ class Terminal:
     def echoes(self) -> bool:
         """Whether keys are shown as they are pressed, as by default."""
         return bool(self.settings[3] & termios.ECHO)
+
+    @property
+    def screen(self) -> list[str]:
+        """Return the lines that have been printed as they look now, wrapped where they are too wide."""
+        lines, row, column = [""], 0, 0
+        for number, code, character in _CODE.findall(self.text):
+            if code == "A":
+                row -= int(number or 1)
+            elif (code, number) == ("K", "2"):
+                lines[row] = ""
+            elif character == "\r":
+                column = 0
+            elif character == "\n" or (character and column == self._columns):
+                row, column = row + 1, 0
+                lines += [""] * (row + 1 - len(lines))
+            if character and character not in "\r\n":
+                line = lines[row].ljust(column)
+                lines[row] = line[:column] + character + line[column + 1 :]
+                column += 1
+        return [line.rstrip() for line in lines]
+
+    def hang_up(self) -> None:
+        """Close the terminal while the program goes on."""
+        os.close(self._slave)
+        os.close(self._master)
+        self._closed = True
 
     def press(self, keys: bytes) -> None:
         """Press keys."""

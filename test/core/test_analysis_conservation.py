@@ -40,7 +40,7 @@ def test_a_run_at_rest_has_no_relative_energy() -> None:
     assert isnan(physics_residuals(make_run()).energy)
 
 
-def test_receipts_that_were_not_recorded_are_left_out() -> None:
+def test_values_that_were_not_recorded_are_left_out() -> None:
     run = make_run()
     rows = len(run.reference_ns)
     lost = np.full((rows, 3), nan)

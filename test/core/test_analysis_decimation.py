@@ -110,7 +110,7 @@ def test_a_series_of_nan_has_its_ends_and_nothing_but_nan() -> None:
 
 
 def test_wrong_input_is_told() -> None:
-    with pytest.raises(ConfigurationError, match="points is 6, it must be at least 7"):
+    with pytest.raises(ConfigurationError, match="points is 6, it must be >= 7"):
         decimate(np.arange(10.0), np.arange(10.0), 6)
     with pytest.raises(ConfigurationError, match=r"time \(10,\) and values \(9,\)"):
         decimate(np.arange(10.0), np.arange(9.0), 8)

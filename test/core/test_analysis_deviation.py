@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sms_handover.analysis.deviation import LargestDeviation, state_deviation
-from sms_handover.types import Pose, RobotState, Twist
+from sms_handover.types import RobotState
 
 JOINTS = 14
 
@@ -19,9 +19,8 @@ def state(
     angles = np.zeros(JOINTS)
     for place, angle in (joints or {}).items():
         angles[place] = angle
-    zero = np.zeros(3)
-    pose = Pose(np.array(position), np.array(turn))
-    return RobotState.of(stamp_ns, pose, Twist(zero, zero), angles, np.zeros(JOINTS), np.full(JOINTS, effort))
+    q = np.concatenate([position, turn, angles])
+    return RobotState(stamp_ns, q, np.zeros(6 + JOINTS), np.full(JOINTS, effort))
 
 
 def about(axis: tuple[float, float, float], angle: float) -> tuple[float, float, float, float]:

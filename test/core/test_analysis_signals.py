@@ -59,7 +59,9 @@ def test_a_signal_has_a_label_per_column_and_cannot_be_written_to() -> None:
     for array in (signal.time, signal.values):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1.0
-    with pytest.raises(ConfigurationError, match=r"signal 'speed' has values \(3,\), expected are \(3, 1\)"):
+    with pytest.raises(
+        ConfigurationError, match=r"signal 'speed' has values of shape \(3,\), they must be \(3, 1\)"
+    ):
         Signal("speed", "m/s", np.arange(3.0), np.zeros(3), ("left",))
 
 

@@ -117,7 +117,7 @@ def test_what_strangers_sent_makes_no_bag_incomplete(tmp_path: Path) -> None:
     bag = write_finished(tmp_path / "bag", refused=refused)
     result = check(bag)
     assert result.complete, result.findings
-    note = "/joint_command/refused: 5 messages of others than the topic's own publisher"
+    note = "/joint_command/refused: 5 messages of other publishers than the topic's own"
     assert note in texts(result, Severity.NOTE)
     assert recover(bag, tmp_path / "again") and check(tmp_path / "again").complete
 
@@ -129,19 +129,19 @@ def test_what_strangers_sent_makes_no_bag_complete_either(tmp_path: Path) -> Non
     assert texts(result, Severity.MISSING) == ["the run was not finished when the recording ended, at 0.2 s"]
 
 
-def test_a_message_of_ours_that_cannot_be_decoded_is_damage(tmp_path: Path) -> None:
+def test_a_message_of_ours_that_cannot_be_decoded_makes_the_run_incomplete(tmp_path: Path) -> None:
     """The name alone makes no topic one of refused messages: a run of ours must have it."""
     kind = "sensor_msgs/msg/JointState"
     result = check(write_finished(tmp_path / "bag", refused=[("/joint_command/other", kind, b"\0\1\0\0")]))
-    assert texts(result, Severity.DAMAGED) == [
-        "/joint_command/other cannot be decoded: its messages do not fit its schema"
-    ]
+    (missing,) = texts(result, Severity.MISSING)
+    assert missing.startswith("/joint_command/other cannot be decoded: ") and not result.damaged
 
 
 def test_counts_that_cannot_be_decoded_count_nothing(tmp_path: Path) -> None:
     kind = f"{OURS}/PublishedCounts"
     result = check(write_finished(tmp_path / "bag", refused=[("/strange/published", kind, b"\0\1\0\0\1")]))
-    assert result.damaged and not texts(result, Severity.MISSING)
+    (missing,) = texts(result, Severity.MISSING)
+    assert "cannot be decoded" in missing
 
 
 def test_an_unfinished_run_is_not(tmp_path: Path) -> None:
@@ -153,7 +153,7 @@ def test_an_unfinished_run_is_not(tmp_path: Path) -> None:
 def test_stamps_and_messages_that_never_came_are_told(tmp_path: Path) -> None:
     result = check(write_finished(tmp_path / "bag", skipped=30))
     assert texts(result, Severity.MISSING) == [
-        "/joint_states: 30 of 201 stamps never came, the largest gap is 31 ms",
+        "/joint_states: 30 of 201 stamps are missing, the largest gap is 31 ms",
         "/joint_states: 171 of 201 messages are there (published)",
     ]
 
@@ -182,7 +182,7 @@ def test_a_bag_that_was_not_closed_says_so(tmp_path: Path) -> None:
     assert any("was not closed" in line for line in texts(result, Severity.DAMAGED))
     missing = " ".join(texts(result, Severity.MISSING))
     assert "metadata.yaml is not there" in missing
-    assert "the loss ledger is not there" in missing
+    assert "there is no loss ledger" in missing
     assert "not finished" in missing
 
 
@@ -192,7 +192,7 @@ def test_a_bag_that_was_not_closed_says_so(tmp_path: Path) -> None:
         ("message_count", 5, "contradicts itself"),
         ("relative_file_paths", ["bag_0.mcap", "bag_1.mcap"], "bag_1.mcap is not there"),
         ("relative_file_paths", [], "bag_0.mcap is there, metadata.yaml does not list it"),
-        ("topics_with_message_count", [], "messages are there, more than told"),
+        ("topics_with_message_count", [], "messages are there, more than stated"),
         ("topics_with_message_count", 3, "not readable"),
     ],
 )
@@ -222,7 +222,7 @@ def bomb(key: str) -> str:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("#" * (LARGEST_METADATA + 1), f"it has more than {LARGEST_METADATA} bytes"),
+        ("#" * (LARGEST_METADATA + 1), f"more than {LARGEST_METADATA} bytes"),
         (bomb("relative_file_paths"), "written out it is too large"),
         ("a: " + "[" * 100_000, "more than 32 levels"),
     ],
@@ -311,8 +311,8 @@ def test_a_bag_without_index_is_complete_and_slow(tmp_path: Path) -> None:
         writer.finish()
     result = check(tmp_path / "a.mcap")
     notes = " ".join(texts(result, Severity.NOTE))
-    assert result.complete and "has no index" in notes and "does not tell how many" in notes
-    assert "/t: 1 messages lie behind later ones" in notes
+    assert result.complete and "has no index" in notes and "has no statistics" in notes
+    assert "/t: 1 messages are out of order" in notes
 
 
 def test_schemas_are_tried_on_the_messages(tmp_path: Path) -> None:
@@ -331,10 +331,10 @@ def test_schemas_are_tried_on_the_messages(tmp_path: Path) -> None:
             writer.add_message(writer.register_channel(topic, encoding, number), 0, data, 0)
         writer.finish()
     result = check(tmp_path / "a.mcap")
-    told = " ".join(texts(result, Severity.DAMAGED))
-    for topic in ("/broken", "/incomplete", "/misfit", "/none"):
-        assert f"{topic} cannot be decoded" in told
-    assert any(line.startswith("/json cannot be decoded") for line in texts(result, Severity.NOTE))
+    notes = " ".join(texts(result, Severity.NOTE))
+    assert result.complete
+    for topic in ("/broken", "/incomplete", "/misfit", "/json", "/none"):
+        assert f"{topic} cannot be decoded" in notes
 
 
 def test_part_of_a_split_bag_that_is_empty_or_gone_is_told(tmp_path: Path) -> None:
@@ -353,11 +353,11 @@ def test_what_is_no_bag_is_refused(tmp_path: Path, content: bytes) -> None:
 
 
 def test_other_kinds_of_bags_are_refused_with_a_way_out(tmp_path: Path) -> None:
-    for name in ("a.db3", "a.bag", "a.mcap.zstd"):
+    for name in ("a.db3", "a.bag", "a.db3.zstd"):
         folder = tmp_path / f"of_{name}"
         folder.mkdir()
         (folder / name).touch()
-        with pytest.raises(BagError, match=r"only \.mcap files are read; '(rosbags-convert --src|zstd -d)"):
+        with pytest.raises(BagError, match=r"only \.mcap files are read; 'rosbags-convert --src"):
             check(folder)
         shutil.copy(folder / name, tmp_path / name)
         with pytest.raises(BagError, match=r"only \.mcap files are read"):

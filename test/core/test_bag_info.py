@@ -11,6 +11,10 @@ from rosbags.typesys import Stores, get_typestore
 from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import read_info
 from sms_handover.bag.recording import Recording
+from sms_handover.bag.repair.check import check
+from sms_handover.bag.repair.findings import Severity
+from sms_handover.bag.repair.recover import recover
+from sms_handover.bag.time_order import messages_by_time
 from sms_handover.errors import BagError
 
 from .bag_messages import JOINT_STATE, TYPES, joint_state, text
@@ -63,8 +67,8 @@ def test_a_split_bag_is_one_bag_in_the_order_of_its_numbers(tmp_path: Path) -> N
     assert [m.log_time_ns for m in read_messages(tmp_path)] == list(range(24))
 
 
-@pytest.mark.parametrize("mode", [CompressionMode.NONE, CompressionMode.STORAGE])
-def test_a_bag_of_rosbags(tmp_path: Path, mode: CompressionMode) -> None:
+@pytest.mark.parametrize("mode", list(CompressionMode))
+def test_a_bag_of_rosbags_in_every_compression(tmp_path: Path, mode: CompressionMode) -> None:
     store = get_typestore(Stores.ROS2_JAZZY)
     writer = RosbagsWriter(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP)
     writer.set_compression(mode, CompressionFormat.ZSTD)
@@ -77,6 +81,10 @@ def test_a_bag_of_rosbags(tmp_path: Path, mode: CompressionMode) -> None:
     assert (info.message_count, info.start_ns, info.end_ns) == (20, 10, 29)
     assert info.topics["/robot/joints"].type == JOINT_STATE
     assert [message.data for message in read_messages(tmp_path / "bag")] == messages
+    assert [message.data for message in messages_by_time(tmp_path / "bag")] == messages
+    assert not [f for f in check(tmp_path / "bag").findings if f.severity is not Severity.NOTE]
+    assert recover(tmp_path / "bag", tmp_path / "new").message_count == 20
+    assert [m.data for m in read_messages(info.files[0])] == messages
 
 
 def test_messages_of_chosen_topics_only(tmp_path: Path) -> None:

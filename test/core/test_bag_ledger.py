@@ -71,11 +71,11 @@ def test_published_counts_tell_what_was_lost_at_the_ends() -> None:
     for tick in range(5):
         keeper.receive(TOPIC, tick)
     keeper.receive_unstamped("/run/ready")
-    keeper.report_published("plant", TOPIC, 7)
-    keeper.report_published("plant", TOPIC, 7)  # a latched report that comes twice counts once
+    keeper.report(published_counts("plant", {TOPIC: 7}))
+    keeper.report(published_counts("plant", {TOPIC: 7}))  # a latched report that comes twice counts once
     for node in ("ik", "trajectory"):
-        keeper.report_published(node, "/run/ready", 1)
-    keeper.report_published("plant", "/not/recorded", 3)
+        keeper.report(published_counts(node, {"/run/ready": 1}))
+    keeper.report(published_counts("plant", {"/not/recorded": 3}))
     ledger = keeper.ledger()
     assert [topic.published for topic in ledger.topics] == [7, 2, None]
     assert [topic.lost for topic in ledger.topics] == [2, 1, None]

@@ -92,14 +92,6 @@ def test_an_unreadable_definition_is_named(tmp_path: Path) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_a_type_is_learned_from_the_schema_in_a_bag() -> None:
-    schema = TYPES.schema(f"{OURS}/GraspEvent")
-    types = MessageTypes(roots=())
-    types.learn(schema.type, schema.text)
-    types.learn(schema.type, schema.text)
-    assert types.schema(schema.type) == schema
-
-
 def test_wrong_bytes_do_not_decode() -> None:
     with pytest.raises(BagError, match="does not decode as sensor_msgs/msg/JointState"):
         TYPES.deserialize(TYPES.serialize(text("short")), "sensor_msgs/msg/JointState")

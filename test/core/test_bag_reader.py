@@ -17,6 +17,7 @@ from sms_handover.run_data import RunData
 
 from .bag_damage import chunks_of
 from .bag_messages import (
+    JOINT_STATE,
     JOINTS,
     TICK_NS,
     TYPES,
@@ -192,6 +193,19 @@ def test_several_runs_in_one_bag_need_a_namespace(tmp_path: Path) -> None:
     assert read.base_pose.tobytes() == runs["/right"].base_pose.tobytes()
     with pytest.raises(BagError, match="it has no topic /up/joint_states"):
         read_run(tmp_path / "bag", namespace="/up")
+
+
+def test_arms_are_in_the_order_of_their_joints_even_if_a_name_begins_another(tmp_path: Path) -> None:
+    """``arm_b_joint_1`` is a joint of ``arm_b``, not of ``arm``; a run in a namespace adds no arms."""
+    pose = "geometry_msgs/msg/PoseStamped"
+    with Recording(tmp_path / "bag", types=TYPES) as recording:
+        recording.add_topic("/joint_states", JOINT_STATE)
+        recording.add_topic("/base_odometry", "nav_msgs/msg/Odometry")
+        for name in ("/arm/tool_pose", "/arm_b/tool_pose", "/other/arm_c/tool_pose"):
+            recording.add_topic(name, pose)
+        names = ["arm_b_joint_1", "arm_joint_1"]
+        recording.receive("/joint_states", TYPES.serialize(joint_state(0, names, [1.0, 2.0])), WALL_NS)
+    assert read_run(tmp_path / "bag").arms == ("arm_b", "arm")
 
 
 def test_missing_and_unusable_bags_are_refused(tmp_path: Path) -> None:

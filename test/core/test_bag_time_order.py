@@ -6,11 +6,11 @@ from random import Random
 
 import pytest
 from mcap.reader import make_reader
-from mcap.records import Chunk, McapRecord
-from mcap.stream_reader import breakup_chunk
 from mcap.writer import CompressionType, IndexType, Writer
 
 from sms_handover.bag.files import RawMessage, read_messages
+from sms_handover.bag.mcap.chunks import records_of
+from sms_handover.bag.mcap.records import ChunkHead
 from sms_handover.bag.time_order import TimeSpan, messages_by_time
 from sms_handover.errors import BagError
 
@@ -97,11 +97,11 @@ def test_only_chunks_that_overlap_are_held(tmp_path: Path, monkeypatch: pytest.M
     write(tmp_path / "bag_0.mcap", range(5000))
     read: list[object] = []
 
-    def counted(chunk: Chunk, validate_crc: bool) -> list[McapRecord]:
-        read.append(chunk)
-        return breakup_chunk(chunk, validate_crc)
+    def counted(head: ChunkHead, body: bytes) -> bytes:
+        read.append(head)
+        return records_of(head, body)
 
-    monkeypatch.setattr("sms_handover.bag.time_order.breakup_chunk", counted)
+    monkeypatch.setattr("sms_handover.bag.mcap.scan.records_of", counted)
     messages = messages_by_time(tmp_path)
     next(messages)
     assert len(read) == 1

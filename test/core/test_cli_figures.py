@@ -53,7 +53,7 @@ def test_help_lists_every_figure(capsys: pytest.CaptureFixture[str]) -> None:
         (["--only", "torq"], "unknown figure 'torq' (did you mean 'torque'?): known are 'tool_error', "),
         (["--format", "png,jpeg"], "unknown figure format 'jpeg'"),
         (["--format", ""], "unknown figure format ''"),
-        (["--dpi", "10"], "--dpi is 10 dots per inch, allowed is 50 to 1200"),
+        (["--dpi", "10"], "--dpi is 10 dots per inch, must be 50 to 1200"),
     ],
 )
 def test_wrong_input_ends_in_one_line_before_anything_is_read(

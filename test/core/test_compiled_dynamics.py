@@ -153,9 +153,9 @@ def test_a_whole_run_differs_by_rounding_alone() -> None:
         np.concatenate([compiled.base_pose[-1], compiled.joint_position[-1]]),
         np.concatenate([compiled.base_twist[-1], compiled.joint_velocity[-1]]),
     )
-    receipt = conserved_quantities(robot, *end)
-    assert np.abs(receipt.linear_momentum).max() < 1e-12
-    assert np.abs(receipt.angular_momentum).max() < 1e-12
+    conserved = conserved_quantities(robot, *end)
+    assert np.abs(conserved.linear_momentum).max() < 1e-12
+    assert np.abs(conserved.angular_momentum).max() < 1e-12
 
 
 def test_pid_is_compiled_too() -> None:

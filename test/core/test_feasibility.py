@@ -13,6 +13,7 @@ from sms_handover.model.poses import pose_distance, pose_row, se3_of
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.run_data import RunData
 from sms_handover.simulation import feasibility
+from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.feasibility import PhasePrediction, base_after, check_feasibility
 from sms_handover.simulation.scenario import Scenario
 from sms_handover.simulation.simulate import simulate
@@ -27,6 +28,13 @@ _ROUNDING = 3 * 12 * 3 * _EPS
 _A_CARRIES = "xyz: [1.15, 0.02, 0.75]"  # where arm A takes its tool in the phase 'carry'
 _B_COMES = "xyz: [1.15, -0.22, 0.75]"  # where arm B meets the other end of the deputy
 _B_LEAVES = "xyz: [1.2, -0.42, 0.75]"
+
+
+def predicted(scenario: Scenario) -> tuple[PhasePrediction, ...]:
+    """Return the predictions with the parameters of a scenario."""
+    parameters = scenario.parameters
+    tolerance = parameters.plant.grasp_tolerance
+    return check_feasibility(scenario.robot, scenario.schedule, parameters.ik, tolerance)
 
 
 def _changed(old: str, new: str) -> str:
@@ -87,7 +95,7 @@ def test_nothing_moves_nothing(robot: RobotModel, draw: Draw) -> None:
 def _walk(scenario: Scenario) -> Iterator[tuple[PhasePrediction, Pose, Array]]:
     """Yield each prediction with base and joints at the start of its phase."""
     base, joints = scenario.schedule.base_in_world, initial_joints(scenario.robot, scenario.schedule)
-    for prediction in check_feasibility(scenario):
+    for prediction in predicted(scenario):
         yield prediction, base, joints
         base, joints = prediction.base_in_world, prediction.joint_position
 
@@ -119,7 +127,7 @@ def test_each_kind_of_target_is_predicted(make_scenario: MakeScenario) -> None:
     scenario = make_scenario()
     robot, schedule = scenario.robot, scenario.schedule
     a, b = (robot.arm_joints[arm] for arm in ("arm_a", "arm_b"))
-    approach, carry, withdraw, let_go = check_feasibility(scenario)
+    approach, carry, withdraw, let_go = predicted(scenario)
     start = initial_joints(robot, schedule)
     np.testing.assert_array_equal(approach.joint_position[b], start[b])
     np.testing.assert_array_equal(withdraw.joint_position[a], [0.6, -1.6, 1.3, 1.8, 1.5, -1.3, 1.1])
@@ -138,7 +146,7 @@ def test_a_robot_that_holds_stays(make_scenario: MakeScenario) -> None:
     """Without a motion there is no reaction: the prediction is the start itself."""
     text = SCHEDULE[: SCHEDULE.index("  - name: carry")].replace("{grasp_frame: left}", "hold")
     scenario = make_scenario(text)
-    (prediction,) = check_feasibility(scenario)
+    (prediction,) = predicted(scenario)
     np.testing.assert_array_equal(
         prediction.joint_position, initial_joints(scenario.robot, scenario.schedule)
     )
@@ -150,7 +158,7 @@ def test_the_same_schedule_has_the_same_predictions(make_scenario: MakeScenario)
     """Bit for bit, and a run after the check is the run without it."""
     scenario = make_scenario(common={"duration": 0.1})
     alone = simulate(scenario)
-    first, second = check_feasibility(scenario), check_feasibility(scenario)
+    first, second = predicted(scenario), predicted(scenario)
     for a, b in zip(first, second, strict=True):
         assert a.joint_position.tobytes() == b.joint_position.tobytes()
         assert pose_row(a.base_in_world).tobytes() == pose_row(b.base_in_world).tobytes()
@@ -159,7 +167,7 @@ def test_the_same_schedule_has_the_same_predictions(make_scenario: MakeScenario)
 
 def test_a_prediction_cannot_be_changed(make_scenario: MakeScenario) -> None:
     """It is a value."""
-    prediction = check_feasibility(make_scenario())[0]
+    prediction = predicted(make_scenario())[0]
     with pytest.raises(ValueError, match="read-only"):
         prediction.joint_position[0] = 0.0
 
@@ -169,7 +177,7 @@ def test_the_shipped_handover_ends_where_it_was_foreseen(nmpc_run: RunData, scen
 
     That difference is of second order in the motion. A tenth of the base's whole motion bounds it.
     """
-    predictions = check_feasibility(scenario)
+    predictions = predicted(scenario)
     start = scenario.schedule.base_in_world
     assert [prediction.restarts for prediction in predictions] == [0] * len(predictions)
     ways = [pose_distance(start, prediction.base_in_world) for prediction in predictions]
@@ -188,7 +196,7 @@ def test_a_target_out_of_reach_is_named(make_scenario: MakeScenario) -> None:
     """Phase, arm, where the target is, and how far the nearest pose is from it: in one line."""
     scenario = make_scenario(_changed(_B_COMES, "xyz: [1.95, -0.22, 0.75]"))
     with pytest.raises(ScheduleError) as caught:
-        check_feasibility(scenario)
+        predicted(scenario)
     match = re.fullmatch(
         r"phase 'carry': the target of arm_b at \(1\.950, -0\.220, 0\.750\) m is out of reach: "
         r"the nearest pose found is ([\d.]+) mm and ([\d.]+) deg away",
@@ -223,14 +231,14 @@ def test_every_phase_and_arm_is_checked(
 ) -> None:
     """Targets in the world and at grasp frames, in the first phase and in the last."""
     with pytest.raises(ScheduleError, match=rf"^phase '{phase}': the target of {arm} at \(.* out of reach"):
-        check_feasibility(make_scenario(_changed(old, new)))
+        predicted(make_scenario(_changed(old, new)))
 
 
 def test_targets_that_do_not_fit_the_deputy_are_refused(make_scenario: MakeScenario) -> None:
     """Where A holds one end, B's target must be the other end: 63 mm beside it the transfer would miss."""
     scenario = make_scenario(_changed(_B_COMES, "xyz: [1.15, -0.283, 0.75]"))
     with pytest.raises(ScheduleError) as caught:
-        check_feasibility(scenario)
+        predicted(scenario)
     expected = "phase 'withdraw': arm_b would miss grasp frame 'right': distance 63 mm, allowed 10 mm"
     assert str(caught.value) == expected
 
@@ -241,25 +249,43 @@ def test_the_angle_must_fit_too(make_scenario: MakeScenario) -> None:
     with pytest.raises(
         ScheduleError, match=r"arm_b would miss grasp frame 'right': angle 5\.73 deg, allowed 2"
     ):
-        check_feasibility(make_scenario(text))
+        predicted(make_scenario(text))
 
 
 def test_the_tolerance_is_that_of_the_plant(make_scenario: MakeScenario) -> None:
     """An offset of 8 mm fits 10 mm and not 5 mm."""
     text = _changed(_B_COMES, "xyz: [1.15, -0.228, 0.75]")
-    assert len(check_feasibility(make_scenario(text))) == 4
+    assert len(predicted(make_scenario(text))) == 4
     with pytest.raises(ScheduleError, match="distance 8 mm, allowed 5 mm"):
-        check_feasibility(make_scenario(text, plant={"grasp_position_tolerance": 0.005}))
+        predicted(make_scenario(text, plant={"grasp_position_tolerance": 0.005}))
+
+
+def test_reach_is_that_of_the_solver(make_scenario: MakeScenario) -> None:
+    """What is in reach depends on the parameters of inverse kinematics: those of the scenario count."""
+    with pytest.raises(ScheduleError, match="is out of reach"):
+        check_scenario(make_scenario(ik={"stall_step": 0.1}))
+    far = _changed(_B_LEAVES, "xyz: [1.2, -0.42, 3.75]")
+    loose = {"position_tolerance": 3.0, "orientation_tolerance": 3.0}
+    assert (
+        len(
+            predicted(
+                make_scenario(
+                    far, ik=loose, plant={"grasp_position_tolerance": 9.0, "grasp_angle_tolerance": 4.0}
+                )
+            )
+        )
+        == 4
+    )
 
 
 def test_an_error_of_the_first_grasp_is_carried_on(make_scenario: MakeScenario) -> None:
     """A deputy grasped 8 mm off stays 8 mm off in the hand, so the other end is too."""
     offset = "arm_a: {grasp_frame: left, tool_in_grasp_frame: {xyz: [0, 0.008, 0], rpy: [0, 0, 0]}}"
     text = _changed("arm_a: {grasp_frame: left}\n", f"{offset}\n")
-    assert len(check_feasibility(make_scenario(text))) == 4
+    assert len(predicted(make_scenario(text))) == 4
     both = text.replace(_B_COMES, "xyz: [1.15, -0.228, 0.75]")
     with pytest.raises(ScheduleError, match=r"arm_b would miss grasp frame 'right': distance 1[0-9.]+ mm"):
-        check_feasibility(make_scenario(both))
+        predicted(make_scenario(both))
 
 
 def test_a_target_on_a_deputy_that_the_other_arm_carries(make_scenario: MakeScenario) -> None:
@@ -268,7 +294,7 @@ def test_a_target_on_a_deputy_that_the_other_arm_carries(make_scenario: MakeScen
         f"arm_b: {{tool_in_world: {{{_B_COMES}, rpy: [3.14, -1.5, 0.0]}}}}", "arm_b: {grasp_frame: right}"
     )
     scenario = make_scenario(text)
-    carry = check_feasibility(scenario)[1]
+    carry = predicted(scenario)[1]
     tool = scenario.robot.tools_in_world(carry.base_in_world, carry.joint_position)["arm_b"]
     expected = Pose(np.array([1.15, -0.22, 0.75]), np.array([0.0, 0.0, 0.0, 1.0]))
     # A is at its target and holds its end, each within the tolerance of inverse kinematics, 1e-6 m and rad
@@ -293,9 +319,9 @@ def test_a_target_that_needs_another_start_is_found_and_told(make_scenario: Make
     text = SCHEDULE[: SCHEDULE.index("  - name: carry")]
     text = text.replace("{grasp_frame: left}", f"{{tool_in_world: {{xyz: {xyz}, rpy: {rpy}}}}}")
     scenario = make_scenario(text)
-    (prediction,) = check_feasibility(scenario)
+    (prediction,) = predicted(scenario)
     assert 1 <= prediction.restarts <= 10
     found = robot.tools_in_world(prediction.base_in_world, prediction.joint_position)["arm_a"]
     assert max(pose_distance(found, tool)) <= 1e-6 + _ROUNDING
-    again = check_feasibility(make_scenario(text))[0]
+    again = predicted(make_scenario(text))[0]
     assert again.joint_position.tobytes() == prediction.joint_position.tobytes()

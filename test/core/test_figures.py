@@ -348,5 +348,5 @@ def test_runs_are_checked(nmpc: RunData) -> None:
     with pytest.raises(ConfigurationError, match="there is no run to draw"):
         next(draw_figures([]))
     twice = [DrawnRun("one", nmpc), DrawnRun("one", nmpc)]
-    with pytest.raises(ConfigurationError, match="runs need different names, given are one, one"):
+    with pytest.raises(ConfigurationError, match="runs must have different names, these are one, one"):
         next(draw_figures(twice))

@@ -10,7 +10,7 @@ import pytest
 from sms_handover.bag.info import read_info
 from sms_handover.bag.run.reader import read_run
 from sms_handover.cli.main import main
-from sms_handover.cli.reproduce import scenario_in
+from sms_handover.launcher.recorded_scenario import scenario_in
 from sms_handover.simulation.simulate import simulate
 
 from ..first_edition import FOLDER, LAWS, digests_of, machine, rows_of, run_of, stored
@@ -57,9 +57,9 @@ def test_recorded_runs_are_reported(tmp_path: Path) -> None:
 
 
 def different(now: Any, then: Any, place: str = "") -> list[str]:
-    """Return the places where two JSON values differ; numbers may differ in their last digits."""
+    """Return where JSON values differ from those of then: missing, or not equal up to rounding."""
     if isinstance(now, dict) and isinstance(then, dict):
-        missing = [f"{place}/{key}" for key in now.keys() ^ then.keys()]
+        missing = [f"{place}/{key}" for key in then.keys() - now.keys()]
         return missing + [
             d for key in now.keys() & then.keys() for d in different(now[key], then[key], f"{place}/{key}")
         ]

@@ -156,7 +156,7 @@ def test_the_script_in_one_process_prints_both_laws(
 
 
 def test_gains_of_an_example_are_checked_as_ours_are() -> None:
-    with pytest.raises(ConfigurationError, match=r"'stiffness' is -1.0 N/m, allowed is at least 0"):
+    with pytest.raises(ConfigurationError, match=r"'stiffness' is -1.0 N/m, must be >= 0"):
         build(TaskSpaceGains, {"stiffness": -1.0}, "controller")
     assert build(TaskSpaceGains, {}, "controller") == TaskSpaceGains()
 

@@ -12,9 +12,9 @@ from sms_handover.configuration.parameters import (
     build,
     parameter,
     read_parameter_files,
-    read_yaml,
     spec_of,
 )
+from sms_handover.configuration.yaml_reader import read_yaml
 from sms_handover.control.nmpc import NmpcGains
 from sms_handover.control.parameters import ControllerParameters, gains_of
 from sms_handover.control.pid import PidGains
@@ -53,30 +53,30 @@ def test_good_values_are_taken_as_their_type() -> None:
 
 
 REFUSED: dict[str, tuple[str, object, str]] = {
-    "below": ("length", 0.4, "'length' is 0.4 m, allowed is at least 0.5"),
-    "above": ("length", 2.1, "'length' is 2.1 m, allowed is at most 2.0"),
-    "not a number": ("length", nan, "'length' is nan, expected a finite number m"),
-    "infinite": ("length", inf, "'length' is inf, expected a finite number m"),
-    "too large for a float": ("length", 10**400, "expected a finite number m"),
-    "text for a number": ("length", "1.5", "'length' is '1.5', expected a number m"),
-    "switch for a number": ("length", True, "'length' is True, expected a number m"),
-    "nothing for a number": ("length", None, "'length' is None, expected a number m"),
-    "list for a number": ("length", [1.0], "'length' is [1.0], expected a number m"),
-    "fraction for a count": ("count", 1.5, "'count' is 1.5, expected a whole number"),
-    "whole float for a count": ("count", 2.0, "'count' is 2.0, expected a whole number"),
-    "switch for a count": ("count", True, "'count' is True, expected a number"),
-    "too small a count": ("count", 0, "'count' is 0, allowed is at least 1"),
+    "below": ("length", 0.4, "'length' is 0.4 m, must be >= 0.5 and <= 2 m"),
+    "above": ("length", 2.1, "'length' is 2.1 m, must be >= 0.5 and <= 2 m"),
+    "not a number": ("length", nan, "'length' is nan m, must be finite"),
+    "infinite": ("length", inf, "'length' is inf m, must be finite"),
+    "too large for a float": ("length", 10**400, "'length' is inf m, must be finite"),
+    "text for a number": ("length", "1.5", "'length' is '1.5', must be a number in m"),
+    "switch for a number": ("length", True, "'length' is True, must be a number in m"),
+    "nothing for a number": ("length", None, "'length' is None, must be a number in m"),
+    "list for a number": ("length", [1.0], "'length' is [1.0], must be a number in m"),
+    "fraction for a count": ("count", 1.5, "'count' is 1.5, must be a whole number"),
+    "whole float for a count": ("count", 2.0, "'count' is 2.0, must be a whole number"),
+    "switch for a count": ("count", True, "'count' is True, must be a whole number"),
+    "too small a count": ("count", 0, "'count' is 0, must be >= 1"),
     "unknown choice": (
         "name",
         "gren",
         "unknown value 'gren' (did you mean 'green'?): known are 'red', 'green'",
     ),
-    "number for text": ("name", 1, "'name' is 1, expected str"),
-    "number for a switch": ("active", 1, "'active' is 1, expected bool"),
-    "scalar for a list": ("offsets", 0.5, "'offsets' is 0.5, expected a list"),
-    "text for a list": ("labels", "a", "'labels' is 'a', expected a list"),
-    "bad item": ("offsets", [0.0, "x"], "'offsets' is 'x', expected a number rad"),
-    "item below": ("offsets", [0.0, -1.5], "'offsets' is -1.5 rad, allowed is at least -1.0"),
+    "number for text": ("name", 1, "'name' is 1, must be text"),
+    "number for a switch": ("active", 1, "'active' is 1, must be true or false"),
+    "scalar for a list": ("offsets", 0.5, "'offsets' is 0.5, must be a list"),
+    "text for a list": ("labels", "a", "'labels' is 'a', must be a list"),
+    "bad item": ("offsets", [0.0, "x"], "'offsets' is 'x', must be a number in rad"),
+    "item below": ("offsets", [0.0, -1.5], "'offsets' is -1.5 rad, must be >= -1 rad"),
     "unknown item": ("labels", ["a", "c"], "unknown value 'c': known are 'a', 'b'"),
 }
 
@@ -147,13 +147,18 @@ def test_later_files_win_and_other_sections_do_not_matter(tmp_path: Path) -> Non
     assert read_parameter_files([first, second], "recorder") == {}
 
 
-@pytest.mark.parametrize("text", ["plant: 5\n", "plant: {a: 1}\n", "plant: {ros__parameters: [1]}\n"])
-def test_a_section_without_parameters_is_refused(tmp_path: Path, text: str) -> None:
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("plant: 5\n", "plant is 5, must be a mapping"),
+        ("plant: {a: 1}\n", "plant.ros__parameters is missing"),
+        ("plant: {ros__parameters: [1]}\n", r"plant.ros__parameters is \[1\], must be a mapping"),
+    ],
+)
+def test_a_section_without_parameters_is_refused(tmp_path: Path, text: str, reason: str) -> None:
     """A file that is not in ROS form is said to be so instead of being ignored."""
     path = _write(tmp_path / "p.yaml", text)
-    with pytest.raises(
-        ConfigurationError, match=r"p\.yaml:1: section 'plant' needs a mapping 'ros__parameters'"
-    ):
+    with pytest.raises(ConfigurationError, match=rf"p\.yaml:1: {reason}"):
         read_parameter_files([path], "plant")
 
 
@@ -166,25 +171,19 @@ def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
     cases = {
         tmp_path / "none.yaml": "No such file or directory",
         folder: "Is a directory",
-        _write(tmp_path / "broken.yaml", "a: [1,\nb: 2\n"): "not valid YAML.*line 1, column 4",
-        _write(tmp_path / "tag.yaml", "a: !!python/object/apply:os.getcwd []\n"): "not valid YAML",
-        binary: "not valid YAML",
-        _write(tmp_path / "list.yaml", "- 1\n"): "expected a mapping at the top level",
-        _write(tmp_path / "empty.yaml", ""): "expected a mapping at the top level",
+        _write(
+            tmp_path / "broken.yaml", "a: [1,\nb: 2\n"
+        ): r":3: not valid YAML: while parsing a flow sequence \(line 1\): expected",
+        _write(tmp_path / "tag.yaml", "a: !!python/object/apply:os.getcwd []\n"): ":1: not valid YAML",
+        binary: "can't decode byte 0xff",
+        _write(tmp_path / "list.yaml", "- 1\n"): "must be a mapping at the top level",
+        _write(tmp_path / "empty.yaml", ""): "must be a mapping at the top level",
     }
     for path, reason in cases.items():
         with pytest.raises(ConfigurationError, match=reason) as caught:
             read_yaml(path)
         assert str(path) in str(caught.value)
         assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("written", "read"), [("1e-3", 1e-3), ("-2E+1", -20.0), ("1.5e3", 1500.0), (".5e-1", 0.05), ("7", 7)]
-)
-def test_numbers_are_read_as_ros_reads_them(tmp_path: Path, written: str, read: float) -> None:
-    """An exponent makes a number, with or without a decimal point; YAML 1.1 alone would give text."""
-    assert read_yaml(_write(tmp_path / "p.yaml", f"a: {written}\nb: 1e\n")) == {"a": read, "b": "1e"}
 
 
 # --- groups with rules of their own --------------------------------------------------------------
@@ -229,8 +228,8 @@ def test_gains_of_a_phase_lie_over_those_of_the_controller() -> None:
     ):
         gains_of(nmpc, {"roling_period": 2.0}, "here")
     with pytest.raises(
-        ConfigurationError, match=r"here: parameter 'rolling_period' is 0 s, allowed is at least"
+        ConfigurationError, match=r"here: parameter 'rolling_period' is 0 s, must be >= 0.001 s"
     ):
         gains_of(nmpc, {"rolling_period": 0}, "here")
-    with pytest.raises(ConfigurationError, match=r"'control_order' is 4, allowed is at most 3"):
+    with pytest.raises(ConfigurationError, match=r"'control_order' is 4, must be >= 0 and <= 3"):
         gains_of(nmpc, {"control_order": 4}, "here")

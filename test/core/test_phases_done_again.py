@@ -77,7 +77,7 @@ def test_it_compares_with_a_run_that_did_without(again: RunData, plain: RunData)
         "grasp_failed",
     ]
     table = comparison_table({"again": again, "plain": plain})
-    assert "Decisions of the nodes" in table
+    assert "Warnings and errors" in table
     counts = {line.split()[0]: line.split()[-2:] for line in table.splitlines() if "(warning)" in line}
     assert counts["phase_retried"] == ["2", "0"]
     assert counts["grasp_missed"] == ["0", "3"]

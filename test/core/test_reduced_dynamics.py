@@ -89,12 +89,12 @@ def test_base_motion_at_zero_momentum(robot: RobotModel, draw: Draw) -> None:
     for _ in range(20):
         q, rates = draw.q(), draw.vector(14)
         v = np.concatenate([base_twist_per_joint_rate(robot, q) @ rates, rates])
-        receipt = conserved_quantities(robot, q, v)
+        conserved = conserved_quantities(robot, q, v)
         rounding = _rounding(robot, q) * 254.0
-        np.testing.assert_allclose(receipt.linear_momentum, 0.0, atol=rounding)
-        np.testing.assert_allclose(receipt.angular_momentum, 0.0, atol=rounding)
+        np.testing.assert_allclose(conserved.linear_momentum, 0.0, atol=rounding)
+        np.testing.assert_allclose(conserved.angular_momentum, 0.0, atol=rounding)
         energy = 0.5 * rates @ reduced_dynamics(robot, q, v).inertia @ rates
-        assert receipt.kinetic_energy == pytest.approx(energy, rel=_rounding(robot, q))
+        assert conserved.kinetic_energy == pytest.approx(energy, rel=_rounding(robot, q))
 
 
 def test_base_reaction_depends_on_the_joints_only(robot: RobotModel, draw: Draw) -> None:

@@ -1,5 +1,6 @@
 """The shipped robot has the published Gen3 data, and a robot that cannot exist is refused in one line."""
 
+import re
 from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import FrozenInstanceError, replace
@@ -13,10 +14,11 @@ import pytest
 import yaml
 
 from sms_handover.configuration.package_files import config_file
-from sms_handover.configuration.parameters import read_yaml
-from sms_handover.errors import ConfigurationError, RobotDescriptionError, UnknownNameError
-from sms_handover.model.description import Inertia, RobotDescription, load_robot
-from sms_handover.model.parts import Gripper, box_moments, cylinder_moments
+from sms_handover.configuration.yaml_reader import read_yaml
+from sms_handover.errors import ConfigurationError, RobotDescriptionError
+from sms_handover.model.assembly import RobotDescription
+from sms_handover.model.description import load_robot
+from sms_handover.model.parts import Gripper, Inertia, box_moments, cylinder_moments
 from sms_handover.model.urdf import to_urdf
 from sms_handover.types import Array
 
@@ -112,7 +114,7 @@ def test_limits_are_the_published_ones(robot: RobotDescription) -> None:
         upper = [2 * pi, 2.24, 2 * pi, 2.57, 2 * pi, 2.09, 2 * pi]
         assert [joint.upper for joint in arm.joints] == upper
         assert [joint.lower for joint in arm.joints] == [-value for value in upper]
-        assert arm.rotor_inertia == (0.0,) * 7
+        assert [joint.rotor_inertia for joint in arm.joints] == [0.0] * 7
 
 
 def test_angles_are_exact_multiples_of_a_right_angle(robot: RobotDescription) -> None:
@@ -229,7 +231,7 @@ def test_any_number_of_arms_and_joints(files: Files, n_arms: int, n_joints: int)
     model = pin.buildModelFromXML(to_urdf(robot), pin.JointModelFreeFlyer())
     assert (model.nq, model.nv) == (7 + n_arms * n_joints, 6 + n_arms * n_joints)
     assert pin.computeTotalMass(model) == pytest.approx(robot.mass, abs=1e-9)
-    assert robot.arm("limb_0").rotor_inertia == (0.1,) * n_joints
+    assert [joint.rotor_inertia for joint in robot.arms[0].joints] == [0.1] * n_joints
 
 
 def test_limits_can_be_overridden_per_arm(files: Files) -> None:
@@ -267,13 +269,6 @@ def test_a_description_cannot_be_changed(robot: RobotDescription) -> None:
         robot.base.inertia.mass = 1.0  # type: ignore[misc]
     with pytest.raises(ValueError, match="read-only"):
         robot.base.inertia.matrix[0, 0] = 1.0
-
-
-def test_arm_is_found_by_name(robot: RobotDescription) -> None:
-    """An unknown arm is answered with the nearest known one."""
-    assert robot.arm("arm_b") is robot.arms[1]
-    with pytest.raises(UnknownNameError, match=r"unknown arm 'arm_c' \(did you mean 'arm_[ab]'\?\)"):
-        robot.arm("arm_c")
 
 
 # --- what is refused -----------------------------------------------------------------------------
@@ -321,151 +316,156 @@ def _robot_arm(key: str, value: object) -> Spoil:
     return _set("robot", "arms", 0, key, value=value)
 
 
-_AXIS = r"arm_a_joint_1: axis"
-_HALF_ARM = r"gen3.yaml: (line \d+: )?arm_a_link_3: "
-_PRINCIPAL = r"principal moments .* kg m\^2, "
-
 REFUSED: dict[str, tuple[Spoil, str]] = {
-    "zero link mass": (_link("mass", 0.0), _HALF_ARM + r"mass is 0.0 kg, allowed is more than 0"),
-    "negative link mass": (_link("mass", -1), _HALF_ARM + r"mass is -1.0 kg, allowed is more than 0"),
-    "mass is text": (_link("mass", "heavy"), _HALF_ARM + r"mass is 'heavy', expected a number in kg$"),
-    "mass is a boolean": (_link("mass", True), _HALF_ARM + r"mass is True, expected a number in kg"),
-    "mass beyond every float": (
-        _link("mass", 10**400),
-        _HALF_ARM + r"mass is inf kg, expected a finite number",
+    "zero link mass": (_link("mass", 0.0), "joints[2].link.mass is 0.0 kg, must be > 0 kg"),
+    "negative link mass": (_link("mass", -1), "joints[2].link.mass is -1 kg, must be > 0 kg"),
+    "mass is text": (_link("mass", "heavy"), "joints[2].link.mass is 'heavy', must be a number in kg"),
+    "mass is a boolean": (_link("mass", True), "joints[2].link.mass is True, must be a number in kg"),
+    "mass beyond every float": (_link("mass", 10**400), "joints[2].link.mass is inf kg, must be finite"),
+    "com not a number": (_link("com", [0.0, nan, 0.0]), "joints[2].link.com[1] is nan m, must be finite"),
+    "com too short": (_link("com", [0.0, 0.0]), "joints[2].link.com is [0.0, 0.0], must be 3 numbers in m"),
+    "com a number": (_link("com", 0.0), "joints[2].link.com is 0.0, must be 3 numbers in m"),
+    "inertia too long": (
+        _link("inertia", [1.0] * 9),
+        "joints[2].link.inertia is [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, ...], must be 6 numbers in kg m^2",
     ),
-    "com not a number": (_link("com", [0.0, nan, 0.0]), r"com\[1\] is nan m, expected a finite number"),
-    "com too short": (_link("com", [0.0, 0.0]), _HALF_ARM + r"com has 2 numbers, expected 3 in m"),
-    "com a number": (_link("com", 0.0), _HALF_ARM + r"com is 0.0, expected a list of 3 numbers in m"),
-    "inertia too long": (_link("inertia", [1.0] * 9), r"inertia has 9 numbers, expected 6 in kg m\^2"),
     "inertia not positive definite": (
         _link("inertia", [0.01, 0.02, 0.0, 0.01, 0.0, 0.01]),
-        _HALF_ARM + "inertia has " + _PRINCIPAL + "allowed is all more than 0",
+        "arm_a_link_3: inertia has principal moments -0.01, 0.01, 0.03 kg m^2, all must be > 0",
     ),
     "triangle inequality": (
         _link("inertia", [0.01, 0.0, 0.0, 0.01, 0.0, 0.0201]),
-        _HALF_ARM + "inertia has " + _PRINCIPAL + "allowed is none above the sum of the other two",
+        "arm_a_link_3: inertia has principal moments 0.01, 0.01, 0.0201 kg m^2, none may exceed",
     ),
-    "link radius": (_link("radius", 0.0), _HALF_ARM + r"radius is 0.0 m, allowed is more than 0"),
-    "axis not of unit length": (_joint("axis", [0, 0, 2]), _AXIS + r" \[.*\] has length 2, allowed is 1"),
-    "axis zero": (_joint("axis", [0, 0, 0]), _AXIS + r" \[.*\] has length 0, allowed is 1"),
-    "axis too long": (_joint("axis", [0, 0, 1, 0]), _AXIS + r" has 4 numbers, expected 3"),
-    "origin not a mapping": (_joint("origin", [0, 0, 0]), r"origin is \[0, 0, 0\], expected a mapping"),
+    "link radius": (_link("radius", 0.0), "joints[2].link.radius is 0.0 m, must be > 0 m"),
+    "axis not of unit length": (
+        _joint("axis", [0, 0, 2]),
+        "arm_a_joint_1: axis [0.0, 0.0, 2.0] has length 2, must be 1",
+    ),
+    "axis zero": (_joint("axis", [0, 0, 0]), "arm_a_joint_1: axis [0.0, 0.0, 0.0] has length 0, must be 1"),
+    "axis too long": (_joint("axis", [0, 0, 1, 0]), "joints[0].axis is [0, 0, 1, 0], must be 3 numbers"),
+    "origin not a mapping": (_joint("origin", [0, 0, 0]), "joints[0].origin is [0, 0, 0], must be a mapping"),
     "origin infinite": (
         _joint("origin", {"xyz": [0, 0, inf], "rpy": [0, 0, 0]}),
-        r"arm_a_joint_1: origin: xyz\[2\] is inf m, expected a finite number",
+        "joints[0].origin.xyz[2] is inf m, must be finite",
     ),
     "inverted limit": (
         _limit("position", [1.0, -1.0]),
-        r"gen3.yaml: arm_a_joint_2: position limit is \[1.0, -1.0\] rad, allowed is lower < upper",
+        "arm_a_joint_2: position limit is [1.0, -1.0] rad, must be lower < upper",
     ),
-    "empty limit": (_limit("position", [1.0, 1.0]), r"position limit is .* allowed is lower < upper"),
+    "empty limit": (
+        _limit("position", [1.0, 1.0]),
+        "arm_a_joint_2: position limit is [1.0, 1.0] rad, must be lower < upper",
+    ),
     "infinite limit": (
         _limit("position", [-inf, 1.0]),
-        r"arm_a_joint_2: position limit\[0\] is -inf rad, expected a finite number",
+        "joints[1].limits.position[0] is -inf rad, must be finite",
     ),
-    "limit with one number": (_limit("position", [1.0]), r"limit has 1 numbers, expected 2 in rad"),
-    "zero velocity": (_limit("velocity", 0.0), r"velocity limit is 0.0 rad/s, allowed is more than 0"),
-    "infinite velocity": (_limit("velocity", inf), r"velocity limit is inf rad/s, expected a finite number"),
-    "negative effort": (_limit("effort", -39), r"effort limit is -39.0 N m, allowed is more than 0"),
-    "effort not a number": (_limit("effort", nan), r"effort limit is nan N m, expected a finite number"),
-    "unknown key in a link": (_link("masss", 1.0), r"unknown key 'masss' \(did you mean 'mass'\?\)"),
-    "unknown key in a limit": (_limit("torque", 1.0), r"arm_a_joint_2: limits: unknown key 'torque': known"),
+    "limit with one number": (
+        _limit("position", [1.0]),
+        "joints[1].limits.position is [1.0], must be 2 numbers in rad",
+    ),
+    "zero velocity": (_limit("velocity", 0.0), "joints[1].limits.velocity is 0.0 rad/s, must be > 0 rad/s"),
+    "infinite velocity": (_limit("velocity", inf), "joints[1].limits.velocity is inf rad/s, must be finite"),
+    "negative effort": (_limit("effort", -39), "joints[1].limits.effort is -39 N m, must be > 0 N m"),
+    "effort not a number": (_limit("effort", nan), "joints[1].limits.effort is nan N m, must be finite"),
+    "unknown key in a link": (
+        _link("masss", 1.0),
+        "joints[2].link: unknown key 'masss' (did you mean 'mass'?): known are ",
+    ),
+    "unknown key in a limit": (_limit("torque", 1.0), "joints[1].limits: unknown key 'torque': known are "),
     "unknown key of the arm": (
         _set("arm", "flangee", value=0),
-        r"gen3.yaml: (line \d+: )?arm description: unknown key 'flangee' \(did you mean 'flange'\?\)",
+        "unknown key 'flangee' (did you mean 'flange'?): known are ",
     ),
-    "missing link": (_drop("arm", "joints", 6, "link"), r"arm_a_joint_7: key 'link' is missing"),
-    "missing flange": (
-        _drop("arm", "flange"),
-        r"gen3.yaml: (line \d+: )?arm description: key 'flange' is missing",
-    ),
-    "no joints": (
-        _set("arm", "joints", value=[]),
-        r"gen3.yaml: (line \d+: )?joints has 0 entries, allowed is at least 1",
-    ),
-    "joints not a list": (_set("arm", "joints", value={}), r"joints is \{\}, expected a list"),
-    "base mass": (_set("robot", "base", "mass", value=0), r"base: mass is 0.0 kg, allowed is more than 0"),
-    "base size": (
-        _set("robot", "base", "size", value=[1, 0, 1]),
-        r"base: size\[1\] is 0.0 m, allowed is more than 0",
-    ),
+    "missing link": (_drop("arm", "joints", 6, "link"), "joints[6].link is missing"),
+    "missing flange": (_drop("arm", "flange"), "flange is missing"),
+    "no joints": (_set("arm", "joints", value=[]), "joints has 0 entries, must be >= 1"),
+    "joints not a list": (_set("arm", "joints", value={}), "joints is {}, must be a list"),
+    "base mass": (_set("robot", "base", "mass", value=0), "base.mass is 0 kg, must be > 0 kg"),
+    "base size": (_set("robot", "base", "size", value=[1, 0, 1]), "base.size[1] is 0 m, must be > 0 m"),
     "base inertia by an unknown name": (
         _set("robot", "base", "inertia", value="uniform_bx"),
-        r"base: inertia: unknown inertia 'uniform_bx' \(did you mean 'uniform_box'\?\)",
+        "base: unknown inertia 'uniform_bx' (did you mean 'uniform_box'?): known are ",
     ),
     "base inertia impossible": (
         _set("robot", "base", "inertia", value=[1, 0, 0, 1, 0, 3]),
-        r"base_link: inertia has .* none above the sum of the other two",
+        "base_link: inertia has principal moments 1, 1, 3 kg m^2, none may exceed the sum of the other two",
     ),
-    "missing base key": (
-        _drop("robot", "base", "com"),
-        r"robot.yaml: (line \d+: )?base: key 'com' is missing",
+    "missing base key": (_drop("robot", "base", "com"), "base.com is missing"),
+    "unknown base key": (
+        _set("robot", "base", "sizes", value=1),
+        "base: unknown key 'sizes' (did you mean 'size'?): known are ",
     ),
-    "unknown base key": (_set("robot", "base", "sizes", value=1), r"unknown key 'sizes' .*'size'"),
-    "unknown key of the robot": (_set("robot", "arm", value=1), r"robot: unknown key 'arm' .*'arms'"),
-    "key that is a number": (_set("robot", 7, value=1), r"robot: unknown key 7: known are"),
+    "unknown key of the robot": (
+        _set("robot", "arm", value=1),
+        "unknown key 'arm' (did you mean 'arms'?): known are ",
+    ),
+    "key that is a number": (_set("robot", 7, value=1), "key 7 must be text"),
     "panel size": (
         _set("robot", "base", "panels", 1, "size", value=[1, 1, -1]),
-        r"base: panels\[1\]: size\[2\] is -1.0 m, allowed is more than 0",
+        "base.panels[1].size[2] is -1 m, must be > 0 m",
     ),
-    "robot without a name": (
-        _set("robot", "name", value=""),
-        r"robot.yaml: (line \d+: )?name is '', expected text",
+    "robot without a name": (_set("robot", "name", value=""), "name is '', must be text"),
+    "no arms": (_set("robot", "arms", value=[]), "the robot has 0 arms, must be >= 1"),
+    "arms not a list": (_set("robot", "arms", value=None), "arms is None, must be a list"),
+    "duplicate arm": (_robot_arm("name", "arm_b"), "arm name 'arm_b' is given 2 times"),
+    "arm name": (
+        _robot_arm("name", "Arm A"),
+        "arm name is 'Arm A', must be lower-case letters, digits and _, a letter first",
     ),
-    "no arms": (_set("robot", "arms", value=[]), r"robot.yaml: the robot has 0 arms, allowed is at least 1"),
-    "arms not a list": (_set("robot", "arms", value=None), r"arms is None, expected a list"),
-    "duplicate arm": (_robot_arm("name", "arm_b"), r"arm name 'arm_b' is given 2 times, allowed is once"),
-    "arm name": (_robot_arm("name", "Arm A"), r"arm name is 'Arm A', allowed are lower-case letters"),
-    "missing mount": (_drop("robot", "arms", 0, "mount"), r"arms\[0\]: key 'mount' is missing"),
+    "missing mount": (_drop("robot", "arms", 0, "mount"), "arms.arm_a.mount is missing"),
     "mount angle": (
         _set("robot", "arms", 0, "mount", "rpy", value=[0, 0, nan]),
-        r"robot.yaml: (line \d+: )?arm_a: mount: rpy\[2\] is nan rad, expected a finite number",
+        "arms.arm_a.mount.rpy[2] is nan rad, must be finite",
     ),
     "gripper mass": (
         _set("robot", "arms", 0, "gripper", "mass", value=0),
-        r"robot.yaml: (line \d+: )?arm_a_gripper: mass is 0.0 kg, allowed is more than 0",
+        "arms.arm_a.gripper.mass is 0 kg, must be > 0 kg",
     ),
     "gripper length": (
         _set("robot", "arms", 0, "gripper", "length", value=-1),
-        r"arm_a_gripper: length is -1.0 m, allowed is more than 0",
+        "arms.arm_a.gripper.length is -1 m, must be > 0 m",
     ),
     "gripper radius": (
         _set("robot", "arms", 0, "gripper", "radius", value=0),
-        r"arm_a_gripper: radius is 0.0 m, allowed is more than 0",
+        "arms.arm_a.gripper.radius is 0 m, must be > 0 m",
     ),
     "too few rotor inertias": (
         _robot_arm("rotor_inertia", [0.4] * 6),
-        r"arm_a: rotor_inertia has 6 numbers, expected 7 in kg m\^2",
+        "arms.arm_a.rotor_inertia is [0.4, 0.4, 0.4, 0.4, 0.4, 0.4], must be 7 numbers in kg m^2",
     ),
     "negative rotor inertia": (
         _robot_arm("rotor_inertia", [0.4] * 6 + [-0.2]),
-        r"robot.yaml: (line \d+: )?arm_a_joint_7: rotor inertia is -0.2 kg m\^2, allowed is 0 or more",
+        "arm_a_joint_7: rotor inertia is -0.2 kg m^2, must be >= 0 kg m^2",
     ),
     "override of an unknown joint": (
         _robot_arm("limits", {"joint_8": {"effort": 1.0}}),
-        r"arm_a: limits: unknown key 'joint_8' \(did you mean 'joint_\d'\?\)",
+        "arms.arm_a.limits: unknown key 'joint_8' (did you mean 'joint_7'?): known are ",
     ),
     "override of an unknown limit": (
         _robot_arm("limits", {"joint_1": {"efort": 1.0}}),
-        r"arm_a: limits: joint_1: unknown key 'efort' \(did you mean 'effort'\?\)",
+        "arms.arm_a.limits.joint_1: unknown key 'efort' (did you mean 'effort'?): known are ",
     ),
     "override that inverts a limit": (
         _robot_arm("limits", {"joint_2": {"position": [1.0, -1.0]}}),
-        r"robot.yaml: arm_a_joint_2: position limit is \[1.0, -1.0\] rad, allowed is lower < upper",
+        "arm_a_joint_2: position limit is [1.0, -1.0] rad, must be lower < upper",
     ),
 }
 
 
 @pytest.mark.parametrize("case", REFUSED)
 def test_impossible_robots_are_refused(files: Files, case: str) -> None:
-    """The message is one line and names the file, the part, the value with its unit and what is allowed."""
-    spoil, message = REFUSED[case]
+    """The message is one line: file, line, dotted path, the value with its unit, and what is allowed."""
+    spoil, expected = REFUSED[case]
     spoil(files)
-    with pytest.raises(RobotDescriptionError, match=message) as caught:
+    with pytest.raises(RobotDescriptionError) as caught:
         files.load()
-    assert "\n" not in str(caught.value)
-    assert str(files.folder) in str(caught.value)
+    match = re.fullmatch(r"(.*\.yaml):(\d+): (.*)", str(caught.value))
+    assert match and match[3].startswith(expected)
+    lines = Path(match[1]).read_text(encoding="utf-8").splitlines()
+    named = re.match(r"[\w.\[\]]*?(\w+)(\[\d+\])* is .* must be", match[3])
+    assert named is None or f"{named[1]}: " in f"{lines[int(match[2]) - 1]} "
 
 
 def test_missing_file_is_named(files: Files) -> None:
@@ -478,31 +478,29 @@ def test_missing_file_is_named(files: Files) -> None:
 def test_parts_made_in_code_are_checked_too(robot: RobotDescription) -> None:
     """The rules hold for a description however it is made."""
     arm = robot.arms[0]
-    with pytest.raises(RobotDescriptionError, match=r"arm_a: has 7 joints and 6 links, allowed are equal"):
+    with pytest.raises(RobotDescriptionError, match=r"arm_a: has 7 joints and 6 links, must be equal"):
         replace(arm, links=arm.links[:6])
-    with pytest.raises(RobotDescriptionError, match=r"arm_a: has 0 joints, allowed is at least 1"):
+    with pytest.raises(RobotDescriptionError, match=r"arm_a: has 0 joints, must be >= 1"):
         replace(arm, joints=(), links=())
-    with pytest.raises(RobotDescriptionError, match=r"arm_c: .*'arm_a_joint_1', allowed is 'arm_c_joint_1'"):
+    with pytest.raises(RobotDescriptionError, match=r"arm_c: .*'arm_a_gripper', must be 'arm_c_gripper'"):
         replace(arm, name="arm_c")
-    with pytest.raises(RobotDescriptionError, match=r"origin xyz has 2 numbers, expected 3 in m"):
+    with pytest.raises(RobotDescriptionError, match=r"origin xyz is \(0.0, 0.0\), must be 3 numbers in m"):
         replace(arm.mount, xyz=(0.0, 0.0))
-    with pytest.raises(RobotDescriptionError, match=r"origin rpy\[2\] is nan rad"):
+    with pytest.raises(RobotDescriptionError, match=r"origin rpy\[2\] is nan rad, must be finite"):
         replace(arm.mount, rpy=(0.0, 0.0, nan))
-    with pytest.raises(RobotDescriptionError, match=r"arm_a_link_1: com has 2 numbers, expected 3 in m"):
+    with pytest.raises(RobotDescriptionError, match=r"arm_a_link_1: com is \(0.0, 0.0\), must be 3"):
         replace(arm.links[0].inertia, com=(0.0, 0.0))
-    with pytest.raises(RobotDescriptionError, match=r"arm_a_link_1: inertia has 3 numbers, expected 6"):
+    with pytest.raises(RobotDescriptionError, match=r"arm_a_link_1: inertia is \(.*\), must be 6"):
         replace(arm.links[0].inertia, moments=(1.0, 1.0, 1.0))
-    with pytest.raises(RobotDescriptionError, match=r"arm_a_joint_1: axis has 1 numbers, expected 3"):
+    with pytest.raises(RobotDescriptionError, match=r"arm_a_joint_1: axis is \(1.0,\), must be 3"):
         replace(arm.joints[0], axis=(1.0,))
     with pytest.raises(RobotDescriptionError, match=r"panel xyz\[0\] is inf m"):
         replace(robot.base.panels[0], xyz=(inf, 0.0, 0.0))
-    with pytest.raises(RobotDescriptionError, match=r"panel size\[0\] is 0.0 m, allowed is more than 0"):
+    with pytest.raises(RobotDescriptionError, match=r"panel size\[0\] is 0.0 m, must be > 0 m"):
         replace(robot.base.panels[0], size=(0.0, 1.0, 1.0))
-    with pytest.raises(
-        RobotDescriptionError, match=r"base_link: size\[2\] is -1.0 m, allowed is more than 0"
-    ):
+    with pytest.raises(RobotDescriptionError, match=r"base_link: size\[2\] is -1.0 m, must be > 0 m"):
         replace(robot.base, size=(1.0, 1.0, -1.0))
-    with pytest.raises(RobotDescriptionError, match=r"position limit upper is inf rad"):
+    with pytest.raises(RobotDescriptionError, match=r"position limit\[1\] is inf rad, must be finite"):
         replace(arm.joints[0], upper=inf)
 
 

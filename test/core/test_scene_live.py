@@ -49,7 +49,7 @@ def live(scenario: Scenario) -> LiveScene:
 
 def test_in_the_end_it_is_the_scene_of_the_run(live: LiveScene, run: RunData, scene: Scene) -> None:
     play(live, run, scene)
-    news = live.news(Seen(), 0.0)
+    news = live.updates(Seen(), 0.0)
     assert news is not None
     expected = scene_document("live", replace(scene, grasp_events=()))
     assert json.loads(json.dumps(news[0])) == json.loads(json.dumps(expected))
@@ -57,11 +57,11 @@ def test_in_the_end_it_is_the_scene_of_the_run(live: LiveScene, run: RunData, sc
 
 def test_what_is_new_is_told_once(live: LiveScene, run: RunData, scene: Scene) -> None:
     play(live, run, scene, slice(0, 5))
-    first = live.news(Seen(), 0.0)
+    first = live.updates(Seen(), 0.0)
     assert first is not None and "shapes" in first[0]
-    assert live.news(first[1], 0.0) is None
+    assert live.updates(first[1], 0.0) is None
     play(live, run, scene, slice(5, 8))
-    second = live.news(first[1], 0.0)
+    second = live.updates(first[1], 0.0)
     assert second is not None and "shapes" not in second[0]
     told = np.concatenate([times(first[0]), times(second[0])])
     assert np.array_equal(told, scene.stamp_ns[:8] / 1e9)
@@ -69,7 +69,7 @@ def test_what_is_new_is_told_once(live: LiveScene, run: RunData, scene: Scene) -
 
 def test_poses_are_those_of_the_run(live: LiveScene, run: RunData, scene: Scene) -> None:
     play(live, run, scene)
-    news = live.news(Seen(), 0.0)
+    news = live.updates(Seen(), 0.0)
     assert news is not None
     told = poses(news[0], len(scene.links) + 1 + len(scene.arms))
     targets = [scene.target_in_world[arm][:, None] for arm in scene.arms]
@@ -81,25 +81,25 @@ def test_a_frame_that_goes_back_begins_another_run(live: LiveScene, run: RunData
     """Whether the phase or the frame comes first depends on the middleware."""
     for frame in (*frames(run, scene), frames(run, scene)[0]):
         live.add(frame)
-    news = live.news(Seen(), 0.0)
+    news = live.updates(Seen(), 0.0)
     assert news is not None and times(news[0]).tolist() == [0.0]
 
 
 def test_instants_between_frames_are_left_out(scenario: Scenario, run: RunData, scene: Scene) -> None:
     slow = LiveScene(scenario.robot.urdf, scenario.schedule.deputy.size, frame_rate=5.0)
     play(slow, run, scene)
-    news = slow.news(Seen(), 0.0)
+    news = slow.updates(Seen(), 0.0)
     assert news is not None
     assert times(news[0]).tolist() == [0.0, 0.2, 0.4, 0.6]
 
 
 def test_a_stamp_that_goes_back_begins_another_run(live: LiveScene, run: RunData, scene: Scene) -> None:
     play(live, run, scene)
-    before = live.news(Seen(), 0.0)
+    before = live.updates(Seen(), 0.0)
     assert before is not None
-    live.tell(scene.grasp_events[0])
+    live.add_event(scene.grasp_events[0])
     play(live, run, scene, slice(0, 2))
-    again = live.news(before[1], 0.0)
+    again = live.updates(before[1], 0.0)
     assert again is not None and "shapes" in again[0]
     assert times(again[0]).tolist() == (scene.stamp_ns[:2] / 1e9).tolist()
     assert again[0]["events"] == []
@@ -108,7 +108,7 @@ def test_a_stamp_that_goes_back_begins_another_run(live: LiveScene, run: RunData
 
 def test_who_waits_is_woken(live: LiveScene, run: RunData, scene: Scene) -> None:
     told: list[Any] = []
-    waiting = Thread(target=lambda: told.append(live.news(Seen(), PATIENCE_S)))
+    waiting = Thread(target=lambda: told.append(live.updates(Seen(), PATIENCE_S)))
     waiting.start()
     live.add(frames(run, scene)[0])
     waiting.join(PATIENCE_S)
@@ -120,17 +120,17 @@ def test_a_long_run_keeps_its_newest_frames(
 ) -> None:
     monkeypatch.setattr("sms_handover.scene.live._MOST_FRAMES", 8)
     play(live, run, scene, slice(0, 8))
-    seen = live.news(Seen(), 0.0)
+    seen = live.updates(Seen(), 0.0)
     assert seen is not None
     play(live, run, scene, slice(8, 9))
-    news = live.news(seen[1], 0.0)
+    news = live.updates(seen[1], 0.0)
     assert news is not None and "shapes" in news[0]
     assert times(news[0]).tolist() == (scene.stamp_ns[4:9] / 1e9).tolist()
 
 
 @pytest.mark.parametrize("frame_rate", [0.0, -5.0, float("nan")])
 def test_a_rate_that_is_not_positive_is_refused(scenario: Scenario, frame_rate: float) -> None:
-    with pytest.raises(ConfigurationError, match=r"frame rate is .* 1/s, it must be positive"):
+    with pytest.raises(ConfigurationError, match=r"frame rate is .* 1/s, it must be > 0"):
         LiveScene(scenario.robot.urdf, scenario.schedule.deputy.size, frame_rate)
 
 

@@ -1,5 +1,6 @@
 """A schedule is read whole, and everything wrong with it is said with the line where it stands."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -44,10 +45,12 @@ class Files:
 
     def refusal(self, text: str) -> str:
         """Return the words with which a schedule is refused."""
-        with pytest.raises(ScheduleError) as caught:
+        with pytest.raises(ConfigurationError) as caught:
             self.load(text)
+        assert isinstance(caught.value, ScheduleError) or re.search(
+            "not valid YAML|top level", str(caught.value)
+        )
         assert "\n" not in str(caught.value)
-        assert isinstance(caught.value, ConfigurationError)
         return str(caught.value)
 
 
@@ -139,15 +142,15 @@ def test_what_a_phase_does_about_a_miss(files: Files, written: str, read: OnMiss
     ("policy", "words"),
     [
         ("on_miss: abbort", ["unknown value 'abbort'", "did you mean 'abort'"]),
-        ("on_miss: retry", ["needs to know how often: write {retry: 2}"]),
-        ("on_miss: {retry: 0}", ["'retry' is 0, expected a whole number from 1 to 100"]),
-        ("on_miss: {retry: 2.5}", ["'retry' is 2.5, expected a whole number"]),
-        ("on_miss: {retry: true}", ["'retry' is True, expected a whole number"]),
-        ("on_miss: {retry: 101}", ["'retry' is 101, expected a whole number from 1 to 100"]),
+        ("on_miss: retry", ["needs the number of retries: write {retry: 2}"]),
+        ("on_miss: {retry: 0}", ["phases.carry.on_miss.retry is 0, must be >= 1 and <= 100"]),
+        ("on_miss: {retry: 2.5}", ["retry is 2.5, must be a whole number"]),
+        ("on_miss: {retry: true}", ["retry is True, must be a whole number"]),
+        ("on_miss: {retry: 101}", ["retry is 101, must be >= 1 and <= 100"]),
         ("on_miss: {retries: 2}", ["unknown key 'retries'", "did you mean 'retry'"]),
-        ("on_miss: {}", ["key 'retry' is missing"]),
-        ("on_miss: 3", ["'on_miss' is 3, expected text"]),
-        ("on_miss: [abort]", ["'on_miss' must be a mapping"]),
+        ("on_miss: {}", ["phases.carry.on_miss.retry is missing"]),
+        ("on_miss: 3", ["phases.carry.on_miss is 3, must be a mapping"]),
+        ("on_miss: [abort]", ["on_miss is ['abort'], must be a mapping"]),
     ],
 )
 def test_a_policy_that_makes_no_sense_is_refused(files: Files, policy: str, words: list[str]) -> None:
@@ -164,7 +167,7 @@ def test_a_policy_needs_a_grasp_and_a_retry_a_phase_before(files: Files) -> None
     assert "no event of the phase is a grasp or transfer" in files.refusal(text)
     grasp = "    on_miss: {retry: 1}\n    events:\n      - grasp: {arm: arm_a, grasp_frame: left}\n"
     text = SCHEDULE.replace("  - name: approach\n", f"  - name: approach\n{grasp}")
-    assert "a retry does the phase before again, but this is the first one" in files.refusal(text)
+    assert "a retry repeats the phase before, but this is the first one" in files.refusal(text)
 
 
 def test_phase_in_force(files: Files) -> None:
@@ -245,178 +248,183 @@ REFUSED: dict[str, tuple[str, str, str, str]] = {
     "two events in one": (
         "- release: {arm: arm_b}",
         "- {release: {arm: arm_b}, grasp: {arm: arm_b, grasp_frame: left}}",
-        "an event is exactly one of grasp, release, transfer",
+        "an event must have exactly one of grasp, release, transfer",
         "- {release",
     ),
     "missing joints of an arm": (
         "    arm_b: [-0.7, -1.7, -1.4, 1.9, -1.6, -1.4, -1.2]\n",
         "",
-        "key 'arm_b' is missing",
+        "initial.joints.arm_b is missing",
         "    arm_a: [0.7",
     ),
     "missing target of an arm": (
         "      arm_b: hold\n\n",
         "\n",
-        "target of 'arm_b' is missing: give one of hold, joints, tool_in_world, grasp_frame",
+        "phases.approach.arms.arm_b is missing",
         "arm_a: {grasp_frame: left}",
     ),
     "missing rpy": (
         "{xyz: [1.15, 0.02, 0.75], rpy: [3.14, -1.5, 0.0]}",
         "{xyz: [1.15, 0.02, 0.75]}",
-        "'rpy' is missing",
+        "phases.carry.arms.arm_a.tool_in_world.rpy is missing",
         "[1.15, 0.02",
     ),
-    "missing name": (_CARRY, "  - start: 0.4\n", "key 'name' is missing", "- start: 0.4"),
-    "missing duration": ("    duration: 0.6\n", "", "key 'duration' is missing", "name: carry"),
-    "empty name": (_CARRY, '  - name: ""\n', "'name' is '', expected text", '- name: ""'),
-    "number for a name": (_CARRY, "  - name: 5\n", "'name' is 5, expected text", "- name: 5"),
+    "missing name": (_CARRY, "  - start: 0.4\n", "phases[1].name is missing", "- start: 0.4"),
+    "missing duration": ("    duration: 0.6\n", "", "phases.carry.duration is missing", "name: carry"),
+    "empty name": (_CARRY, '  - name: ""\n', "phases[1].name is '', must be text", '- name: ""'),
+    "number for a name": (_CARRY, "  - name: 5\n", "phases[1].name is 5, must be text", "- name: 5"),
     "target that is a word": (
         "arm_b: hold\n\n",
         "arm_b: wait\n\n",
-        "is 'wait', expected 'hold' or a mapping",
+        "phases.approach.arms.arm_b is 'wait', must be hold or a mapping",
         "wait",
     ),
     "target of two kinds": (
         "arm_a: {grasp_frame: left}",
         "arm_a: {grasp_frame: left, joints: [0, 0, 0, 0, 0, 0, 0]}",
-        "needs exactly one of joints, tool_in_world, grasp_frame",
+        "must have exactly one of joints, tool_in_world, grasp_frame",
         "joints: [0, 0",
     ),
     "target of no kind": (
         "arm_a: {grasp_frame: left}",
         "arm_a: {}",
-        "needs exactly one of joints",
+        "must have exactly one of joints",
         "arm_a: {}",
     ),
     "offset without a grasp frame": (
         "arm_a: {grasp_frame: left}",
         "arm_a: {tool_in_grasp_frame: {xyz: [0, 0, 0], rpy: [0, 0, 0]}}",
-        "needs exactly one of joints",
+        "must have exactly one of joints",
         "arm_a: {tool_in_grasp_frame",
     ),
     "text for a time": (
         "duration: 0.6",
         "duration: long",
-        "'duration' is 'long', expected a number of at",
+        "phases.carry.duration is 'long', must be a number in s",
         "long",
     ),
     "no number": (
         "duration: 0.6",
         "duration: .nan",
-        "'duration' is nan, expected a number of at least 1e-09",
+        "duration is nan s, must be finite",
         ".nan",
     ),
     "infinite time": (
         "duration: 0.6",
         "duration: .inf",
-        "'duration' is inf, expected a number of at",
+        "duration is inf s, must be finite",
         ".inf",
     ),
     "time beyond every float": (
         "duration: 0.6",
         "duration: 1" + 400 * "0",
-        "expected a number of at",
+        "duration is inf s, must be finite",
         "duration: 10",
     ),
     "no time at all": (
         "duration: 0.6",
         "duration: 0",
-        "'duration' is 0, expected a number of at least",
+        "duration is 0 s, must be >= 1e-09 s",
         "duration: 0\n",
     ),
     "negative time": (
         "duration: 0.6",
         "duration: -0.6",
-        "'duration' is -0.6, expected a number of at least",
+        "duration is -0.6 s, must be >= 1e-09 s",
         "-0.6\n",
     ),
-    "yes for a time": ("duration: 0.6", "duration: yes", "'duration' is True, expected a number", "yes"),
+    "yes for a time": ("duration: 0.6", "duration: yes", "duration is True, must be a number in s", "yes"),
     "motion longer than the phase": (
         "motion: 0.3",
         "motion: 0.5",
-        "'motion' is longer than the phase",
+        "phases.approach.motion is 0.5 s, must be >= 1e-09 and <= 0.4 s",
         "motion: 0.5",
     ),
     "no motion": (
         "motion: 0.3",
         "motion: 0.0",
-        "'motion' is 0.0, expected a number of at least",
+        "phases.approach.motion is 0.0 s, must be >= 1e-09",
         "motion: 0.0",
     ),
     "too few joints": (
         "[0.6, -1.6, 1.3, 1.8, 1.5, -1.3, 1.1]",
         "[0.6]",
-        "expected 7 numbers in rad",
+        "phases.withdraw.arms.arm_a.joints is [0.6], must be 7 numbers in rad",
         "[0.6]",
     ),
     "too many coordinates": (
         "[1.25, 0.0, 0.75]",
         "[1.25, 0.0, 0.75, 0]",
-        "expected 3 numbers in m",
+        "deputy.in_world.xyz is [1.25, 0.0, 0.75, 0], must be 3 numbers in m",
         "0.75, 0]",
     ),
     "text among coordinates": (
         "[1.25, 0.0, 0.75]",
         "[1.25, x, 0.75]",
-        "'xyz' is 'x', expected a finite number in m",
+        "deputy.in_world.xyz[1] is 'x', must be a number in m",
         "x, 0.75",
     ),
     "scalar for coordinates": (
         "[1.25, 0.0, 0.75]",
         "1.25",
-        "'xyz' is 1.25, expected 3 numbers in m",
+        "deputy.in_world.xyz is 1.25, must be 3 numbers in m",
         "xyz: 1.25",
     ),
     "infinite coordinate": (
         "[1.25, 0.0, 0.75]",
         "[1.25, -.inf, 0.75]",
-        "'xyz' is -inf, expected a finite",
+        "deputy.in_world.xyz[1] is -inf m, must be finite",
         "-.inf",
     ),
     "start outside a limit": (
         "1.4, 1.9, 1.6",
         "1.4, 2.6, 1.6",
-        "arm_a_joint_4 is 2.6 rad, allowed is -2.57",
+        "arm_a_joint_4 is 2.6 rad, must be >= -2.57 and <= 2.57 rad",
         "2.6, 1.6",
     ),
     "target outside a limit": (
         "0.6, -1.6, 1.3",
         "0.6, 2.5, 1.3",
-        "arm_a_joint_2 is 2.5 rad, allowed is -2.24",
+        "arm_a_joint_2 is 2.5 rad, must be >= -2.24 and <= 2.24 rad",
         "2.5,",
     ),
-    "deputy with mass": ("mass: 0.0", "mass: 4.0", "'mass' is 4 kg, but only a massless deputy", "mass"),
+    "deputy with mass": ("mass: 0.0", "mass: 4.0", "deputy.mass is 4 kg, must be 0", "mass"),
     "deputy with negative mass": (
         "mass: 0.0",
         "mass: -1.0",
-        "'mass' is -1.0, expected a number of at least 0",
+        "deputy.mass is -1.0 kg, must be >= 0 kg",
         "-1.0\n",
     ),
     "deputy without extent": (
         "size: [0.1, 0.34, 0.1]",
         "size: [0.1, 0, 0.1]",
-        "three positive lengths",
+        "deputy.size[1] is 0 m, must be > 0 m",
         "size: [0.1, 0,",
     ),
     "word for a mapping": (
         "base_in_world: {xyz: [0.1, -0.2, 0.3], rpy: [0.0, 0.0, 0.05]}",
         "base_in_world: here",
-        "'base_in_world' must be a mapping",
+        "initial.base_in_world is 'here', must be a mapping",
         "here",
     ),
     "word for a list of events": (
         "    events:\n      - release: {arm: arm_b}\n",
         "    events: release\n",
-        "'events' must be a list",
+        "phases.let go.events is 'release', must be a list",
         "events: release",
     ),
     "word for an event": (
         "- release: {arm: arm_b}",
         "- release",
-        "every item of 'events' must be a mapping",
-        "- release",
+        "phases.let go.events[0] is 'release', must be a mapping",
+        "events:",
     ),
-    "word for gains": ("nmpc: {rolling_period: 2.0}", "nmpc: 2.0", "'nmpc' must be a mapping", "nmpc: 2.0"),
+    "word for gains": (
+        "nmpc: {rolling_period: 2.0}",
+        "nmpc: 2.0",
+        "phases.carry.gains.nmpc is 2.0, must be a mapping",
+        "nmpc: 2.0",
+    ),
     "key given twice": (
         "duration: 0.6\n",
         "duration: 0.6\n    duration: 0.8\n",
@@ -444,7 +452,7 @@ REFUSED: dict[str, tuple[str, str, str, str]] = {
     "negative start": (
         "    start: 0.0\n",
         "    start: -1\n",
-        "'start' is -1, expected a number of at least 0",
+        "phases.approach.start is -1 s, must be >= 0 s",
         "-1\n",
     ),
     "name given twice": (
@@ -456,7 +464,7 @@ REFUSED: dict[str, tuple[str, str, str, str]] = {
     "end between two references": (
         "duration: 0.2\n    events:\n      - release",
         "duration: 0.21\n    events:\n      - release",
-        "phase 'let go' ends at 1.41 s, which is not a multiple of the reference period of 0.02 s",
+        "phase 'let go' ends at 1.41 s, must be a multiple of the reference period of 0.02 s",
         "name: let go",
     ),
     "release before a grasp": (
@@ -521,24 +529,24 @@ def test_missing_sections_are_named(files: Files) -> None:
     for name, after in (("initial", "deputy:"), ("deputy", "phases:")):
         start = SCHEDULE.index(f"{name}:\n")
         text = SCHEDULE[:start] + SCHEDULE[SCHEDULE.index(after) :]
-        assert files.refusal(text) == f"{files.path}:1: key {name!r} is missing"
+        assert files.refusal(text) == f"{files.path}:1: {name} is missing"
     text = SCHEDULE[: SCHEDULE.index("phases:")]
-    assert files.refusal(text) == f"{files.path}:1: key 'phases' is missing"
-    assert "'phases' is empty: a schedule needs at least one phase" in files.refusal(text + "phases: []\n")
-    assert "'phases' must be a list" in files.refusal(text + "phases: {a: 1}\n")
-    assert "every item of 'phases' must be a mapping" in files.refusal(text + "phases: [1]\n")
+    assert files.refusal(text) == f"{files.path}:1: phases is missing"
+    assert "phases has 0 entries, must be >= 1" in files.refusal(text + "phases: []\n")
+    assert "phases is {'a': 1}, must be a list" in files.refusal(text + "phases: {a: 1}\n")
+    assert "phases[0] is 1, must be a mapping" in files.refusal(text + "phases: [1]\n")
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "expected a mapping at the top level"),
-        ("- 1\n", "expected a mapping at the top level"),
-        ("just words\n", "expected a mapping at the top level"),
-        ("initial: [1,\n", "is not valid YAML"),
-        ("a: b: c\n", "is not valid YAML: mapping values are not allowed here"),
-        ("\tinitial: 1\n", "is not valid YAML"),
-        ("initial: *nowhere\n", "is not valid YAML: found undefined alias"),
+        ("", "must be a mapping at the top level"),
+        ("- 1\n", "must be a mapping at the top level"),
+        ("just words\n", "must be a mapping at the top level"),
+        ("initial: [1,\n", ":2: not valid YAML"),
+        ("a: b: c\n", ":1: not valid YAML: mapping values are not allowed here"),
+        ("\tinitial: 1\n", ":1: not valid YAML"),
+        ("initial: *nowhere\n", ":1: not valid YAML: found undefined alias"),
     ],
 )
 def test_what_is_not_a_schedule_at_all(files: Files, text: str, words: str) -> None:
@@ -550,19 +558,19 @@ def test_what_is_not_a_schedule_at_all(files: Files, text: str, words: str) -> N
 
 def test_files_that_cannot_be_read(files: Files, robot: RobotModel) -> None:
     """A missing file, a folder and bytes that are no text are named."""
-    with pytest.raises(ScheduleError, match=r"cannot read the schedule .*schedule\.yaml: No such file"):
+    with pytest.raises(ConfigurationError, match=r"cannot read .*schedule\.yaml: No such file"):
         load_schedule(files.path, robot, _PERIOD_NS)
-    with pytest.raises(ScheduleError, match=r"cannot read the schedule .*: Is a directory"):
+    with pytest.raises(ConfigurationError, match=r"cannot read .*: Is a directory"):
         load_schedule(files.path.parent, robot, _PERIOD_NS)
     files.path.write_bytes(b"\xff\xfe")
-    with pytest.raises(ScheduleError, match=r"schedule\.yaml is not valid YAML"):
+    with pytest.raises(ConfigurationError, match=r"cannot read .*schedule\.yaml: 'utf-8' codec can't decode"):
         load_schedule(files.path, robot, _PERIOD_NS)
 
 
 def test_a_tag_runs_no_code(files: Files) -> None:
     """YAML can name Python functions; a schedule that does is refused, and nothing is called."""
     text = SCHEDULE.replace("duration: 0.6", 'duration: !!python/object/apply:os.system ["exit 1"]')
-    assert "'duration'" in files.refusal(text)
+    assert "could not determine a constructor" in files.refusal(text)
 
 
 def test_gains_of_an_unknown_law_are_refused_when_the_controller_is_made(make_scenario: MakeScenario) -> None:

@@ -9,7 +9,9 @@ import pinocchio as pin
 import pytest
 
 from sms_handover.frames import joint_name, mount_frame, tool_frame
-from sms_handover.model.description import Inertia, Origin, RobotDescription, load_robot
+from sms_handover.model.assembly import RobotDescription
+from sms_handover.model.description import load_robot
+from sms_handover.model.parts import Inertia, Origin
 from sms_handover.model.urdf import to_urdf
 from sms_handover.types import Array
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .attempt import attempt, from_json, to_json, write_outcome
-from .discover import chosen, families
+from .discover import chosen, families, sample
 from .outcome import Outcome, Status
 from .page import page
 from .runner import own_mounts, run_all
@@ -24,6 +24,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ValueError as error:
         print(f"faults: error: {error}", file=sys.stderr)
         return EXIT_USAGE
+    if options.sample:
+        jobs = sample(jobs, options.seed)
     if options.attempt:
         ((family, fault),) = jobs
         write_outcome(attempt(fault, family.name, options.seed, options.folder), options.folder)
@@ -106,6 +108,7 @@ def _parser() -> ArgumentParser:
         epilog="exit codes: 0 every promise was kept (or could not be tried here), 1 one was broken, 2 wrong "
         "options, 130 interrupted.\n\nexamples:\n  python test/faults --list\n"
         "  python test/faults --family disk --seed 7\n"
+        "  python test/faults --sample --seed 7\n"
         "  python test/faults --only 'processes/*killed*' --jobs 2",
         formatter_class=RawDescriptionHelpFormatter,
     )
@@ -118,6 +121,9 @@ def _parser() -> ArgumentParser:
         default=[],
         metavar="PATTERN",
         help="only these, e.g. 'disk/*full*'",
+    )
+    parser.add_argument(
+        "--sample", action="store_true", help="only one of each family, which the seed decides"
     )
     parser.add_argument("--seed", type=int, default=0, help="of what is random in the faults (default: 0)")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="faults at a time (default: 1)")

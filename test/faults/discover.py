@@ -4,7 +4,9 @@ import ast
 from collections.abc import Sequence
 from fnmatch import fnmatch
 from importlib import import_module
+from itertools import groupby
 from pathlib import Path
+from random import Random
 from typing import Any
 
 from .fault import Family, Fault
@@ -47,6 +49,13 @@ def chosen(
         if (not names or family.name in names)
         and (not patterns or any(_fits(family, fault, pattern) for pattern in patterns))
     ]
+
+
+def sample(jobs: Sequence[tuple[Family, Fault[Any]]], seed: int) -> list[tuple[Family, Fault[Any]]]:
+    """Return one of the faults of each family, which the seed decides."""
+    random = Random(seed)
+    by_family = groupby(jobs, key=lambda job: job[0].name)
+    return [random.choice(list(of_family)) for _, of_family in by_family]
 
 
 def _fits(family: Family, fault: Fault[Any], pattern: str) -> bool:

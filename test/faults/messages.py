@@ -239,7 +239,7 @@ FAULTS = (
     _file(
         "schedule-bomb", "a schedule of aliases of aliases", _bomb, _SCHEDULE, "written out it is too large"
     ),
-    _file("schedule-huge", "a schedule of 10 MB", lambda: "#" * 10**7, _SCHEDULE, "it has more than"),
+    _file("schedule-huge", "a schedule of 10 MB", lambda: "#" * 10**7, _SCHEDULE, "more than"),
     _file(
         "schedule-code",
         "a schedule with a Python object",

@@ -20,6 +20,7 @@ from sms_handover.bag.metadata import METADATA_FILE, counts_of, metadata_of
 from sms_handover.bag.repair.check import check
 from sms_handover.bag.repair.recover import recover
 from sms_handover.bag.run.reader import read_run
+from sms_handover.bag.time_order import messages_by_time
 from sms_handover.configuration.package_files import config_file
 from sms_handover.errors import SmsHandoverError
 from sms_handover.frames import BASE, WORLD
@@ -119,6 +120,7 @@ def _bag(data: bytes, folder: Path) -> None:
     _refusing(lambda: check(path))
     _refusing(lambda: read_info(path))
     _refusing(lambda: [None for _ in read_messages(path)])
+    _refusing(lambda: [None for _ in messages_by_time(path)])
     _refusing(lambda: read_run(path))
     _refusing(lambda: recover(path, folder / "recovered"))
 

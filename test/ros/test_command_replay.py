@@ -26,7 +26,7 @@ from sms_handover.model.robot_model import RobotModel
 from sms_handover.ros.codecs.convert import header
 from sms_handover.ros.codecs.loop_messages import JointStateCodec, StateCodec
 from sms_handover.ros.node.endpoints import Endpoints
-from sms_handover.types import Pose, RobotState, Twist
+from sms_handover.types import RobotState
 
 from .bench import Bench
 
@@ -40,11 +40,9 @@ STATES = StateCodec(ROBOT.joint_names, WORLD, BASE)
 
 def state(tick: int, angle: float = 0.0) -> tuple[bytes, bytes]:
     """Return the messages of a state in which every joint is at an angle."""
-    zero, n = np.zeros(3), ROBOT.n_joints
-    pose, twist = Pose(zero, np.array([0.0, 0.0, 0.0, 1.0])), Twist(zero, zero)
-    return STATES.pack(
-        RobotState.of(tick * TICK_NS, pose, twist, np.full(n, angle), np.zeros(n), np.zeros(n))
-    )
+    n = ROBOT.n_joints
+    q = np.concatenate([[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], np.full(n, angle)])
+    return STATES.pack(RobotState(tick * TICK_NS, q, np.zeros(6 + n), np.zeros(n)))
 
 
 def command(tick: int) -> bytes:

@@ -128,19 +128,25 @@ def test_a_spinning_node_ends_on_a_signal() -> None:
     assert run_node(Spinner, []) == EXIT_OK
 
 
-def test_a_node_ends_when_its_launcher_is_gone(monkeypatch: pytest.MonkeyPatch) -> None:
+def pid_of_nobody() -> int:
+    """Return the id of a process that has ended."""
+    with subprocess.Popen(["true"]) as process:
+        return process.pid
+
+
+def test_a_node_ends_when_its_launcher_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(LAUNCHER_PID, str(os.getppid()))
     assert not Stop().asked
-    monkeypatch.setenv(LAUNCHER_PID, str(os.getpid()))  # not the parent of this process
+    monkeypatch.setenv(LAUNCHER_PID, str(pid_of_nobody()))
     assert Stop().asked
 
 
 BAD: dict[str, tuple[str, ...]] = {
     "controller": ("law:=fast", "unknown value 'fast'"),
-    "plant": ("grasp_position_tolerance:=-0.01", "-0.01 m, allowed is at least 0.0"),
+    "plant": ("grasp_position_tolerance:=-0.01", "-0.01 m, must be >= 0 m"),
     "trajectory": ("time_law:=cubic", "unknown value 'cubic'"),
-    "ik": ("max_iterations:=0", "is 0, allowed is at least 1"),
-    "recorder": ("drain_timeout:=nothing", "'nothing', expected a number s"),
+    "ik": ("max_iterations:=0", "is 0, must be >= 1"),
+    "recorder": ("drain_timeout:=nothing", "'nothing', must be a number in s"),
 }
 
 
@@ -192,7 +198,7 @@ def test_a_signal_on_the_way_out_keeps_the_exit_code() -> None:
 
 
 HANGING = """
-from sms_handover.ros.process.realtime import main
+from sms_handover.ros.process import main
 from sms_handover.ros.process.main import RunnableNode, run_node
 
 class Worker(RunnableNode):
@@ -221,7 +227,7 @@ hang = lambda: ctypes.PyDLL(None).sleep(1000)  # s; it keeps the lock of the int
 if "exit" in sys.argv:
     atexit.register(hang)  # before ours, so it is called after it
 
-from sms_handover.ros import launcher_watch, main
+from sms_handover.ros.process import launcher_watch, main
 from sms_handover.ros.process.main import RunnableNode, run_node
 
 class Worker(RunnableNode):
@@ -232,7 +238,7 @@ class Worker(RunnableNode):
             hang()
         return 0
 
-launcher_watch._PATIENCE_S = 0.2
+launcher_watch._GRACE_S = 0.2
 main._TEARDOWN_S = 1
 raise SystemExit(run_node(lambda: Worker("worker"), ["worker"]))
 """
@@ -247,7 +253,7 @@ def test_a_node_that_hangs_when_its_launcher_is_gone_tells_where_and_ends(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Where the thread of Python's that would notice it is never let on."""
-    monkeypatch.setenv(LAUNCHER_PID, "1")  # not the parent of this process
+    monkeypatch.setenv(LAUNCHER_PID, str(pid_of_nobody()))
     command = [sys.executable, "-c", HANGING_LATER, "run"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S, check=False)
     assert done.returncode == 1

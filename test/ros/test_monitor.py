@@ -1,12 +1,11 @@
-"""The launcher's ear: progress, grasp events, who waits for whom, and the request to finish."""
+"""The monitor of the launcher: progress, grasp events, who waits for whom, and the request to finish."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import Point, PoseStamped
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
@@ -30,20 +29,23 @@ from sms_handover.ros.codecs.convert import (
     event_message,
     header,
     phase_message,
-    pose_stamped,
     run_event_message,
 )
-from sms_handover.ros.node.graph_node import INPUTS
+from sms_handover.ros.node.node_inputs import INPUTS
 from sms_handover.ros.qos import LATCHED, LOSSLESS
 from sms_handover.ros.transport.inputs import ExecutorInputs, Inputs
 from sms_handover.simulation.parameters import DIRECT
-from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, Pose, TaskPhase
+from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, TaskPhase
 
 from .bench import Bench
 
 pytestmark = pytest.mark.ros
 
-LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
+
+def position_stamped(x: float, y: float, z: float) -> PoseStamped:
+    message = PoseStamped(header=header(0))
+    message.pose.position = Point(x=x, y=y, z=z)
+    return message
 
 
 class FakeGraph:
@@ -75,7 +77,7 @@ class FakeGraph:
         def heard() -> object:
             for topic, message in said:
                 self.say(topic, message)
-            self.monitor.look()
+            self.monitor.poll()
             return condition()
 
         self.bench.until(heard, what)
@@ -104,9 +106,9 @@ def test_progress_is_followed(graph: FakeGraph) -> None:
     phase = phase_message(TaskPhase(40_000_000, 1, "carry"))
     graph.until(lambda: progress.phase == "carry", "the phase", (TASK_PHASE, phase))
     assert progress.stamp_ns == 40_000_000
-    graph.state(RunState.FINISHED, 50_000_000, "the whole run is done")
+    graph.state(RunState.FINISHED, 50_000_000, "run complete")
     graph.until(lambda: graph.monitor.finished, "the end")
-    assert (progress.stamp_ns, progress.detail) == (50_000_000, "the whole run is done")
+    assert (progress.stamp_ns, progress.detail) == (50_000_000, "run complete")
 
 
 def test_a_failed_run_is_over_too(graph: FakeGraph) -> None:
@@ -153,7 +155,7 @@ def test_grasp_events_are_kept_in_order(graph: FakeGraph) -> None:
 def test_every_event_has_been_heard_when_the_plant_says_so(graph: FakeGraph) -> None:
     """Messages of different topics arrive in any order: the counts of the end may come before the events."""
     monitor = graph.monitor
-    assert not monitor.heard_every_event
+    assert not monitor.has_every_event
 
     def tell(node: str, count: int) -> None:
         counts = PublishedCounts(node=node, topics=["/joint_states", f"/{GRASP_EVENT}"], counts=[7, count])
@@ -162,10 +164,10 @@ def test_every_event_has_been_heard_when_the_plant_says_so(graph: FakeGraph) -> 
     tell("controller", 0)
     graph.say(GRASP_EVENT, GraspEventMessage())
     graph.until(lambda: monitor.progress.events, "the first event")
-    assert not monitor.heard_every_event
+    assert not monitor.has_every_event
     tell("plant", 2)
     graph.say(GRASP_EVENT, GraspEventMessage())
-    graph.until(lambda: monitor.heard_every_event, "the second event and the counts")
+    graph.until(lambda: monitor.has_every_event, "the second event and the counts")
     assert len(monitor.progress.events) == 2
 
 
@@ -180,9 +182,9 @@ def test_decisions_of_every_node_are_heard(graph: FakeGraph) -> None:
         graph.say(RUN_PUBLISHED, counts)
     graph.say(RUN_EVENTS, run_event_message(events[0]))
     graph.until(lambda: monitor.progress.run_events, "the first event")
-    assert not monitor.heard_every_event
+    assert not monitor.has_every_event
     graph.say(RUN_EVENTS, run_event_message(events[1]))
-    graph.until(lambda: monitor.heard_every_event, "the second event and the counts")
+    graph.until(lambda: monitor.has_every_event, "the second event and the counts")
     assert repr(monitor.progress.run_events) == repr(events)
 
 
@@ -205,21 +207,21 @@ def test_what_strangers_say_of_a_run_is_not_believed(bench: Bench) -> None:
     graph.say(GRASP_EVENT, GraspEventMessage(status=77))
     graph.say(GRASP_EVENT, GraspEventMessage())
     graph.say(RUN_PUBLISHED, PublishedCounts(node="plant", topics=["/task/grasp_event"], counts=[1]))
-    graph.until(lambda: graph.monitor.heard_every_event, "the truth")
+    graph.until(lambda: graph.monitor.has_every_event, "the truth")
     assert (len(progress.events), progress.state) == (1, RunState.RUNNING)
     graph.destroy()
 
 
 def test_a_run_without_events_has_none_to_wait_for(graph: FakeGraph) -> None:
     graph.say(RUN_PUBLISHED, PublishedCounts(node="plant", topics=["/joint_states"], counts=[7]))
-    graph.until(lambda: graph.monitor.heard_every_event, "the counts")
+    graph.until(lambda: graph.monitor.has_every_event, "the counts")
     assert graph.monitor.progress.events == []
 
 
 def test_tool_errors_are_distances_to_the_targets(graph: FakeGraph) -> None:
     error = graph.monitor.progress.tool_error
-    target = pose_stamped(Pose(np.array([1.0, 2.0, 3.0]), LEVEL), 0)
-    tool = pose_stamped(Pose(np.array([1.002, 1.997, 3.006]), LEVEL), 0)
+    target = position_stamped(1.0, 2.0, 3.0)
+    tool = position_stamped(1.002, 1.997, 3.006)
     said = ((target_pose("arm_b"), target), (tool_pose("arm_b"), tool))
     graph.until(lambda: "arm_b" in error, "the tool", *said)
     assert error == {"arm_b": pytest.approx(0.007, rel=1e-12)}
@@ -233,7 +235,7 @@ def test_a_pose_without_a_target_is_no_error(graph: FakeGraph) -> None:
 
 def test_who_waits_for_what_is_told(graph: FakeGraph) -> None:
     waiting = graph.monitor.progress.waiting
-    assert graph.monitor.waiting_for() == "no node says why"
+    assert graph.monitor.waiting_for() == "no node reports why"
     warn = DiagnosticStatus(level=DiagnosticStatus.WARN, name="ik", message="waiting for x")
     graph.until(lambda: waiting, "the warning", (DIAGNOSTICS, DiagnosticArray(status=[warn])))
     assert graph.monitor.waiting_for() == "ik is waiting for x"

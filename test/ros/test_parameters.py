@@ -82,20 +82,20 @@ def test_parameters_of_other_nodes_are_not_taken(bench: Bench) -> None:
 REFUSED: dict[str, tuple[dict[str, object], str]] = {
     "below": (
         {"proportional": -1.5},
-        "controller: parameter 'proportional' is -1.5 N m/rad, allowed is at least",
+        "controller: parameter 'proportional' is -1.5 N m/rad, must be >=",
     ),
-    "above": ({"control_order": 9}, "controller: parameter 'control_order' is 9, allowed is at most 3"),
-    "whole number below": ({"control_order": -1}, "parameter 'control_order' is -1, allowed is at least 0"),
-    "text for a number": ({"derivative": "much"}, "'derivative' is 'much', expected a number N m s/rad"),
-    "truth for a number": ({"integral": True}, "'integral' is True, expected a number N m/(rad s)"),
+    "above": ({"control_order": 9}, "controller: parameter 'control_order' is 9, must be >= 0 and <= 3"),
+    "whole number below": ({"control_order": -1}, "parameter 'control_order' is -1, must be >= 0 and <= 3"),
+    "text for a number": ({"derivative": "much"}, "'derivative' is 'much', must be a number in N m s/rad"),
+    "truth for a number": ({"integral": True}, "'integral' is True, must be a number in N m/(rad s)"),
     "fraction for a whole number": (
         {"control_order": 1.5},
-        "'control_order' is 1.5, expected a whole number",
+        "'control_order' is 1.5, must be a whole number",
     ),
-    "number for a text": ({"law": 3}, "'law' is 3, expected str"),
+    "number for a text": ({"law": 3}, "'law' is 3, must be text"),
     "unknown choice": ({"law": "pdi"}, "unknown value 'pdi' (did you mean 'pid'?): known are 'nmpc', 'pid'"),
     "list for a number": ({"proportional": [1.0, 2.0]}, "'proportional' is"),
-    "too small": ({"rolling_period": 0.0}, "'rolling_period' is 0.0 s, allowed is at least 0.001"),
+    "too small": ({"rolling_period": 0.0}, "'rolling_period' is 0.0 s, must be >= 0.001 s"),
 }
 
 
@@ -119,7 +119,7 @@ def test_a_value_that_is_not_finite_is_refused(bench: Bench) -> None:
             parameter_overrides=[Parameter("derivative", value=float("nan"))],
         )
     )
-    with pytest.raises(ConfigurationError, match="'derivative' is nan, expected a finite number"):
+    with pytest.raises(ConfigurationError, match="'derivative' is nan N m s/rad, must be finite"):
         declare(node, ControllerParameters, "controller.yaml", CONTROLLER)
 
 
@@ -127,9 +127,7 @@ def test_a_value_that_is_not_finite_is_refused(bench: Bench) -> None:
 def test_bad_common_values_are_refused(bench: Bench, values: dict[str, object]) -> None:
     bench.start({"common": values})
     name, value = next(iter(values.items()))
-    with pytest.raises(
-        ConfigurationError, match=f"plant: parameter '{name}'.*{value}.*(allowed is|known are)"
-    ):
+    with pytest.raises(ConfigurationError, match=f"plant: parameter '{name}'.*{value}.*(must be|known are)"):
         declare(node_of(bench, PLANT), CommonParameters, "common.yaml", EVERY_NODE)
 
 
@@ -241,5 +239,5 @@ def test_nothing_changes_while_a_node_runs(bench: Bench) -> None:
 
 def test_simulated_time_is_refused(bench: Bench) -> None:
     bench.start({CONTROLLER: {"use_sim_time": True}})
-    with pytest.raises(ConfigurationError, match="'use_sim_time' is true, allowed is false"):
+    with pytest.raises(ConfigurationError, match="'use_sim_time' is true, must be false"):
         reject_unknown(node_of(bench))

@@ -49,7 +49,7 @@ def graph(bench: Bench) -> Graph:
 def shown(viewer: ViewerNode) -> Any:
     """Return all that the viewer shows; None as long as there is nothing."""
     scene = viewer.find_scene()
-    news = scene.news(Seen(), 0.0) if isinstance(scene, LiveScene) else None
+    news = scene.updates(Seen(), 0.0) if isinstance(scene, LiveScene) else None
     return news and news[0]
 
 
@@ -123,7 +123,7 @@ def test_bad_messages_are_refused_and_end_no_viewer(graph: Graph) -> None:
     def refused() -> dict[str, int]:
         for publisher, data in say:  # again and again, as the viewer is no reliable reader
             publisher.publish(data)
-        return viewer.refusals.counts
+        return viewer.message_filter.counts
 
     expected = {
         "deputy/pose: duplicate stamp",
@@ -133,7 +133,7 @@ def test_bad_messages_are_refused_and_end_no_viewer(graph: Graph) -> None:
         "task/phase: wrong names",
     }
     graph.bench.until(lambda: refused().keys() >= expected, "the refusals")
-    assert viewer.refusals.counts.keys() == expected
+    assert viewer.message_filter.counts.keys() == expected
     assert shown(viewer) == before
     viewer.server.close()
 

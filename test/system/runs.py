@@ -182,7 +182,7 @@ def is_node(pid: int) -> bool:
 def node_name(pid: int) -> str:
     """Return the name of the node that a process is, or ''."""
     try:
-        words = Path(f"/proc/{pid}/cmdline").read_bytes().decode().split("\0")
+        words = Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace").split("\0")
     except OSError:
         return ""
     names = [word.removeprefix(_NODES) for word in words if word.startswith(_NODES)]

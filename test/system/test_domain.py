@@ -85,7 +85,7 @@ def test_the_parts_of_one_graph_share_a_domain() -> None:
 
 @pytest.mark.parametrize("asked", [-1, LAST_DOMAIN + 1])
 def test_a_domain_out_of_range_is_refused(asked: int) -> None:
-    with pytest.raises(ConfigurationError, match=f"domain id is {asked}, allowed is 0 to 101"):
+    with pytest.raises(ConfigurationError, match=f"domain id is {asked}, must be 0 to 101"):
         reserved_domain(asked).__enter__()
 
 

@@ -1,6 +1,7 @@
 """However a run ends, no process is left, and what was recorded can be read."""
 
 import os
+import shutil
 import signal
 import subprocess
 from contextlib import suppress
@@ -8,14 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from sms_handover.analysis.equality import compare_runs
 from sms_handover.bag.info import read_info
 from sms_handover.bag.run.reader import read_run
 from sms_handover.graph.topics import NODES
 from sms_handover.run_data import RunData
 
+from ..core.terminal import Terminal
 from ..ros.short_handover import short_handover
-from .runs import DEADLINE_S, command_of, has_ended, nodes_of, running, sms_handover
+from .conftest import Command
+from .runs import DEADLINE_S, Ended, Running, command_of, has_ended, nodes_of, running, sms_handover
 
 pytestmark = [pytest.mark.system, pytest.mark.slow]
 
@@ -34,22 +36,47 @@ def beginning(bag: Path) -> RunData:
     return run
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_an_interrupt_leaves_a_complete_bag(number: signal.Signals, tmp_path: Path) -> None:
-    """The plant ends at the tick it is at, the others tell their counts, the recorder takes all of it."""
+def ends_in_order(run: Running, number: signal.Signals, bag: Path) -> None:
+    """Send a signal: the plant ends at the tick it is at, the others tell their counts, all is recorded."""
+    assert set(run.nodes) == set(NODES)
+    run.send(number)
+    assert run.end() == 130
+    assert "stopped on request at" in run.text
+    run.wait_for_nodes()
+    every_state_is_there(bag)
+
+
+def every_state_is_there(bag: Path) -> None:
+    """Assert that a bag has every state up to the end, and as many as were published."""
+    ledger = read_info(bag).ledger
+    assert ledger is not None
+    states = {account.name: account for account in ledger.topics}["/joint_states"]
+    assert states.received == states.published == len(beginning(bag).tick_ns)
+
+
+def test_a_request_to_end_leaves_a_complete_bag(tmp_path: Path) -> None:
     bag = tmp_path / "run" / "bag"
     with running("run", "-o", "run", cwd=tmp_path) as run:
         run.until_recorded(bag, UNDER_WAY)
-        assert set(run.nodes) == set(NODES)
-        run.send(number)
-        assert run.end() == 130
-        assert "stopped on request at" in run.text
-        run.wait_for_nodes()
-    ledger = read_info(bag).ledger
-    assert ledger is not None
-    accounts = {account.name: account for account in ledger.topics}
-    states = accounts["/joint_states"]
-    assert states.received == states.published == len(beginning(bag).tick_ns)
+        ends_in_order(run, signal.SIGTERM, bag)
+
+
+def test_a_suspended_node_is_named_and_the_run_goes_on_with_it_up_to_an_interrupt(tmp_path: Path) -> None:
+    """While it stands still another run wants its folder, and does not get it."""
+    bag = tmp_path / "run" / "bag"
+    with running("run", "-o", "run", cwd=tmp_path) as run:
+        run.until_recorded(bag, UNDER_WAY)
+        pid = run.nodes["ik"]
+        os.kill(pid, signal.SIGSTOP)
+        refused = sms_handover("run", "-o", "run", "--overwrite", cwd=tmp_path)
+        assert (refused.code, len(refused.errors)) == (2, 1)
+        assert "a run still writes to output folder run" in refused.errors[0]
+        run.until(lambda: "node 'ik' is suspended; " in run.text, "the news")
+        assert f"'kill -CONT {pid}' lets it go on" in run.text
+        size = (bag / "bag_0.mcap").stat().st_size
+        os.kill(pid, signal.SIGCONT)
+        run.until_recorded(bag, size + UNDER_WAY)  # far more than without an answer of it
+        ends_in_order(run, signal.SIGINT, bag)
 
 
 def test_an_interrupt_before_the_start_ends_everything(tmp_path: Path) -> None:
@@ -103,10 +130,16 @@ def test_a_closed_terminal_ends_the_run_in_order(tmp_path: Path) -> None:
         assert process.wait(DEADLINE_S) == 130
     assert set(nodes) == set(NODES)
     assert all(has_ended(pid, DEADLINE_S) for pid in nodes.values())
-    ledger = read_info(bag).ledger
-    assert ledger is not None
-    states = {account.name: account for account in ledger.topics}["/joint_states"]
-    assert states.received == states.published == len(beginning(bag).tick_ns)
+    every_state_is_there(bag)
+
+
+def test_the_progress_of_a_run_takes_one_line_of_a_narrow_terminal(schedule: Path, tmp_path: Path) -> None:
+    command = ["run", "--schedule", str(schedule), "--duration", "0.1", "-o", str(tmp_path / "run")]
+    program = f"from sms_handover.cli.main import main\nraise SystemExit(main({command}))"
+    with Terminal(program, columns=40, TERM="xterm") as terminal:
+        assert terminal.end() == 0, terminal.text
+    (line,) = [line for line in terminal.screen if " of 0.1 s" in line]
+    assert line.startswith("  0.10 of 0.1 s") and len(line) <= 40
 
 
 def read_until_recorded(terminal: int, pid: int, bag: Path) -> dict[str, int]:
@@ -117,29 +150,6 @@ def read_until_recorded(terminal: int, pid: int, bag: Path) -> dict[str, int]:
         with suppress(BlockingIOError):
             os.read(terminal, 4096)
     return nodes_of(pid)
-
-
-def test_a_suspended_node_is_named_and_the_run_goes_on_with_it(tmp_path: Path) -> None:
-    with running("run", "--duration", "2", "-o", "run", cwd=tmp_path) as run:
-        run.until_recorded(tmp_path / "run" / "bag", UNDER_WAY)
-        pid = run.nodes["ik"]
-        os.kill(pid, signal.SIGSTOP)
-        run.until(lambda: "node 'ik' is suspended; " in run.text, "the news")
-        assert f"'kill -CONT {pid}' lets it go on" in run.text
-        os.kill(pid, signal.SIGCONT)
-        assert run.end() == 0, run.text
-
-
-def test_a_run_is_not_overwritten_while_it_goes_on(tmp_path: Path) -> None:
-    bag = tmp_path / "run" / "bag"
-    with running("run", "-o", "run", cwd=tmp_path) as run:
-        run.until_recorded(bag, UNDER_WAY)
-        refused = sms_handover("run", "-o", "run", "--overwrite", cwd=tmp_path)
-        assert (refused.code, len(refused.errors)) == (2, 1)
-        assert "a run still writes to output folder run" in refused.errors[0]
-        run.send(signal.SIGINT)
-        assert run.end() == 130
-    beginning(bag)
 
 
 def test_a_dead_node_ends_the_run_and_is_named(tmp_path: Path) -> None:
@@ -181,44 +191,31 @@ def test_nodes_end_when_their_launcher_is_gone(tmp_path: Path) -> None:
     beginning(bag)
 
 
-def test_runs_side_by_side_do_not_hear_each_other(
-    schedule: Path, simulated: dict[str, RunData], tmp_path: Path
-) -> None:
-    """Each run takes a domain of its own, so both are whole, under different laws."""
-    with running("run", "--schedule", schedule, "-o", "nmpc", cwd=tmp_path) as one:
-        other = sms_handover("run", "--schedule", schedule, "--controller", "pid", "-o", "pid", cwd=tmp_path)
-        assert (one.end(), other.code) == (0, 0), one.text + other.out + other.err
-        domains = {text.split("running on ROS domain ")[1].split(",")[0] for text in (one.text, other.out)}
-    assert len(domains) == 2
-    for law in ("nmpc", "pid"):
-        assert compare_runs(read_run(tmp_path / law / "bag"), simulated[law]) == ()
-
-
 def test_a_missed_grasp_has_an_exit_code_of_its_own(tmp_path: Path) -> None:
-    """The target is in reach, but not within so short a phase: that shows only in the run."""
+    """The target is in reach, but not within so short a phase: that shows only in the run.
+
+    Nothing else does here: without a recorder nothing is recorded.
+    """
     schedule = tmp_path / "schedule.yaml"
     schedule.write_text(short_handover(stretch=2.0, deputy_off=(0.0, 0.03, 0.04)), encoding="utf-8")
-    done = sms_handover("run", "--schedule", schedule, "-o", "run", cwd=tmp_path)
+    done = sms_handover("run", "--no-record", "--compose", "--schedule", schedule, "-o", "run", cwd=tmp_path)
     assert done.code == 4, done
     assert "grasp by arm_a: missed" in done.err
     assert "transfer by arm_b: rejected" in done.err
-
-
-def test_without_a_recorder_nothing_is_recorded(schedule: Path, tmp_path: Path) -> None:
-    done = sms_handover("run", "--no-record", "--schedule", schedule, "-o", "run", cwd=tmp_path)
-    assert done.code == 0, done
-    assert "the whole run is done at 2.04 s" in done.out
+    assert "run complete at 0.68 s" in done.out
     assert not (tmp_path / "run" / "bag").exists()
 
 
-def test_an_earlier_run_is_replaced_only_if_wanted(schedule: Path, tmp_path: Path) -> None:
-    arguments = ("run", "--schedule", schedule, "--duration", "0.1", "-o", "run")
-    assert sms_handover(*arguments, cwd=tmp_path).code == 0
+def test_an_earlier_run_is_replaced_only_if_wanted(
+    recorded: dict[str, tuple[Path, Ended]], schedule: Path, tmp_path: Path, called: Command
+) -> None:
+    shutil.copytree(recorded["nmpc"][0], tmp_path / "run")
     before = (tmp_path / "run" / "bag" / "bag_0.mcap").read_bytes()
-    refused = sms_handover(*arguments, cwd=tmp_path)
+    arguments = ("run", "--compose", "--schedule", schedule, "--duration", "0.2", "-o", "run")
+    refused = called(*arguments, cwd=tmp_path)
     assert (refused.code, len(refused.errors)) == (2, 1)
     assert (tmp_path / "run" / "bag" / "bag_0.mcap").read_bytes() == before
-    again = sms_handover(*arguments[:-2], "--overwrite", "--duration", "0.2", "-o", "run", cwd=tmp_path)
+    again = sms_handover(*arguments, "--overwrite", cwd=tmp_path)
     assert again.code == 0, again
     assert len(read_run(tmp_path / "run" / "bag").tick_ns) == 201
 

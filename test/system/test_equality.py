@@ -13,7 +13,7 @@ from sms_handover.simulation.simulate import simulate
 from sms_handover.types import GraspStatus
 
 from .conftest import LAWS, TICKS
-from .runs import Ended, busy_cores, sms_handover
+from .runs import Ended, busy_cores, running, sms_handover
 
 pytestmark = [pytest.mark.system, pytest.mark.slow]
 
@@ -33,28 +33,32 @@ def test_first_run(law: str, recorded: dict[str, tuple[Path, Ended]], simulated:
     assert len(run.tick_ns) == TICKS
     assert [event.status for event in run.grasp_events] == [GraspStatus.SUCCEEDED] * 2
     assert_same_bits(run, simulated[law])
-    assert "the whole run is done at 2.04 s" in ended.out
+    assert "run complete at 1.02 s" in ended.out
     assert "grasp by arm_a: succeeded" in ended.err and "transfer by arm_b: succeeded" in ended.err
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("loaded", [False, True])
-def test_further_run(
-    law: str, loaded: bool, schedule: Path, simulated: dict[str, RunData], tmp_path: Path
+def test_runs_side_by_side_do_not_hear_each_other(
+    schedule: Path, simulated: dict[str, RunData], tmp_path: Path
 ) -> None:
-    """A second time, and while as many other processes as there are cores never rest."""
-    arguments = ("run", "--controller", law, "--schedule", schedule, "-o", "out")
-    if loaded:
-        with busy_cores():
-            ended = sms_handover(*arguments, cwd=tmp_path)
-    else:
-        ended = sms_handover(*arguments, cwd=tmp_path)
+    """Each takes a domain of its own, so both are whole, under different laws, a second time."""
+    with running("run", "--schedule", schedule, "-o", "nmpc", cwd=tmp_path) as one:
+        other = sms_handover("run", "--schedule", schedule, "--controller", "pid", "-o", "pid", cwd=tmp_path)
+        assert (one.end(), other.code) == (0, 0), one.text + other.out + other.err
+        domains = {text.split("running on ROS domain ")[1].split(",")[0] for text in (one.text, other.out)}
+    assert len(domains) == 2
+    for law in LAWS:
+        assert_same_bits(read_run(tmp_path / law / "bag"), simulated[law])
+
+
+def test_run_on_busy_cores(schedule: Path, simulated: dict[str, RunData], tmp_path: Path) -> None:
+    """While as many other processes as there are cores never rest."""
+    with busy_cores():
+        ended = sms_handover("run", "--schedule", schedule, "-o", "out", cwd=tmp_path)
     assert ended.code == 0, ended
-    assert_same_bits(read_run(tmp_path / "out" / "bag"), simulated[law])
+    assert_same_bits(read_run(tmp_path / "out" / "bag"), simulated["nmpc"])
 
 
-@pytest.mark.parametrize("transport", ["direct", "executor"])
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(("law", "transport"), [("nmpc", "direct"), ("pid", "executor")])
 def test_run_in_one_process(
     law: str, transport: str, schedule: Path, simulated: dict[str, RunData], tmp_path: Path
 ) -> None:

@@ -35,7 +35,7 @@ from ..core.layout_paths import (
     plotjuggler_curves,
     plotjuggler_value,
 )
-from .conftest import LAWS, TICKS
+from .conftest import LAWS, TICKS, Command
 from .runs import Ended, sms_handover
 
 pytestmark = [pytest.mark.system, pytest.mark.slow]
@@ -150,28 +150,30 @@ def test_laws_share_everything_but_the_commands(recorded: Recorded) -> None:
     assert nmpc.joint_command[0].tobytes() != pid.joint_command[0].tobytes()
 
 
-def test_a_bag_reproduces_itself(recorded: Recorded, tmp_path: Path) -> None:
+def test_a_bag_reproduces_itself(recorded: Recorded, tmp_path: Path, called: Command) -> None:
     """From a bag alone: the schedule and the output folder of then need not be there."""
     for law, (folder, _) in recorded.items():
         shutil.copytree(folder / "bag", tmp_path / law)
-        again = sms_handover("reproduce", law, cwd=tmp_path)
+        again = called("reproduce", law, cwd=tmp_path)
         assert (again.code, again.err) == (0, "")
         assert f"the same bit for bit: {TICKS} states, {PERIODS} references" in again.out
 
 
-def test_reproduce_tells_what_it_cannot_use(tmp_path: Path) -> None:
+def test_reproduce_tells_what_it_cannot_use(tmp_path: Path, called: Command) -> None:
     (tmp_path / "empty").mkdir()
     BagWriter(tmp_path / "foreign").close()
     for folder, told in (("nowhere", "no bag"), ("empty", "not a bag"), ("foreign", "no run")):
-        done = sms_handover("reproduce", folder, cwd=tmp_path)
+        done = called("reproduce", folder, cwd=tmp_path)
         assert (done.code, len(done.errors)) == (2, 1), done
         assert told in done.errors[0]
         assert done.err.count("\n") == 1
 
 
-def test_compare_prints_a_table_and_writes_figures(recorded: Recorded, tmp_path: Path) -> None:
+def test_compare_prints_a_table_and_writes_figures(
+    recorded: Recorded, tmp_path: Path, called: Command
+) -> None:
     folders = [folder for folder, _ in recorded.values()]
-    done = sms_handover("compare", *folders, "--json", "figures.json", cwd=tmp_path)
+    done = called("compare", *folders, "--json", "figures.json", cwd=tmp_path)
     assert done.code == 0, done
     table = done.out.splitlines()
     assert any("nmpc" in line and "pid" in line for line in table)
@@ -180,9 +182,9 @@ def test_compare_prints_a_table_and_writes_figures(recorded: Recorded, tmp_path:
     assert figures
 
 
-def test_a_report_is_one_page_on_the_runs(recorded: Recorded, tmp_path: Path) -> None:
+def test_a_report_is_one_page_on_the_runs(recorded: Recorded, tmp_path: Path, called: Command) -> None:
     folders = [folder for folder, _ in recorded.values()]
-    done = sms_handover("report", *folders, "-o", "report", cwd=tmp_path)
+    done = called("report", *folders, "-o", "report", cwd=tmp_path)
     assert done.code == 0, done
     page = tmp_path / "report" / "index.html"
     assert done.out.startswith(f"{page.relative_to(tmp_path)}: ")

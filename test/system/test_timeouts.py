@@ -17,36 +17,36 @@ def test_time_in_which_nobody_looked_does_not_count() -> None:
     time = ActiveTime(lambda: now[0])
     for _ in range(10):
         now[0] += 0.25
-        time.look()
+        time.update()
     assert time.seconds == 2.5
     now[0] += 3600.0  # suspended by Ctrl-Z for an hour
-    time.look()
+    time.update()
     assert 2.5 < time.seconds <= 3.5
 
 
 def test_what_a_run_waits_for_is_told_after_a_while_and_when_it_changes() -> None:
     delay = WaitNotice()
     reasons = ["plant is waiting for a"] * 25 + ["ik is waiting for b"] * 15
-    told = {second: line for second, why in enumerate(reasons) if (line := delay.note(float(second), why))}
+    told = {second: lines for second, why in enumerate(reasons) if (lines := delay.poll(float(second), why))}
     assert told == {
-        10: "the run has not begun after 10 s: plant is waiting for a",
-        25: "the run has not begun after 25 s: ik is waiting for b",
+        10: ["the run has not begun after 10 s: plant is waiting for a"],
+        25: ["the run has not begun after 25 s: ik is waiting for b"],
     }
 
 
-def test_a_suspended_node_is_told_once_and_then_given_up(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_suspended_node_is_reported_once_and_then_given_up() -> None:
     suspended = SuspensionMonitor()
     for second in range(20):
-        suspended.look({"ik": 4711}, 7.0 + second)
-        assert ("kill -CONT 4711" in capsys.readouterr().err) == (second == 6)
+        lines = suspended.poll({"ik": 4711}, 7.0 + second)
+        assert ("kill -CONT 4711" in "".join(lines)) == (second == 6)
     with pytest.raises(GraphError, match="'ik' has been suspended for 20 s"):
-        suspended.look({"ik": 4711}, 27.5)
+        suspended.poll({"ik": 4711}, 27.5)
 
 
 def test_a_node_that_goes_on_is_forgiven() -> None:
     suspended = SuspensionMonitor()
     for second in range(100):
-        suspended.look({"ik": 4711} if second % 10 else {}, float(second))
+        suspended.poll({"ik": 4711} if second % 10 else {}, float(second))
 
 
 def test_a_process_is_seen_suspended_as_long_as_it_is(

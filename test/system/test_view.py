@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from .conftest import LAWS
+from .conftest import LAWS, Command
 from .runs import Ended, sms_handover
 
 pytestmark = [pytest.mark.system, pytest.mark.slow]
@@ -29,24 +29,28 @@ def test_runs_become_one_page(recorded: Recorded, tmp_path: Path) -> None:
         (["nowhere", "--live"], "give no RUN and no --output with it"),
         (["nowhere", "--port", "8080"], "--port and --domain-id are for a running graph: give --live"),
         (["--live", "--port", "70000"], "'port' is 70000"),
-        (["--live", "--domain-id", "500"], "domain id is 500, allowed is 0 to"),
+        (["--live", "--domain-id", "500"], "domain id is 500, must be 0 to"),
     ],
 )
-def test_what_cannot_be_shown_is_named(arguments: list[str], message: str, tmp_path: Path) -> None:
-    ended = sms_handover("view", *arguments, "--no-browser", cwd=tmp_path)
+def test_what_cannot_be_shown_is_named(
+    arguments: list[str], message: str, tmp_path: Path, called: Command
+) -> None:
+    ended = called("view", *arguments, "--no-browser", cwd=tmp_path)
     assert ended.code == 2
     (error,) = ended.errors
     assert message in error
 
 
-def test_a_rate_of_zero_is_not_taken_for_the_default(recorded: Recorded, tmp_path: Path) -> None:
-    ended = sms_handover("view", recorded[LAWS[0]][0], "--frame-rate", 0, "--no-browser", cwd=tmp_path)
+def test_a_rate_of_zero_is_not_taken_for_the_default(
+    recorded: Recorded, tmp_path: Path, called: Command
+) -> None:
+    ended = called("view", recorded[LAWS[0]][0], "--frame-rate", 0, "--no-browser", cwd=tmp_path)
     assert ended.code == 2
-    assert "frame rate is 0 1/s, it must be positive" in ended.err
+    assert "frame rate is 0 1/s, it must be > 0" in ended.err
 
 
-def test_a_page_that_cannot_be_written_is_named(recorded: Recorded, tmp_path: Path) -> None:
+def test_a_page_that_cannot_be_written_is_named(recorded: Recorded, tmp_path: Path, called: Command) -> None:
     folder = recorded[LAWS[0]][0]
-    ended = sms_handover("view", folder, "-o", "no/where.html", "--no-browser", cwd=tmp_path)
+    ended = called("view", folder, "-o", "no/where.html", "--no-browser", cwd=tmp_path)
     assert ended.code == 2
     assert "where.html cannot be written: No such file or directory" in ended.err

@@ -11,12 +11,13 @@ from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
 
 from ..ros.short_handover import short_handover
+from .conftest import Command
 from .runs import sms_handover
 
 pytestmark = [pytest.mark.system, pytest.mark.slow]
 
 
-def test_a_run_with_retries_is_the_one_in_one_process(tmp_path: Path) -> None:
+def test_a_run_with_retries_is_the_one_in_one_process(tmp_path: Path, called: Command) -> None:
     """The end of the run moves twice, and then comes early; the bag is whole and reproduces."""
     schedule = yaml.safe_load(short_handover(deputy_off=(0.02, 0.0, 0.0)))
     schedule["phases"][1]["on_miss"] = {"retry": 2}
@@ -26,7 +27,7 @@ def test_a_run_with_retries_is_the_one_in_one_process(tmp_path: Path) -> None:
     ended = sms_handover("run", "--schedule", path, *hold, "-o", "out", cwd=tmp_path)
     assert ended.code == 4, ended
     assert "phase_retried" in ended.err and "grasp_failed" in ended.err
-    assert "the nodes told of 1 error, 2 warnings, see above" in ended.out
+    assert "the nodes reported 1 error, 2 warnings, see above" in ended.out
     assert "phase 'carry' has failed at 0.42 s of simulated time" in ended.out
     recorded = read_run(tmp_path / "out" / "bag")
     scenario = load_scenario({"common": {"schedule": str(path)}, "trajectory": {"failure_hold": 0.06}})
@@ -37,7 +38,7 @@ def test_a_run_with_retries_is_the_one_in_one_process(tmp_path: Path) -> None:
         "grasp_failed",
     ]
     for command in (("reproduce", "out"), ("bag", "check", "out")):
-        again = sms_handover(*command, cwd=tmp_path)
+        again = called(*command, cwd=tmp_path)
         assert again.code == 0, again
-    alone = sms_handover("simulate", "--schedule", path, *hold, cwd=tmp_path)
+    alone = called("simulate", "--schedule", path, *hold, cwd=tmp_path)
     assert alone.code == 4 and "grasp_failed" in alone.out

@@ -7,6 +7,7 @@ import yaml
 
 from sms_handover.configuration.package_files import config_file
 
+from .conftest import Command
 from .runs import sms_handover
 
 pytestmark = pytest.mark.system
@@ -44,8 +45,8 @@ WRONG = {
     "two own controllers": (["--own-controller", "true", "--without-controller"], "not allowed with"),
     "time law": (["--time-law", "cubic"], "invalid choice: 'cubic'"),
     "option": (["--no-such-option"], "unrecognized arguments"),
-    "missing schedule": (["--schedule", "nowhere.yaml"], "cannot read the schedule"),
-    "folder for a schedule": (["--schedule", "taken"], "cannot read the schedule"),
+    "missing schedule": (["--schedule", "nowhere.yaml"], "cannot read "),
+    "folder for a schedule": (["--schedule", "taken"], "cannot read "),
     "schedule that is no YAML": (["--schedule", "broken.yaml"], "broken.yaml"),
     "schedule that is no mapping": (["--schedule", "list.yaml"], "list.yaml"),
     "unknown grasp frame": (["--schedule", "frame.yaml"], "unknown grasp frame 'end_x'"),
@@ -53,31 +54,31 @@ WRONG = {
     "missing robot": (["--robot", "nowhere.yaml"], "nowhere.yaml"),
     "robot": (["--robot", "reach.yaml"], "unknown key 'initial'"),
     "parameter name": (["-p", "plant.integrater:=rk4"], "did you mean 'integrator'?"),
-    "parameter value": (["-p", "controller.rolling_period:=-1.0"], "-1.0 s, allowed is at least 0.001"),
-    "parameter type": (["-p", "controller.rolling_period:=long"], "'long', expected a number"),
+    "parameter value": (["-p", "controller.rolling_period:=-1.0"], "-1.0 s, must be >= 0.001 s"),
+    "parameter type": (["-p", "controller.rolling_period:=long"], "'long', must be a number in s"),
     "parameter form": (["-p", "tick=1"], "NODE.NAME:=VALUE"),
     "parameter without a value": (["-p", "common.tick:="], "'tick' is None"),
     "node": (["-p", "plnt.integrator:=rk4"], "did you mean 'plant'?"),
-    "recorder parameter": (["-p", "recorder.drain_timeout:=-1.0"], "-1.0 s, allowed is at least 0.1"),
+    "recorder parameter": (["-p", "recorder.drain_timeout:=-1.0"], "-1.0 s, must be >= 0.1"),
     "recorder parameter name": (["-p", "recorder.drain:=1.0"], "unknown parameter 'drain'"),
     "missing parameter file": (["--params-file", "nowhere.yaml"], "cannot read"),
     "parameter name in a file": (["--params-file", "unknown.yaml"], "unknown parameter 'no_such'"),
-    "parameter type in a file": (["--params-file", "type.yaml"], "'often', expected a number s"),
-    "recorder parameter in a file": (["--params-file", "recorder.yaml"], "-1.0 s, allowed is at least 0.1"),
+    "parameter type in a file": (["--params-file", "type.yaml"], "'often', must be a number in s"),
+    "recorder parameter in a file": (["--params-file", "recorder.yaml"], "-1.0 s, must be >= 0.1"),
     "unstable loop": (["-p", "common.tick:=0.002", "--controller", "pid"], "joint_7"),
     "reference period": (["-p", "common.tick:=0.003"], "a multiple of the tick"),
-    "duration": (["--duration", "-3"], "-3.0 s, allowed is at least 0.0"),
-    "endless duration": (["--duration", "inf"], "expected a finite number"),
-    "domain": (["--domain-id", "400"], "allowed is 0 to 101"),
-    "negative domain": (["--domain-id", "-1"], "allowed is 0 to 101"),
+    "duration": (["--duration", "-3"], "-3.0 s, must be >= 0 s"),
+    "endless duration": (["--duration", "inf"], "is inf s, must be finite"),
+    "domain": (["--domain-id", "400"], "must be 0 to 101"),
+    "negative domain": (["--domain-id", "-1"], "must be 0 to 101"),
     "domain that is no number": (["--domain-id", "one"], "invalid int value"),
     "node of a host": (
         ["--nodes", "plant,recoder", "--domain-id", "5"],
-        "'recoder' cannot be started, allowed",
+        "'recoder' cannot be started, must be of plant",
     ),
     "recorder of no recording": (
         ["--nodes", "recorder", "--no-record"],
-        "allowed without a recorder are plant",
+        "cannot be started without a recorder, must be of plant",
     ),
     "hosts without a domain": (["--peers", "127.0.0.1"], "give each host the same --domain-id"),
     "nodes without a domain": (["--nodes", "plant"], "give each host the same --domain-id"),
@@ -113,11 +114,11 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_nothing_is_started(case: str, folder: Path) -> None:
+def test_nothing_is_started(case: str, folder: Path, called: Command) -> None:
     """One line names the value and what is allowed; nothing is made or changed, so no node has run."""
     before = tree(folder)
     arguments, told = WRONG[case]
-    done = sms_handover("run", *arguments, cwd=folder)
+    done = called("run", *arguments, cwd=folder)
     assert done.code == 2, done
     assert len(done.errors) == 1 and told in done.errors[0], done
     assert "Traceback" not in done.err
@@ -126,31 +127,36 @@ def test_nothing_is_started(case: str, folder: Path) -> None:
     assert tree(folder) == before
 
 
-def test_simulate_refuses_the_same(folder: Path) -> None:
+def test_the_command_of_a_shell_says_and_returns_the_same(folder: Path, called: Command) -> None:
+    arguments, _ = WRONG["target out of reach"]
+    assert sms_handover("run", *arguments, cwd=folder) == called("run", *arguments, cwd=folder)
+
+
+def test_simulate_refuses_the_same(folder: Path, called: Command) -> None:
     for case in ("target out of reach", "parameter value", "unstable loop"):
         arguments, told = WRONG[case]
-        done = sms_handover("simulate", *arguments, cwd=folder)
+        done = called("simulate", *arguments, cwd=folder)
         assert done.code == 2, done
         assert len(done.errors) == 1 and told in done.errors[0], done
 
 
-def test_numbers_are_read_as_ros_reads_them(schedule: Path, tmp_path: Path) -> None:
+def test_numbers_are_read_as_ros_reads_them(schedule: Path, tmp_path: Path, called: Command) -> None:
     """An exponent without a decimal point makes a number too."""
     arguments = ("-p", "common.tick:=1e-3", "--duration", "0.02", "--schedule", schedule)
-    done = sms_handover("simulate", *arguments, cwd=tmp_path)
+    done = called("simulate", *arguments, cwd=tmp_path)
     assert done.code == 0, done
 
 
 @pytest.mark.parametrize("command", [[], ["run"], ["simulate"], ["compare"], ["reproduce"]])
-def test_help_teaches(command: list[str], tmp_path: Path) -> None:
+def test_help_teaches(command: list[str], tmp_path: Path, called: Command) -> None:
     """Every command tells what it does and exits with 0."""
-    done = sms_handover(*command, "--help", cwd=tmp_path)
+    done = called(*command, "--help", cwd=tmp_path)
     assert done.code == 0
     assert "usage: sms-handover" in done.out
     assert done.err == ""
 
 
 @pytest.mark.parametrize("arguments", [[], ["fly"], ["compare"], ["reproduce"]])
-def test_a_command_must_be_whole(arguments: list[str], tmp_path: Path) -> None:
-    done = sms_handover(*arguments, cwd=tmp_path)
+def test_a_command_must_be_whole(arguments: list[str], tmp_path: Path, called: Command) -> None:
+    done = called(*arguments, cwd=tmp_path)
     assert (done.code, len(done.errors)) == (2, 1)

@@ -3,8 +3,12 @@
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import pinocchio as pin
 import pytest
 
+from sms_handover.model.poses import pose_of
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.types import Array, Pose
 from test.verification.evidence import Evidence, Ledger
 
 Record = Callable[..., None]
@@ -28,6 +32,13 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     path = session.config.getoption("--evidence", default=None)
     if path is not None:
         session.config.stash[_LEDGER].write(path)
+
+
+def links_in_world(robot: RobotModel, q: Array) -> dict[str, Pose]:
+    """Return the pose in ``world`` of every link at a configuration (7 + n,)."""
+    pin.framesForwardKinematics(robot.pin, robot.data, q)
+    frames = enumerate(robot.pin.frames)
+    return {f.name: pose_of(robot.data.oMf[i]) for i, f in frames if f.type == pin.FrameType.BODY}
 
 
 @pytest.fixture

@@ -72,11 +72,12 @@ def misplaced(breaks: Sequence[Break], root: Path) -> list[str]:
     return lines
 
 
-def first_failure(folder: Path, *tests: str) -> str:
-    """Return the first test that fails in a copy, '' if none does."""
+def first_failure(folder: Path, *tests: str, workers: int = 0) -> str:
+    """Return the first test that fails in a copy, '' if none does; ``workers`` is of pytest-xdist."""
     environment = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
     environment["OPENBLAS_NUM_THREADS"] = "1"
-    options = ["-x", "-q", "--tb=no", "-rfE", "-p", "no:cacheprovider", "-k", f"not {SLOW} or core"]
+    options = ["-q", "--tb=no", "-rfE", "-p", "no:cacheprovider", "-k", f"not {SLOW} or core"]
+    options += ["--numprocesses", str(workers), "--dist", "loadfile"] if workers else ["-x"]
     command = [sys.executable, "-m", "pytest", *options, *tests]
     try:
         done = subprocess.run(
@@ -130,7 +131,7 @@ def run(breaks: Sequence[Break], root: Path, workers: int) -> list[Result]:
         copies: Queue[Path] = Queue()
         for number in range(workers):
             copies.put(copy_of(root, Path(scratch) / f"copy_{number}"))
-        failing = first_failure(Path(scratch) / "copy_0", *FAST)
+        failing = first_failure(Path(scratch) / "copy_0", *FAST, workers=workers)
         if failing:
             raise SystemExit(f"the tests fail without any break: {failing}")
         print(f"without a break every test passes; now {len(breaks)} breaks", flush=True)

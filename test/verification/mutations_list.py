@@ -88,8 +88,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "angular part of a twist first",
         "types",
-        "[twist_base_in_base.linear, twist_base_in_base.angular, joint_velocity]",
-        "[twist_base_in_base.angular, twist_base_in_base.linear, joint_velocity]",
+        "Twist(self.v[:3], self.v[3:BASE_NV])",
+        "Twist(self.v[3:BASE_NV], self.v[:3])",
         "robot_model",
     ),
     _core(

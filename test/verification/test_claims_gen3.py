@@ -7,10 +7,11 @@ second time from the source: a wrong sign in a light link hides in any test of t
 import numpy as np
 import pytest
 
-from sms_handover.model.description import RobotDescription, load_robot
+from sms_handover.model.assembly import RobotDescription
+from sms_handover.model.description import load_robot
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.types import Array, Pose
-from test.verification.conftest import Record
+from sms_handover.types import Array
+from test.verification.conftest import Record, links_in_world
 
 _SOURCE = "Kinovarobotics/ros2_kortex, gen3_macro.xacro"
 
@@ -85,12 +86,12 @@ def test_where_the_flange_is(description: RobotDescription, record: Record) -> N
     """Forward kinematics meets the published poses but for the rounded angles of the source."""
     robot = RobotModel(description)
     bound = _tilt(description) + 5e-7  # six digits
-    origin = Pose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+    origin = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     for joints, published in _FLANGE:
         for arm in description.arms:
             placed = np.zeros(robot.n_joints)
             placed[robot.arm_joints[arm.name]] = joints
-            links = robot.links_in_world(origin, placed)
+            links = links_in_world(robot, np.concatenate([origin, placed]))
             mount, flange = links[f"{arm.name}_mount"], links[arm.gripper.name]
             x, y, z = flange.position - mount.position
             # The arm's z is the body's x and its x the body's -z: what the mount turns by pi/2 about y.

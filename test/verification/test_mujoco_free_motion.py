@@ -171,9 +171,9 @@ def test_ours_loses_no_more_momentum(robot: RobotModel, motions: list[Motion], r
 
 def test_table_of_steps(robot: RobotModel, motions: list[Motion], table: Table) -> None:
     """What a reader compares: agreement and momentum at every step, the worst of all motions."""
-    receipts = [conserved_quantities(robot, *motion.start) for motion in motions]
+    conserved = [conserved_quantities(robot, *motion.start) for motion in motions]
     linear, angular = (
-        max(float(np.linalg.norm(getattr(receipt, name))) for receipt in receipts)
+        max(float(np.linalg.norm(getattr(each, name))) for each in conserved)
         for name in ("linear_momentum", "angular_momentum")
     )
     lines = [

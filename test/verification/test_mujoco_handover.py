@@ -133,9 +133,9 @@ def _furthest(a: list[State], b: list[State]) -> Array:
 
 def _drift(scenario: Scenario, states: list[State]) -> tuple[float, float]:
     """Return the largest linear and angular momentum over the run, which starts at rest."""
-    receipts = [conserved_quantities(scenario.robot, *state) for state in states]
-    linear = max(float(np.linalg.norm(receipt.linear_momentum)) for receipt in receipts)
-    return linear, max(float(np.linalg.norm(receipt.angular_momentum)) for receipt in receipts)
+    conserved = [conserved_quantities(scenario.robot, *state) for state in states]
+    linear = max(float(np.linalg.norm(each.linear_momentum)) for each in conserved)
+    return linear, max(float(np.linalg.norm(each.angular_momentum)) for each in conserved)
 
 
 def _rounding(scenario: Scenario, run: RunData) -> Array:

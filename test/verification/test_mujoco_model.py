@@ -17,8 +17,8 @@ from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.description import load_robot
 from sms_handover.model.parts import Inertia, JointDescription, Origin
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.types import Array, Pose
-from test.verification.conftest import Record
+from sms_handover.types import Array
+from test.verification.conftest import Record, links_in_world
 
 _STATES = 100
 _TURN = (0.3, -0.5, 0.7)  # [rad] about all three axes, so that their order counts
@@ -96,7 +96,7 @@ def test_every_frame_is_at_the_same_place(description: RobotDescription, record:
     position = rotation = 0.0
     for q, v, effort in _states(robot):
         other.dynamics(q, v, effort)
-        for name, pose in robot.links_in_world(Pose(q[:3], q[3:7]), q[7:]).items():
+        for name, pose in links_in_world(robot, q).items():
             at, axes = other.frame(name)
             position = max(position, float(np.max(np.abs(at - pose.position))))
             rotation = max(rotation, float(np.max(np.abs(axes - rotation_matrix(pose.quaternion_xyzw)))))
@@ -111,8 +111,8 @@ def test_momentum_is_measured_alike(description: RobotDescription, record: Recor
     errors = np.zeros(2)
     for q, v, effort in _states(robot):
         other.dynamics(q, v, effort)
-        receipt = conserved_quantities(robot, q, v)
-        pairs = zip(other.momentum(), (receipt.linear_momentum, receipt.angular_momentum), strict=True)
+        conserved = conserved_quantities(robot, q, v)
+        pairs = zip(other.momentum(), (conserved.linear_momentum, conserved.angular_momentum), strict=True)
         errors = np.maximum(errors, [np.linalg.norm(a - b) / np.linalg.norm(b) for a, b in pairs])
     name = "shipped" if description == load_robot() else "skewed"
     record(f"linear momentum, {name} robot, relative", errors[0], _ROUNDING, against=_AGAINST)
@@ -129,7 +129,7 @@ def test_mujoco_adds_nothing(description: RobotDescription) -> None:
     assert (model.opt.density, model.opt.viscosity) == (0.0, 0.0)
     assert (model.ngeom, model.neq, model.ntendon, model.nu) == (0, 0, 0, 0)
     assert model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
-    rotors = [rotor for arm in description.arms for rotor in arm.rotor_inertia]
+    rotors = [joint.rotor_inertia for arm in description.arms for joint in arm.joints]
     np.testing.assert_array_equal(model.dof_armature, np.concatenate([np.zeros(6), rotors]))
     parts = [description.base.inertia]
     for arm in description.arms:

@@ -1,1 +1,1 @@
-"""A torque law of one's own for sms_handover."""
+"""A custom torque law for sms_handover."""

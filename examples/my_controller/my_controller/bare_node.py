@@ -1,8 +1,7 @@
-"""The same law without a line of sms_handover: an rclpy node, standard messages and Pinocchio.
+"""The same law as a bare node, without sms_handover: rclpy, standard messages and Pinocchio.
 
-What a node in the place of the controller has to do is little: for every state, which is a JointState and
-an Odometry of equal stamp, publish one JointState with efforts and that stamp. The rules are in
-docs/own_controller.md.
+A node that replaces the controller answers every state, a JointState and an Odometry of equal stamp, with one
+JointState with efforts and that stamp. docs/own_controller.md has the rules.
 """
 
 from functools import partial
@@ -24,9 +23,9 @@ Array = npt.NDArray[np.float64]
 
 ARMS = ("arm_a", "arm_b")
 REFERENCE_NS = 20_000_000  # [ns] every 20 ms there are new targets
-PATIENCE_S = 0.5  # [s] of wall time in which a signal is seen at the latest
+SPIN_TIMEOUT_S = 0.5  # [s] of wall time after which a signal is noticed at the latest
 LAW = {
-    "law": "task_space_pd_bare",  # the parameter of this name is what reports call the law
+    "law": "task_space_pd_bare",  # the name of the law in reports
     "stiffness": 5.0,  # N/m
     "damping": 7.0,  # N s/m
     "angular_stiffness": 0.5,  # N m/rad
@@ -36,7 +35,7 @@ LAW = {
 STATE = ("joint_states", "base_odometry")
 TARGETS = tuple(f"{arm}/target_pose" for arm in ARMS)
 
-LOSSLESS = QoSProfile(depth=1000)  # reliable; deep enough for readers that fall behind, such as the recorder
+LOSSLESS = QoSProfile(depth=1000)  # reliable; deep enough for slow subscribers, such as the recorder
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -44,7 +43,6 @@ class BareController(Node):
     """Answers every state with the efforts of springs and dampers between the tools and their targets."""
 
     def __init__(self) -> None:
-        """Subscribe to what the law needs; the publisher of commands comes last, the run waits for it."""
         super().__init__("controller")
         for name, value in LAW.items():
             self.declare_parameter(name, value)
@@ -60,34 +58,36 @@ class BareController(Node):
             for topic, kind in kinds.items()
         ]
         self._ready = self.create_publisher(String, "run/ready", LATCHED)
-        self._matching = self.create_timer(0.05, self._look_for_graph)  # s of wall time
-        self._command = self.create_publisher(JointState, "joint_command", LOSSLESS)
+        self._matching = self.create_timer(0.05, self._announce)  # s of wall time
+        self._command = self.create_publisher(
+            JointState, "joint_command", LOSSLESS
+        )  # last: the run waits for it
 
-    def _look_for_graph(self) -> None:
-        """Say that the run can begin, once all that this node needs has matched."""
+    def _announce(self) -> None:
+        """Announce that this node is ready once its endpoints have matched."""
         found = all(subscription.get_publisher_count() for subscription in self._inputs)
         if found and self._command.get_subscription_count():
             self._matching.cancel()
             self._ready.publish(String(data=self.get_name()))
 
     def _on_description(self, message: String) -> None:
-        """Build the model, and answer the states that have waited for it."""
+        """Build the model, and answer the states that waited for it."""
         self._model = pin.buildModelFromXML(message.data, pin.JointModelFreeFlyer())
         self._data = self._model.createData()
         for stamp in sorted(self._waiting):
             self._answer_if_complete(stamp)
 
     def _on_input(self, topic: str, message: Any) -> None:
-        """Keep a message until everything of its stamp is there."""
+        """Keep a message until all messages with its stamp have arrived."""
         stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
         if stamp == self._answered_ns and topic == STATE[1]:
-            self._command.publish(self._answer)  # the plant asks again: it has missed the answer
+            self._command.publish(self._answer)  # the plant asks again: the answer was lost
         elif stamp > self._answered_ns:
             self._waiting.setdefault(stamp, {})[topic] = message
             self._answer_if_complete(stamp)
 
     def _answer_if_complete(self, stamp: int) -> None:
-        """Answer a state; one at which new targets are due waits for these."""
+        """Answer a state; at a reference period it waits for the targets."""
         needed = (*STATE, *TARGETS) if stamp % REFERENCE_NS == 0 else STATE
         inputs = self._waiting.get(stamp, {})
         if self._model is None or not inputs.keys() >= set(needed):
@@ -143,8 +143,8 @@ def _numbers(*parts: Point | Quaternion | Vector3) -> Array:
 def main(args: list[str] | None = None) -> None:
     """Run the node until a signal ends it.
 
-    Not by ``rclpy.spin``, which waits without an end: rclpy wakes it before it shuts the context down, and a
-    node that looks in between sleeps on. Here it looks again, PATIENCE_S later at most.
+    ``rclpy.spin`` waits without a timeout: rclpy wakes it before it shuts the context down, and a node that
+    checks in between continues to wait. Here it checks again after SPIN_TIMEOUT_S.
     """
     rclpy.init(args=args)
     node = BareController()
@@ -152,7 +152,7 @@ def main(args: list[str] | None = None) -> None:
     executor.add_node(node)
     try:
         while rclpy.ok():
-            executor.spin_once(timeout_sec=PATIENCE_S)
+            executor.spin_once(timeout_sec=SPIN_TIMEOUT_S)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:

@@ -1,4 +1,4 @@
-"""The law as a node in the place of the controller of sms_handover, by its helper."""
+"""The law as a node that replaces the controller of sms_handover, by its helper."""
 
 from collections.abc import Sequence
 

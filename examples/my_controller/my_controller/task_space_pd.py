@@ -1,6 +1,6 @@
 """PD control of the tools of a free-floating robot by the transposed generalised Jacobian.
 
-This file knows nothing of ROS: the same object runs in one process and in the node.
+This file is independent of ROS: the same object runs in one process and in the node.
 """
 
 from dataclasses import dataclass
@@ -32,13 +32,12 @@ class TaskSpaceGains:
 class TaskSpacePd:
     """u = J*^T f - d q_m' with f = -(K e + D x') at every tool, e its error in position and orientation.
 
-    J* is the generalised Jacobian [Umetani1989]: as momentum is conserved, it takes joint rates alone to
-    the twist of a tool, the motion of the base included. Its transpose takes a wrench at the tool to joint
-    efforts, so each tool hangs on springs and dampers fixed in ``world``, whatever the base does.
+    J* is the generalised Jacobian [Umetani1989]: as momentum is conserved, it maps joint rates to the twist
+    of a tool, the motion of the base included. Its transpose maps a wrench at the tool to joint efforts, so
+    springs and dampers connect each tool to ``world``, whatever the base does.
     """
 
     def __init__(self, robot: RobotModel, gains: TaskSpaceGains | None = None) -> None:
-        """Set up the law for a robot."""
         gains = gains or TaskSpaceGains()
         self._robot = robot
         self._stiffness = np.repeat([gains.stiffness, gains.angular_stiffness], 3)
@@ -46,10 +45,10 @@ class TaskSpacePd:
         self._joint_damping = gains.joint_damping
 
     def reset(self) -> None:
-        """Do nothing: the law has no memory but its last targets."""
+        """Do nothing: the law has no state but its last targets."""
 
     def guide(self, guidance: Guidance) -> None:
-        """Take the targets of the tools."""
+        """Set the targets of the tools."""
         self._targets = {arm: se3_of(pose) for arm, pose in guidance.tool_in_world.items()}
 
     def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Figures of runs for print, drawn with matplotlib; the only part of the package that imports it."""
+"""Figures of runs for print, drawn with matplotlib, which no other part of the package imports."""
 
 from importlib.util import find_spec
 

@@ -1,4 +1,4 @@
-"""The path of the free base in space."""
+"""Path of the free base in space, as a 3D figure."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -20,10 +20,10 @@ from sms_handover.types import Array
 from sms_handover.units import MM_PER_M, NS_PER_S
 
 _HEIGHT = 3.2  # [in]
-_EDGE = 0.01  # [-] of the figure, kept free around the box and its labels
+_EDGE = 0.01  # [-] of the figure, margin around the box and its labels
 _LEGEND_COLUMNS = 3
 _LEGEND_ROW = 0.06  # [-] of the figure
-_FITTINGS = 3  # each brings what is drawn nearer to filling the room; the letters keep their size
+_FITTINGS = 3  # iterations, since the labels keep their size while the box is scaled
 _VIEW = (22.0, -52.0)  # [deg] elevation and azimuth
 _MARGIN = 0.05  # [-] of the extent, around the paths
 _LEAST = 1e-6  # [mm] extent, where nothing moves
@@ -31,9 +31,9 @@ _KEY = "base_displacement"
 
 
 def draw_base_path(runs: Sequence[DrawnRun]) -> Figure:
-    """Return the figure: one line per run, equal scales, a mark where each phase after the first begins."""
+    """Return the path of the base: one line per run, equal scales, a mark where each later phase begins."""
     figure = Figure(figsize=(COLUMN, _HEIGHT))
-    figure.set_layout_engine("none")  # none fits a box in perspective
+    figure.set_layout_engine("none")  # no layout engine handles a box in perspective
     axes: Axes3D = figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d")
     paths = [_known_path(run) for run in runs]
     for place, (run, (time, path)) in enumerate(zip(runs, paths, strict=True)):
@@ -70,14 +70,14 @@ def draw_base_path(runs: Sequence[DrawnRun]) -> Figure:
 
 
 def _known_path(run: DrawnRun) -> tuple[Array, Array]:
-    """Return times (K,) in s and places (K, 3) in mm since the start, those that were recorded."""
+    """Return times (K,) in s and displacements (K, 3) in mm where they were recorded."""
     signal = run.signals[_KEY]
     known = complete(signal.values)
     return signal.time[known], MM_PER_M * signal.values[known]
 
 
 def _set_limits(axes: Axes3D, paths: Sequence[Array]) -> float:
-    """Fit the box to the paths, with the same scale along all axes; return how high its floor is."""
+    """Fit the box to the paths, with the same scale along all axes; return the height of its floor."""
     places = np.vstack([np.zeros((1, 3)), *paths])
     low, high = places.min(axis=0), places.max(axis=0)
     margin = _MARGIN * max(float(np.max(high - low)), _LEAST)
@@ -90,7 +90,7 @@ def _set_limits(axes: Axes3D, paths: Sequence[Array]) -> float:
 
 
 def _fit(figure: Figure, axes: Axes3D, room: Bbox) -> None:
-    """Let the box with all its labels fill a room in the figure: its picture depends on what it holds."""
+    """Scale and move the axes so that the box with its labels fills ``room`` in the figure."""
     canvas = FigureCanvasAgg(figure)
     for _ in range(_FITTINGS):
         canvas.draw()  # type: ignore[no-untyped-call]
@@ -104,7 +104,7 @@ def _fit(figure: Figure, axes: Axes3D, room: Bbox) -> None:
 
 
 def _extent(axes: Axes3D) -> Bbox:
-    """Return where the corners of the box are on the canvas, in dots."""
+    """Return the extent of the box on the canvas, in dots."""
     corners = np.array(list(product(axes.get_xlim(), axes.get_ylim(), axes.get_zlim())))
     right, up, _ = proj3d.proj_transform(*corners.T, axes.get_proj())
     seen = axes.transData.transform(np.column_stack([right, up]))

@@ -1,4 +1,4 @@
-"""Draw the figures of one or more runs and write them to files."""
+"""Drawing the figures of one or more runs, and writing them to files."""
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -8,14 +8,17 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from sms_handover.analysis.figure_catalogue import FigureKind, chosen_figures, chosen_formats
-from sms_handover.analysis.figures.base import draw_base
 from sms_handover.analysis.figures.base_path import draw_base_path
 from sms_handover.analysis.figures.drawn_run import DrawnRun
-from sms_handover.analysis.figures.joints import draw_joint_error, draw_torque
-from sms_handover.analysis.figures.momentum import draw_momentum
 from sms_handover.analysis.figures.snapshots import draw_snapshots
 from sms_handover.analysis.figures.style import figure_style
-from sms_handover.analysis.figures.tool_error import draw_tool_error
+from sms_handover.analysis.figures.time_series import (
+    draw_base,
+    draw_joint_error,
+    draw_momentum,
+    draw_tool_error,
+    draw_torque,
+)
 from sms_handover.errors import ConfigurationError
 
 PRINT_DPI = 300  # [1/in]
@@ -34,7 +37,7 @@ _PER_ARM: dict[str, Callable[[Runs, str], Figure]] = {
 }
 _PER_RUN: dict[str, Callable[[DrawnRun], Figure]] = {"snapshots": draw_snapshots}
 
-# what a writer would otherwise add of its own: dates and versions, which differ from day to day
+# the writers would otherwise add dates and versions, and the same figure would not give the same bytes
 _METADATA: dict[str, dict[str, str | None]] = {
     "pdf": {"CreationDate": None, "Producer": None, "Creator": "sms-handover figures"},
     "png": {"Software": None},
@@ -45,23 +48,24 @@ _METADATA: dict[str, dict[str, str | None]] = {
 def draw_figures(runs: Runs, names: Sequence[str] = ()) -> Iterator[tuple[str, Figure]]:
     """Yield the figures of these kinds, or all, each with a name for its file.
 
-    The runs are laid over each other; of a kind per arm or per run there are several. Raises
-    ConfigurationError without a run or with two runs of one name, UnknownNameError for a kind that
-    there is not.
+    The runs are overlaid; a kind may have a figure per arm or per run. Raises ConfigurationError if there
+    is no run or two have the same name, UnknownNameError for an unknown kind.
     """
     if not runs:
         raise ConfigurationError("there is no run to draw")
     if len({run.name for run in runs}) < len(runs):
-        raise ConfigurationError(f"runs need different names, given are {', '.join(r.name for r in runs)}")
+        raise ConfigurationError(
+            f"runs must have different names, these are {', '.join(r.name for r in runs)}"
+        )
     for kind in chosen_figures(names):
         yield from _draw(kind, runs)
 
 
 def write_figure(figure: Figure, path: Path, dpi: int = PRINT_DPI) -> None:
-    """Write a figure to ``path``, in the format that its suffix names; the same figure gives the same bytes.
+    """Write a figure to ``path`` in the format of its suffix; the same figure gives the same bytes.
 
-    Raises UnknownNameError for a suffix that is not one of pdf, png and svg, and ConfigurationError
-    if the file cannot be written.
+    Raises UnknownNameError if the suffix is not pdf, png or svg, ConfigurationError if the file cannot be
+    written.
     """
     (suffix,) = chosen_formats([path.suffix.removeprefix(".")])
     try:
@@ -72,7 +76,6 @@ def write_figure(figure: Figure, path: Path, dpi: int = PRINT_DPI) -> None:
 
 
 def _draw(kind: FigureKind, runs: Runs) -> Iterator[tuple[str, Figure]]:
-    """Yield the figures of one kind."""
     for name, draw in _parts(kind, runs):
         with figure_style():
             figure = draw()
@@ -81,7 +84,7 @@ def _draw(kind: FigureKind, runs: Runs) -> Iterator[tuple[str, Figure]]:
 
 
 def _parts(kind: FigureKind, runs: Runs) -> list[tuple[str, Callable[[], Figure]]]:
-    """Return what a kind consists of: a name and what draws it, per arm, per run, or one for all."""
+    """Return the name and drawing function of each figure of a kind: per arm, per run, or one for all."""
     if kind.name in _PER_ARM:
         arms = dict.fromkeys(arm for run in runs for arm in run.data.arms)
         return [(f"{kind.name}_{arm}", partial(_PER_ARM[kind.name], runs, arm)) for arm in arms]

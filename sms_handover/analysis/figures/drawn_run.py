@@ -1,4 +1,4 @@
-"""What the figures need to know of a run."""
+"""Drawn run: the data of a run that figures need."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from sms_handover.scene.scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class DrawnRun:
-    """A run under the name that its lines have in a legend.
+    """A run under the name for the legend.
 
     ``scene`` has the shapes; without it there are no snapshots of the run.
     """
@@ -24,6 +24,5 @@ class DrawnRun:
     phases: tuple[PhaseSpan, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        """Derive signals and phases once for all figures."""
         object.__setattr__(self, "signals", MappingProxyType(signals_of(self.data)))
         object.__setattr__(self, "phases", phase_spans(self.data))

@@ -1,4 +1,4 @@
-"""Panels with the lines of all runs, which most figures are made of."""
+"""Panels with the lines of all runs, of which most figures consist."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,16 +17,16 @@ from sms_handover.analysis.numbers import lengths
 from sms_handover.analysis.signals import Signal
 from sms_handover.types import Array
 
-POINTS = 2000  # of a line at most: about one per dot of a printed page
+POINTS = 2000  # largest number in a line: about one per dot of a printed page
 TIME = "Time (s)"
-_DECADES = 8  # at most, on a logarithmic axis: what is smaller is rounding
+_DECADES = 8  # largest number on a logarithmic axis: smaller values are rounding errors
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a panel shows of the signal ``key``: one column, or the length of all as ``column`` is None.
+    """What a panel shows of the signal ``key``: one column, or the norm of all if ``column`` is None.
 
-    ``scale`` multiplies SI units into those of ``label``; the axis may be ``logarithmic``.
+    ``scale`` converts SI units into those of ``label``; the axis may be ``logarithmic``.
     """
 
     key: str
@@ -45,7 +45,7 @@ class Quantity:
 
 
 def draw_lines(axes: Axes, runs: Sequence[DrawnRun], quantity: Quantity) -> None:
-    """Draw a quantity of every run over time, with the phases; say of which runs it was not recorded."""
+    """Draw a quantity of every run over time, with the phases; name the runs that did not record it."""
     missing = []
     for place, run in enumerate(runs):
         time, values = quantity.of(run)
@@ -70,7 +70,7 @@ def draw_lines(axes: Axes, runs: Sequence[DrawnRun], quantity: Quantity) -> None
 def column_of_panels(
     column: Sequence[Axes], runs: Sequence[DrawnRun], quantities: Sequence[Quantity]
 ) -> None:
-    """Fill panels that stand over each other: time below the last, phases above the first."""
+    """Fill a column of panels: time below the last, phases above the first."""
     for axes, quantity in zip(column, quantities, strict=True):
         draw_lines(axes, runs, quantity)
         axes.tick_params(labelbottom=axes is column[-1])
@@ -79,7 +79,7 @@ def column_of_panels(
 
 
 def run_handles(runs: Sequence[DrawnRun]) -> list[Line2D]:
-    """Return a line per run that names it in a legend."""
+    """Return a legend entry per run."""
     return [Line2D([], [], **line_style(place), label=run.name) for place, run in enumerate(runs)]
 
 
@@ -89,7 +89,7 @@ def add_legend(figure: Figure, runs: Sequence[DrawnRun]) -> None:
 
 
 def _make_logarithmic(axes: Axes) -> None:
-    """Make the vertical axis logarithmic, over no more decades than say something."""
+    """Make the vertical axis logarithmic, limited to ``_DECADES`` below the largest value."""
     lines = [np.asarray(line.get_ydata(), dtype=np.float64) for line in axes.lines]
     sizes = np.concatenate([np.empty(0), *lines])
     sizes = sizes[np.isfinite(sizes) & (sizes > 0.0)]

@@ -1,4 +1,4 @@
-"""Mark in a figure what the task was doing: phases and grasps."""
+"""Schedule of a run in a figure: phases and grasps."""
 
 from collections.abc import Sequence
 
@@ -9,16 +9,16 @@ from sms_handover.analysis.figures.style import FAINT, MUTED, PAGE
 from sms_handover.types import GraspAction, GraspCommand, GraspStatus
 from sms_handover.units import ns_to_seconds
 
-_SIZE = 7.0  # [pt] of the letters
-_LETTER = 3.6  # [pt] width of one, on the average
-_ROW = 8.5  # [pt] from one row of words above the axes to the next
+_SIZE = 7.0  # [pt] font size
+_LETTER = 3.6  # [pt] average width of a letter
+_ROW = 8.5  # [pt] from one row of text above the axes to the next
 _GAP = 2.0  # [pt] between the axes and the first row
 _POINTS_PER_INCH = 72.0
-_AXES_PART = 0.8  # [-] of the width of its column that axes have at least, beside numbers and label
+_AXES_PART = 0.8  # [-] smallest share of the axes in the width of their column, beside numbers and label
 
 
 def mark_boundaries(axes: Axes, runs: Sequence[DrawnRun]) -> None:
-    """Draw a line where a phase of the first run begins and where a grasp was tried; show all of the time."""
+    """Draw a line where a phase of the first run begins and at each grasp; show the whole time span."""
     ends = [ns_to_seconds(span.end_ns) for run in runs for span in run.phases]
     starts = [ns_to_seconds(span.start_ns) for run in runs for span in run.phases]
     if ends and max(ends) > min(starts):
@@ -30,10 +30,10 @@ def mark_boundaries(axes: Axes, runs: Sequence[DrawnRun]) -> None:
 
 
 def name_phases(axes: Axes, runs: Sequence[DrawnRun]) -> None:
-    """Write the phases' names above the axes, and over them what was grasped when.
+    """Write the names of the phases above the axes, and the grasps above the names.
 
-    Where names are longer than their phases, the phases are numbered from 1 instead; what does not fit
-    beside its neighbour goes a row higher.
+    If a name is longer than its phase, the phases are numbered from 1 instead. A grasp that does not fit
+    beside its neighbour moves up a row.
     """
     spans = runs[0].phases
     middles = [ns_to_seconds(span.start_ns + span.end_ns) / 2.0 for span in spans]
@@ -42,7 +42,7 @@ def name_phases(axes: Axes, runs: Sequence[DrawnRun]) -> None:
     names = [span.name if fits else str(number) for number, span in enumerate(spans, 1)]
     for middle, name in zip(middles, names, strict=True):
         _write(axes, middle, 0, name, style="italic")
-    ends: list[float] = []  # of the words in each row, s
+    ends: list[float] = []  # [s] of the text in each row
     for time, words in _events(runs):
         half = (len(words) + 1) * _LETTER * scale / 2.0
         row = next((row for row, end in enumerate(ends) if end <= time - half), len(ends))
@@ -51,7 +51,7 @@ def name_phases(axes: Axes, runs: Sequence[DrawnRun]) -> None:
 
 
 def _seconds_per_point(axes: Axes) -> float:
-    """Return how long the time is that takes a point of the width, before anything is laid out."""
+    """Return the time that one point of the width represents, estimated before the layout."""
     place = axes.get_subplotspec()
     columns = place.get_gridspec().ncols if place else 1
     low, high = axes.get_xlim()
@@ -61,7 +61,6 @@ def _seconds_per_point(axes: Axes) -> float:
 
 
 def _write(axes: Axes, time: float, row: int, text: str, style: str = "normal") -> None:
-    """Write a text above the axes, centred at a time."""
     axes.annotate(
         text,
         (time, 1.0),
@@ -77,7 +76,7 @@ def _write(axes: Axes, time: float, row: int, text: str, style: str = "normal") 
 
 
 def _events(runs: Sequence[DrawnRun]) -> list[tuple[float, str]]:
-    """Return time in s and words of every grasp event, with the runs in which it failed."""
+    """Return time in s and text of every grasp event, with the runs in which it failed."""
     keys = dict.fromkeys((event.stamp_ns, event.command) for run in runs for event in run.data.grasp_events)
     found = []
     for stamp_ns, command in sorted(keys, key=lambda key: key[0]):
@@ -94,12 +93,11 @@ def _events(runs: Sequence[DrawnRun]) -> list[tuple[float, str]]:
 
 
 def in_print(name: str) -> str:
-    """Return the name of an arm or phase as it stands in a figure: ``arm_a`` is Arm A."""
+    """Return the name of an arm or phase as figures show it: ``arm_a`` is Arm A."""
     return name.replace("_", " ").title()
 
 
 def _in_words(command: GraspCommand) -> str:
-    """Return a grasp command in a few words."""
     if command.action is GraspAction.TRANSFER:
         return f"{in_print(command.from_arm)} to {in_print(command.arm)}"
     return f"{in_print(command.arm)} {command.action.value}s"

@@ -1,4 +1,4 @@
-"""The handover as a strip of pictures (figure 3 of the paper shows the planned sequence)."""
+"""Snapshots of the handover (figure 3 of the paper shows the planned sequence)."""
 
 from collections.abc import Sequence
 from math import radians
@@ -24,20 +24,20 @@ from sms_handover.types import Array, Pose
 from sms_handover.units import ns_to_seconds
 
 COLUMNS = 4
-_WIDTH = 0.96 * PAGE / COLUMNS  # [in] of a picture
+_WIDTH = 0.96 * PAGE / COLUMNS  # [in] of a snapshot
 _TITLE = 0.24  # [in] height of its title
-_ON_THE_WAY = 0.125  # [-] of a phase, when its motion is under way
+_UNDER_WAY = 0.125  # [-] of a phase, when its motion is under way
 _MARGIN = 0.15  # [m] around arms and deputy
 _CAMERA = Camera(radians(60.0), radians(40.0))
 _LIGHT = np.array([0.48, -0.36, 0.8])  # unit vector towards the sun
 _DEPUTY = COLOURS[2]
-_PALE = 0.45  # [-] of white in the colour of an arm, so that its trace stands out
+_PALE = 0.45  # [-] share of white in the colour of an arm, so that its trace stands out
 
 Colour = tuple[float, float, float]
 
 
 def draw_snapshots(run: DrawnRun) -> Figure:
-    """Return the figure of one run: its start, then each phase under way and at its end.
+    """Return the snapshots of one run: its start, then each phase under way and at its end.
 
     Raises ConfigurationError for a run without a scene.
     """
@@ -71,7 +71,7 @@ def _frames(scene: Scene) -> list[int]:
     last = int(scene.stamp_ns[-1])
     times = [int(scene.stamp_ns[0])]
     for start, end in zip(starts, [*starts[1:], last], strict=False):
-        times += [start + round(_ON_THE_WAY * (end - start)), end]
+        times += [start + round(_UNDER_WAY * (end - start)), end]
     times.append(last)
     nearest = [int(np.argmin(np.abs(scene.stamp_ns - time))) for time in times]
     return list(dict.fromkeys(nearest))
@@ -95,14 +95,14 @@ def _draw_robot(axes: Axes, scene: Scene, frame: int) -> None:
 
 
 def _draw_traces(axes: Axes, scene: Scene, before: int, frame: int) -> None:
-    """Draw the way of each tool since the picture before."""
+    """Draw the path of each tool since the previous snapshot."""
     for place, arm in enumerate(scene.arms):
         trace = _CAMERA.seen(scene.tool(arm)[before : frame + 1, :3])
         axes.plot(*trace.T, color=COLOURS[place], linewidth=1.0, gid=f"{arm}/trace")
 
 
 def _window(scene: Scene, frames: list[int]) -> tuple[Array, Array]:
-    """Return the lower left and upper right corner (2,) m of all pictures: arms and deputy fit in."""
+    """Return the lower left and upper right corner (2,) m of all snapshots: arms and deputy fit in."""
     arms = [place for place, link in enumerate(scene.links) if link != BASE]
     places = np.concatenate(
         [scene.link_in_world[frames][:, arms, :3].reshape(-1, 3), scene.deputy_in_world[frames, :3]]
@@ -114,7 +114,7 @@ def _window(scene: Scene, frames: list[int]) -> tuple[Array, Array]:
 
 
 def _title(scene: Scene, frame: int) -> str:
-    """Return the time of a picture and what has just been done, or is going on."""
+    """Return the time of a snapshot and the phase that has just ended, or is in progress."""
     stamp_ns = int(scene.stamp_ns[frame])
     running = [phase for phase in scene.phases if phase.stamp_ns < stamp_ns] or scene.phases[:1]
     name = running[-1].name if running else ""
@@ -126,7 +126,7 @@ def _title(scene: Scene, frame: int) -> str:
 
 
 def _add_key(axes: Axes, arms: Sequence[str], title: str) -> None:
-    """Say in an empty panel what the colours mean, and which way the world's axes point."""
+    """Show in an empty panel the meaning of the colours and the directions of the world axes."""
     handles: list[Patch | Line2D] = [
         Patch(color=_pale(COLOURS[place]), label=in_print(arm)) for place, arm in enumerate(arms)
     ]
@@ -165,5 +165,5 @@ def _placement(row: Array) -> pin.SE3:
 
 
 def _moved(points: Array, placement: pin.SE3) -> Array:
-    """Return points (K, 3) of a frame in the frame that its placement is given in."""
+    """Return points (K, 3) transformed by a placement."""
     return np.asarray(points @ placement.rotation.T + placement.translation)

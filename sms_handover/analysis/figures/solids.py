@@ -1,4 +1,4 @@
-"""Boxes and cylinders as flat faces, and how a camera sees them."""
+"""Solids (boxes and cylinders) as flat faces, and their projection by a camera."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,31 +12,31 @@ import numpy as np
 from sms_handover.types import Array
 
 _SIDES = 20  # of a cylinder
-_LARGEST = 0.12  # [m] edge of a part of a box's face; small parts can be put in the order of depth
-_EDGE_ON = 1e-9  # [-] cosine to the line of sight, below which rounding decides whether a face is seen
-_AMBIENT = 0.55  # [-] brightness of a face that the light does not reach
+_LARGEST = 0.12  # [m] edge of a part of a box's face; only small parts can be sorted by depth
+_EDGE_ON = 1e-9  # [-] cosine to the line of sight below which a face is not drawn: rounding would decide
+_AMBIENT = 0.55  # [-] brightness of a face in shadow
 
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """Sees the world in parallel projection from ``azimuth`` about z, from x to y, and ``elevation``, rad."""
+    """Parallel projection of the world from ``azimuth`` about z, from x to y, and ``elevation``, rad."""
 
     azimuth: float
     elevation: float
 
     def axes(self) -> Array:
-        """Return as rows the picture's right, its up, and the way from the world to the camera."""
+        """Return as rows the picture's right, its up, and the direction from the world to the camera."""
         ca, sa, ce, se = cos(self.azimuth), sin(self.azimuth), cos(self.elevation), sin(self.elevation)
         return np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]])
 
     def seen(self, points: Array) -> Array:
-        """Return where points (..., 3) m are in the picture, (..., 2) m."""
+        """Return the projections (..., 2) m of points (..., 3) m."""
         return np.asarray(points @ self.axes()[:2].T)
 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """Faces as a camera sees them, the farthest first: their corners (K, 2) m, brightness (F,), and solid."""
+    """Projected faces, the farthest first: corners (K, 2) m, brightness (F,), and index of the solid."""
 
     corners: tuple[Array, ...]
     brightness: Array
@@ -50,7 +50,7 @@ def faces_of(kind: Literal["box", "cylinder"], size: tuple[float, ...]) -> tuple
 
 
 def picture_of(solids: Sequence[Sequence[Array]], camera: Camera, light: Array) -> Picture:
-    """Return what a camera sees of solids, given by their faces in the world; ``light`` points at the sun."""
+    """Return the projection of solids, given by their faces in the world; ``light`` points at the sun."""
     view = camera.axes()
     seen: list[tuple[float, Array, float, int]] = []
     for number, faces in enumerate(solids):

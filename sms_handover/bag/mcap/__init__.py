@@ -1,1 +1,1 @@
-"""MCAP files: their records, chunks and summary, read also where they are damaged."""
+"""MCAP files: records, chunks and summary, also of damaged files."""

@@ -1,4 +1,4 @@
-"""Take the messages out of a chunk, whole or cut off, if what it says of itself holds."""
+"""Records of a chunk, whole or cut off, provided that size and checksum match."""
 
 import zlib
 from collections.abc import Iterator
@@ -8,9 +8,8 @@ import lz4.frame
 import zstandard
 from mcap.opcode import Opcode
 
-from sms_handover.bag.mcap.records import MESSAGE_HEAD, RECORD_HEAD, ChunkHead, fits, plausible_head
-
-_ERRORS = (zstandard.ZstdError, RuntimeError, EOFError, ValueError, MemoryError, OverflowError)
+from sms_handover.bag.mcap.compression import COMPRESSION_ERRORS, inflate
+from sms_handover.bag.mcap.records import MESSAGE_HEAD, RECORD_HEAD, ChunkHead, plausible_head, used_length
 
 
 class Inner(NamedTuple):
@@ -22,15 +21,15 @@ class Inner(NamedTuple):
 
 
 class DamagedChunkError(Exception):
-    """The records of a chunk cannot be had; the text says why."""
+    """The records of a chunk are unreadable; the text says why."""
 
 
 def records_of(head: ChunkHead, body: bytes) -> bytes:
-    """Return the records of a whole chunk; raises DamagedChunkError unless they are as they were written."""
-    stored = memoryview(body)[head.begin :]
+    """Return the records of a whole chunk; raises DamagedChunkError unless they are intact."""
+    stored = memoryview(body)[head.begin : head.begin + head.size]
     try:
-        records = _inflated(head.compression, stored, head.uncompressed_size)
-    except _ERRORS as error:
+        records = inflate(head.compression, stored, head.uncompressed_size)
+    except COMPRESSION_ERRORS as error:
         raise DamagedChunkError(f"the chunk does not decompress: {' '.join(str(error).split())}") from error
     if len(records) != head.uncompressed_size:
         raise DamagedChunkError(f"the chunk holds {len(records)} bytes instead of {head.uncompressed_size}")
@@ -40,20 +39,20 @@ def records_of(head: ChunkHead, body: bytes) -> bytes:
 
 
 def records_of_cut(head: ChunkHead, body: bytes) -> bytes:
-    """Return what can be had of the records of a chunk of which only the beginning is there."""
+    """Return the readable records of a chunk of which only the beginning is there."""
     stored = body[head.begin :]
     try:
         if head.compression == "zstd":
             return zstandard.ZstdDecompressor().decompressobj().decompress(stored)
         if head.compression == "lz4":
             return bytes(lz4.frame.LZ4FrameDecompressor().decompress(stored))
-    except _ERRORS:
+    except COMPRESSION_ERRORS:
         return b""
     return stored if head.compression == "" else b""
 
 
 def inner_records(records: bytes) -> Iterator[Inner]:
-    """Yield the records of a chunk that are whole, up to the first that is not."""
+    """Yield the whole records of a chunk, up to the first that is not."""
     place, size = 0, len(records)
     while place + RECORD_HEAD.size <= size:
         opcode, length = RECORD_HEAD.unpack_from(records, place)
@@ -64,18 +63,7 @@ def inner_records(records: bytes) -> Iterator[Inner]:
         if opcode == Opcode.MESSAGE:
             if length < MESSAGE_HEAD.size:
                 return
-        elif not fits(opcode, records[begin:end]):
+        elif used_length(opcode, records[begin:end]) is None:
             return
         yield Inner(opcode, begin, end)
         place = end
-
-
-def _inflated(compression: str, stored: memoryview, size: int) -> bytes:
-    """Return the records in the stored bytes of a whole chunk; raises one of ``_ERRORS``."""
-    if compression == "zstd":
-        return zstandard.ZstdDecompressor().decompress(stored, max_output_size=size)
-    if compression == "lz4":
-        return bytes(lz4.frame.decompress(stored))
-    if compression:
-        raise ValueError(f"unknown compression {compression!r}")
-    return bytes(stored)

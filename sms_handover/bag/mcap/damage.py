@@ -1,4 +1,4 @@
-"""What is wrong at a place of a file, and how long a stretch of time it has cost."""
+"""Damage at a place of a file, and the interval of log time that it costs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,9 +12,9 @@ from sms_handover.units import NS_PER_S
 class Damage:
     """Bytes ``begin`` to ``end`` of a file that cannot be used, and why.
 
-    ``start_ns`` and ``end_ns`` are the log times of the messages that were there, None where nobody
-    tells; ``messages`` counts them by topic, as far as an index tells. Damage ``of_index`` costs no
-    message: the bytes only tell again what the rest of the file holds.
+    ``start_ns`` and ``end_ns`` are the log times of the messages that were there, None if unknown;
+    ``messages`` counts them by topic, as far as an index does. Damage ``of_index`` costs no message:
+    the bytes repeat what the rest of the file holds.
     """
 
     file: Path
@@ -32,7 +32,6 @@ class Damage:
         return self.end - self.begin
 
     def __str__(self) -> str:
-        """Return the damage in words, with its place and, where known, what was there."""
         text = f"{self.file.name}: bytes {self.begin} to {self.end}: {self.reason}"
         if self.start_ns is not None and self.end_ns is not None:
             text += f" ({self.start_ns / NS_PER_S:.3f} to {self.end_ns / NS_PER_S:.3f} s)"
@@ -42,42 +41,42 @@ class Damage:
 
 
 class Hole:
-    """Follows the log times of messages and the damage between them."""
+    """Measures the log time lost to damage between messages."""
 
     def __init__(self) -> None:
         self.first_ns: int | None = None
-        self.newest_ns: int | None = None
-        self._begin_ns: int | None = None  # of a hole that no message has ended yet
+        self.latest_ns: int | None = None
+        self._begin_ns: int | None = None  # of the open hole
         self._open = False
-        self._late_start_ns: int | None = None  # of the first message, if there is damage before it
+        self._late_start_ns: int | None = None  # of the first message, if damage precedes it
         self._largest_ns = 0
 
     def message(self, log_time_ns: int) -> None:
         """Take the time of a message."""
-        if self.newest_ns is None or self.first_ns is None:
-            self.first_ns = self.newest_ns = log_time_ns
+        if self.latest_ns is None or self.first_ns is None:
+            self.first_ns = self.latest_ns = log_time_ns
         if self._open:
             self._open = False
             if self._begin_ns is None:
                 self._late_start_ns = log_time_ns
             else:
                 self._largest_ns = max(self._largest_ns, log_time_ns - self._begin_ns)
-        self.newest_ns = max(self.newest_ns, log_time_ns)
+        self.latest_ns = max(self.latest_ns, log_time_ns)
         self.first_ns = min(self.first_ns, log_time_ns)
 
     def damage(self, damage: Damage) -> None:
-        """Take damage: it reaches from the newest message so far, or where it says itself, to the next."""
+        """Take damage: it spans from the latest message, or its own start, to the next message."""
         if not self._open:
             self._open = True
-            self._begin_ns = damage.start_ns if self.newest_ns is None else self.newest_ns
+            self._begin_ns = damage.start_ns if self.latest_ns is None else self.latest_ns
         if damage.start_ns is not None and damage.end_ns is not None:
             self._largest_ns = max(self._largest_ns, damage.end_ns - damage.start_ns)
 
     def largest(self, span: tuple[int, int] | None) -> tuple[int, bool]:
-        """Return the longest stretch lost of a recording with this first and last log time.
+        """Return the longest interval lost of a recording with this first and last log time.
 
-        The second value tells whether the stretches at its ends are among them: not, if the damage
-        reaches an end and the span of the recording is not known.
+        The second value is whether the intervals at its ends are included: not if damage reaches an
+        end and the span of the recording is unknown.
         """
         ends = []
         if self._late_start_ns is not None:

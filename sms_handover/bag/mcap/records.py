@@ -1,4 +1,8 @@
-"""Read MCAP records from bytes that may be damaged: a record is taken only if it fits its own length."""
+"""MCAP records from bytes that may be damaged: only a record that fits its own length is read.
+
+Records may grow at their end, and opcodes from 0x80 are for private records
+(https://mcap.dev/spec): unknown bytes behind the known fields are skipped.
+"""
 
 import struct
 import zlib
@@ -33,7 +37,7 @@ _CHUNK_HEAD = struct.Struct("<QQQII")  # first and last log time [ns], size [byt
 _INDEX_HEAD = struct.Struct("<HI")  # channel, length of its entries [byte]
 _LENGTH = struct.Struct("<Q")
 _CHECKSUM = struct.Struct("<I")
-_LONGEST = 2**40  # [byte] a record whose length claims more is none
+_LONGEST = 2**40  # [byte] no record is longer
 
 _READ: dict[int, Callable[[ReadDataStream], Any]] = {
     Opcode.HEADER: Header.read,
@@ -51,12 +55,14 @@ _READ: dict[int, Callable[[ReadDataStream], Any]] = {
     Opcode.DATA_END: DataEnd.read,
 }
 _KNOWN = frozenset(Opcode)
-_ERRORS = (struct.error, EndOfFile, UnicodeDecodeError, ValueError, OverflowError, MemoryError)
+PRIVATE = 0x80  # first opcode of private records
+_CHECKED = (Opcode.CHUNK, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.ATTACHMENT, Opcode.METADATA)
+_ERRORS = (struct.error, EndOfFile, UnicodeDecodeError, ValueError, OverflowError, MemoryError, KeyError)
 
 
 @dataclass(frozen=True)
 class ChunkHead:
-    """What a chunk says of itself; its records are ``size`` bytes from ``begin`` on in its body."""
+    """The fields of a chunk; its records are ``size`` bytes from ``begin`` on in its body."""
 
     start_ns: int
     end_ns: int
@@ -68,32 +74,46 @@ class ChunkHead:
 
 
 def plausible_head(opcode: int, length: int) -> bool:
-    """Whether this may begin a record. What MCAP does not define is none: it could not be kept."""
-    return opcode in _KNOWN and length < _LONGEST
+    """Whether a record may begin like this."""
+    return (opcode in _KNOWN or opcode >= PRIVATE) and length < _LONGEST
 
 
-def fits(opcode: int, body: bytes) -> bool:
-    """Whether a body is one of that kind of record: every length in it agrees with the whole."""
-    if opcode == Opcode.CHUNK:
-        head = chunk_head(body)
-        return head is not None and head.begin + head.size == len(body)
-    if opcode == Opcode.MESSAGE:
-        return len(body) >= MESSAGE_HEAD.size
-    if opcode == Opcode.MESSAGE_INDEX:
-        return _INDEX_HEAD.size + _stated(body) == len(body)
+def used_length(opcode: int, body: bytes) -> int | None:
+    """Return how many bytes of a body its known fields take, None if it is no record of this kind.
+
+    A private record that is one of MCAP but for the highest bit of its opcode is taken for damage.
+    """
     try:
-        return opcode in _READ and _parse(opcode, body)[1].count == len(body)
+        if opcode == Opcode.MESSAGE:
+            used = max(len(body), MESSAGE_HEAD.size)
+        elif opcode == Opcode.CHUNK:
+            head = chunk_head(body)
+            used = _LONGEST if head is None else head.begin + head.size
+        elif opcode == Opcode.MESSAGE_INDEX:
+            used = _INDEX_HEAD.size + int(_INDEX_HEAD.unpack_from(body)[1])
+        elif opcode >= PRIVATE:
+            known = opcode - PRIVATE
+            used = _LONGEST if known in _CHECKED and used_length(known, body) == len(body) else len(body)
+        else:
+            used = _parse(opcode, body)[1].count
     except _ERRORS:
-        return False
+        return None
+    return used if used <= len(body) else None
+
+
+def is_misread(body: bytes) -> bool:
+    """Whether the body of a message is one of another record, of which a bit of the opcode was flipped."""
+    kinds = (*_CHECKED, Opcode.MESSAGE_INDEX)
+    return any(used_length(opcode, body) == len(body) for opcode in kinds)
 
 
 def parse(opcode: int, body: bytes) -> Any:
-    """Return the record in a body that fits, None for a chunk or a message."""
+    """Return the record in a body that fits, None for a chunk or message."""
     return _parse(opcode, body)[0] if opcode in _READ else None
 
 
 def chunk_head(body: bytes) -> ChunkHead | None:
-    """Return what the beginning of a chunk says, None if that is not whole or no such thing."""
+    """Return the fields at the beginning of a chunk, None if they are malformed."""
     try:
         start_ns, end_ns, size, checksum, length = _CHUNK_HEAD.unpack_from(body)
         text_end = _CHUNK_HEAD.size + length
@@ -105,14 +125,10 @@ def chunk_head(body: bytes) -> ChunkHead | None:
 
 
 def attachment_is_sound(body: bytes) -> bool:
-    """Whether the checksum of an attachment holds, or there is none."""
-    (stored,) = _CHECKSUM.unpack_from(body, len(body) - _CHECKSUM.size)
-    return stored in (0, zlib.crc32(body[: -_CHECKSUM.size]))
-
-
-def _stated(body: bytes) -> int:
-    """Return the length in byte that a message index claims for its entries, -1 if it claims none."""
-    return int(_INDEX_HEAD.unpack_from(body)[1]) if len(body) >= _INDEX_HEAD.size else -1
+    """Whether the checksum of an attachment matches, or there is none."""
+    end = _parse(Opcode.ATTACHMENT, body)[1].count - _CHECKSUM.size
+    (stored,) = _CHECKSUM.unpack_from(body, end)
+    return stored in (0, zlib.crc32(body[:end]))
 
 
 class _StrictStream(ReadDataStream):

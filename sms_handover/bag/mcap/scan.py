@@ -1,20 +1,20 @@
-"""Go through a file of a bag from its first byte to its last, past everything that is damaged.
+"""Scan of a file of a bag from its first byte to its last, past all damage.
 
-This is the one way in which messages are read: a reader that wants a whole bag stops at the first
-damage, a recovery goes on behind it.
+A reader that needs a whole bag stops at the first damage, a recovery resumes behind it.
 """
 
 import zlib
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
 from sms_handover.bag.mcap.chunks import DamagedChunkError, inner_records, records_of, records_of_cut
+from sms_handover.bag.mcap.compression import inflate_message
 from sms_handover.bag.mcap.damage import Damage
 from sms_handover.bag.mcap.records import (
     MESSAGE_HEAD,
@@ -25,12 +25,12 @@ from sms_handover.bag.mcap.records import (
     parse,
 )
 from sms_handover.bag.mcap.resync import MAGIC, Frame, FrameWalk, Gap
-from sms_handover.bag.mcap.summary_section import Definitions, definitions_at_end
+from sms_handover.bag.mcap.summary_section import SummarySection, read_summary_section
 
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """A channel of a file: where messages come from, with the schema that they follow."""
+    """A channel of a file, with the schema of its messages."""
 
     topic: str
     encoding: str
@@ -39,7 +39,7 @@ class Source:
 
 
 class ScannedMessage(NamedTuple):
-    """One message as it lies in a file."""
+    """One message of a file."""
 
     source: Source
     data: bytes
@@ -51,7 +51,8 @@ class ScannedMessage(NamedTuple):
 class Located(NamedTuple):
     """A record at the top level that is no message.
 
-    A chunk is given by its head, before its messages, and a message index by its bytes.
+    A chunk is given by its head, before its messages, a message index by its bytes, a private record
+    by None.
     """
 
     begin: int
@@ -62,40 +63,51 @@ class Located(NamedTuple):
 
 Found = Source | ScannedMessage | Located | Damage
 
-_NO_SCHEMA = Schema(id=0, data=b"", encoding="", name="")
+_DEFINED = frozenset(Opcode)
+NO_SCHEMA = Schema(id=0, data=b"", encoding="", name="")
 
 
 class FileScan:
     """One file of a bag; iterate over it once.
 
-    ``place`` tells how many bytes have been gone through, ``closed`` after the end whether the file
-    ends as a complete one does, and ``from_cut_chunk`` how many messages came out of a chunk that
-    the end of the file cuts off.
+    ``place`` is the number of bytes read. At the end ``closed`` is whether the file has its final
+    magic, ``from_cut_chunk`` counts messages out of a chunk cut off by the end of the file, and
+    ``private`` the records that only their writer understands.
     """
 
-    def __init__(self, file: Path) -> None:
-        """Prepare; nothing is read yet."""
+    def __init__(
+        self,
+        file: Path,
+        sources: Mapping[int, Source] | None = None,
+        report: Callable[[int], None] | None = None,
+    ) -> None:
+        """Know ``sources``, channels by number, from the summary; call ``report`` with each ``place``."""
         self.file = file
+        self.size = file.stat().st_size
+        self._report = report
         self.place = 0
         self.closed = False
         self.from_cut_chunk = 0
-        self._schemas: dict[int, Schema] = {0: _NO_SCHEMA}
-        self._sources: dict[int, Source] = {}
+        self.private = 0
+        self._schemas: dict[int, Schema] = {0: NO_SCHEMA}
+        self._sources = dict(sources or {})
         self._in_summary = False
         self._data_end = 0  # [byte]
-        self._lost: Damage | None = None  # a chunk whose message indexes may follow
+        self._lost: Damage | None = None  # a chunk that its message indexes may follow
         self._checksum = zlib.crc32(MAGIC)
         self._whole = True  # no gap so far
         self._undescribed: dict[int, int] = {}  # messages by number of channel
-        self._later = Definitions({}, {}, True)  # what the end of the file tells
+        self._summary = SummarySection()
 
     def __iter__(self) -> Iterator[Found]:
-        """Yield channels as they are described, messages, other records and damage, in the file's order."""
-        size = self.file.stat().st_size
+        """Yield channels, messages, other records and damage, in the order of the file."""
+        size = self.size
         with self.file.open("rb") as stream:
-            self._later = definitions_at_end(stream, size)
+            self._summary = read_summary_section(stream, size)
             for found in FrameWalk(stream, size):
                 self.place = found.end
+                if self._report is not None:
+                    self._report(self.place)
                 self._add_to_checksum(found)
                 if self._lost is not None:
                     if self._counts_lost(found):
@@ -107,21 +119,28 @@ class FileScan:
                 yield self._lost
             stream.seek(max(0, size - len(MAGIC)))
             self.closed = size > len(MAGIC) and stream.read() == MAGIC
-        if self.closed and not self._later.sound:
+        if self.closed and not self._summary.sound:
             reason = "the checksum of the summary does not match"
             yield Damage(self.file, self._data_end, size, reason, of_index=True)
         for channel, count in self._undescribed.items():
             name = f"channel {channel}"
-            reason = f"{count} messages belong to {name}, which nothing describes"
+            reason = f"{count} messages belong to {name}, which is not defined"
             yield Damage(self.file, 0, 0, reason, messages=MappingProxyType({name: count}))
 
+    def chunk_at(self, stream: BinaryIO, begin: int, size: int) -> Iterator[Found]:
+        """Yield the messages of one chunk of the open file, or that it is damaged."""
+        stream.seek(begin + RECORD_HEAD.size)
+        body = stream.read(size - RECORD_HEAD.size)
+        yield from self._chunk(Frame(begin, begin + size, Opcode.CHUNK, body, len(body)))
+        if self._lost is not None:
+            yield self._lost
+
     def topic_of(self, number: int) -> str:
-        """Return the topic of a channel, by the number that the file gives it."""
-        source = self._sources.get(number) or self._source_told_later(number)
+        """Return the topic of a channel, by its number in the file."""
+        source = self._sources.get(number) or self._source_in_summary(number)
         return f"channel {number}" if source is None else source.topic
 
     def _frame(self, frame: Frame) -> Iterator[Found]:
-        """Yield what a record holds."""
         if frame.opcode == Opcode.CHUNK:
             yield from self._chunk(frame)
         elif frame.opcode == Opcode.MESSAGE:
@@ -131,6 +150,7 @@ class FileScan:
         elif frame.opcode == Opcode.ATTACHMENT and not attachment_is_sound(frame.body):
             yield self._damage(frame, "the checksum of the attachment does not match")
         else:
+            self.private += frame.opcode not in _DEFINED
             record: Any = (
                 frame.body if frame.opcode == Opcode.MESSAGE_INDEX else parse(frame.opcode, frame.body)
             )
@@ -139,17 +159,16 @@ class FileScan:
                 and self._whole
                 and record.data_section_crc not in (0, self._checksum)
             ):
-                yield self._damage(frame, "the checksum over all messages does not match")
+                yield self._damage(frame, "the checksum of the data section does not match")
             if frame.opcode == Opcode.DATA_END:
                 self._in_summary, self._data_end = True, frame.end
             yield Located(frame.begin, frame.end, frame.opcode, record)
             yield from self._defined(record)
 
     def _chunk(self, frame: Frame) -> Iterator[Found]:
-        """Yield the messages of a chunk, or that it is lost."""
         head = chunk_head(frame.body)
         if head is None:
-            raise AssertionError("a chunk whose head does not parse is no frame")
+            raise AssertionError("a frame is no chunk without its head")
         yield Located(frame.begin, frame.end, frame.opcode, head)
         try:
             records = records_of(head, frame.body)
@@ -158,10 +177,10 @@ class FileScan:
             return
         end = yield from self._inner(records)
         if end != len(records):
-            yield self._damage(frame, f"from byte {end} of the chunk on there are no records", head)
+            yield self._damage(frame, f"there are no records from byte {end} of the chunk on", head)
 
     def _inner(self, records: bytes) -> Generator[Found, None, int]:
-        """Yield what the records of a chunk hold; return where the last whole one ends."""
+        """Yield messages and channels of a chunk; return where its last whole record ends."""
         end = 0
         for opcode, begin, end in inner_records(records):
             if opcode == Opcode.MESSAGE:
@@ -173,7 +192,7 @@ class FileScan:
         return end
 
     def _gap(self, gap: Gap) -> Iterator[Found]:
-        """Yield that bytes are lost, and first the messages in the beginning of a cut chunk."""
+        """Yield the messages in the beginning of a cut chunk, then the damage."""
         head = chunk_head(gap.body) if gap.opcode == Opcode.CHUNK else None
         if head is not None:
             for found in self._inner(records_of_cut(head, gap.body)):
@@ -182,37 +201,38 @@ class FileScan:
         yield self._damage(gap, gap.reason, head)
 
     def _message(self, records: bytes, begin: int, end: int) -> ScannedMessage | None:
-        """Return a message, None if nothing tells of which topic it is."""
+        """Return a message, None if its channel is not defined."""
         channel, sequence, log_time, publish_time = MESSAGE_HEAD.unpack_from(records, begin)
-        source = self._sources.get(channel) or self._source_told_later(channel)
+        source = self._sources.get(channel) or self._source_in_summary(channel)
         if source is None:
             self._undescribed[channel] = self._undescribed.get(channel, 0) + 1
             return None
-        return ScannedMessage(
-            source, records[begin + MESSAGE_HEAD.size : end], log_time, publish_time, sequence
-        )
+        data = inflate_message(source.encoding, records[begin + MESSAGE_HEAD.size : end])
+        return ScannedMessage(source, data, log_time, publish_time, sequence)
 
-    def _defined(self, record: object) -> Iterator[Source]:
-        """Take a schema or a channel, and yield the latter; the first one of a number counts."""
+    def _defined(self, record: object) -> Iterator[Source | Damage]:
+        """Take a schema or channel, and yield the latter; the first one of a number counts."""
         if isinstance(record, Schema):
             self._schemas.setdefault(record.id, record)
-        elif isinstance(record, Channel) and record.id not in self._sources:
-            source = self._source(record)
-            if source is not None:
+        elif isinstance(record, Channel):
+            known, source = self._sources.get(record.id), self._source(record)
+            if known is None and source is not None:
                 self._sources[record.id] = source
                 yield source
+            elif known is not None and known.topic != record.topic:
+                reason = f"channel {record.id} is {known.topic}, and again {record.topic}"
+                yield Damage(self.file, self.place, self.place, reason, of_index=self._in_summary)
 
-    def _source_told_later(self, number: int) -> Source | None:
-        """Return a channel that only the end of the file describes."""
-        channel = self._later.channels.get(number)
+    def _source_in_summary(self, number: int) -> Source | None:
+        """Return a channel that only the summary defines."""
+        channel = self._summary.channels.get(number)
         source = None if channel is None else self._source(channel)
         if source is not None:
             self._sources[number] = source
         return source
 
     def _source(self, channel: Channel) -> Source | None:
-        """Return a channel with its schema, None if that is lost."""
-        schema = self._schemas.get(channel.schema_id) or self._later.schemas.get(channel.schema_id)
+        schema = self._schemas.get(channel.schema_id) or self._summary.schemas.get(channel.schema_id)
         if schema is None:
             return None
         return Source(
@@ -220,12 +240,11 @@ class FileScan:
         )
 
     def _damage(self, frame: Frame | Gap, reason: str, head: ChunkHead | None = None) -> Damage:
-        """Return what is wrong with a record."""
         start_ns, end_ns = (None, None) if head is None else (head.start_ns, head.end_ns)
         return Damage(self.file, frame.begin, frame.end, reason, start_ns, end_ns, of_index=self._in_summary)
 
     def _add_to_checksum(self, found: Frame | Gap) -> None:
-        """Carry on the checksum over the file; behind a gap nothing can be said of it."""
+        """Continue the checksum of the data section, which a gap makes meaningless."""
         if isinstance(found, Gap):
             self._whole = False
         elif self._whole and found.opcode != Opcode.DATA_END:
@@ -233,7 +252,7 @@ class FileScan:
             self._checksum = zlib.crc32(found.body, zlib.crc32(head, self._checksum))
 
     def _counts_lost(self, found: Frame | Gap) -> bool:
-        """Add to the lost chunk how many messages of a topic it had, if that is what was found."""
+        """Add the messages of a message index to those of the lost chunk; return whether it was one."""
         if isinstance(found, Gap) or found.opcode != Opcode.MESSAGE_INDEX or self._lost is None:
             return False
         index = parse(found.opcode, found.body)

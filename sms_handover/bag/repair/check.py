@@ -1,12 +1,10 @@
-"""Whether a bag is complete, and what is missing in it."""
+"""Check of a bag: whether it is complete, and what is missing."""
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
-from sms_handover.bag.files import damage_reported, files_of
+from sms_handover.bag.files import BagFiles, Progress, damage_reported, files_of
 from sms_handover.bag.mcap.damage import Damage
 from sms_handover.bag.mcap.scan import FileScan, ScannedMessage, Source
 from sms_handover.bag.metadata import counts_of, metadata_of
@@ -14,7 +12,6 @@ from sms_handover.bag.repair.check_content import ContentCheck
 from sms_handover.bag.repair.check_index import IndexCheck
 from sms_handover.bag.repair.findings import CheckResult, Findings
 from sms_handover.bag.repair.message_counts import MessageCounts
-from sms_handover.bag.repair.recover import Progress
 from sms_handover.errors import BagError
 
 _MOST = 20  # places of damage that are listed one by one
@@ -23,63 +20,54 @@ _MOST = 20  # places of damage that are listed one by one
 def check(path: Path, progress: Progress | None = None) -> CheckResult:
     """Return what is wrong with the bag at ``path``, its folder or a file.
 
-    Looked at are every checksum, the index and the summary against what is in the file,
-    ``metadata.yaml`` against both, the schema of every topic, the stamps of the messages against
-    the loss ledger, and for a run of ours whether it was finished and everything published came.
-    Raises BagError if it is no MCAP bag at all.
+    Checked are every checksum, index and summary against the file, ``metadata.yaml`` against both,
+    the schema of every topic, stamps against the loss ledger, and of a recorded run whether it ended
+    and every published message is there. Raises BagError if it is no MCAP bag at all.
     """
-    files = files_of(path)
-    with damage_reported(path):
-        sizes = [file.stat().st_size for file in files]
-    findings, content, claims = Findings(), ContentCheck(), MessageCounts()
-    counts: Counter[str] = Counter()
-    before = 0
-    for file, size in zip(files, sizes, strict=True):
-        report = None if progress is None else partial(_tell, progress, before, sum(sizes))
-        with damage_reported(file):
-            if size == 0:
-                findings.damaged(f"{file.name} is empty")
-                continue
-            _check_file(FileScan(file), _Into(findings, content, claims, counts), report)
-        before += size
+    bag = files_of(path)
+    result = _Result(Findings(), ContentCheck(), MessageCounts(), Counter())
+    findings, content = result.findings, result.content
+    for scan in bag.scans(progress):
+        with damage_reported(scan.file):
+            _check_file(scan, result)
     if not content.any_record:
         raise BagError(f"{path} is not a bag: no record of an MCAP file is in it")
-    _check_metadata(path, files, _Into(findings, content, claims, counts))
-    content.close(findings, claims)
-    claims.close(counts, findings)
-    return CheckResult(path, files, dict(counts), content.is_ours, findings.all)
+    _check_metadata(bag, result)
+    content.close(findings, result.stated)
+    result.stated.close(result.counts, findings)
+    return CheckResult(path, bag.files, dict(result.counts), content.is_ours, findings.all)
 
 
 @dataclass(frozen=True)
-class _Into:
-    """What all files of a bag are gathered into."""
+class _Result:
+    """The results of all files of a bag."""
 
     findings: Findings
     content: ContentCheck
-    claims: MessageCounts
+    stated: MessageCounts
     counts: Counter[str]
 
 
-def _check_file(scan: FileScan, into: _Into, report: Callable[[int], None] | None) -> None:
-    """Look at one file."""
-    findings, content = into.findings, into.content
+def _check_file(scan: FileScan, result: _Result) -> None:
+    findings, content = result.findings, result.content
+    if scan.size == 0:
+        findings.damaged(f"{scan.file.name} is empty")
+        return
     index = IndexCheck()
     damages: list[Damage] = []
     for found in scan:
         if isinstance(found, ScannedMessage):
-            into.counts[found.source.topic] += 1
+            result.counts[found.source.topic] += 1
             index.message(found)
             content.message(found)
         elif isinstance(found, Source):
-            into.counts[found.topic] += 0
+            result.counts[found.topic] += 0
             content.source(found)
         elif isinstance(found, Damage):
             damages.append(found)
         else:
             index.record(found, scan)
             content.record(found.record)
-            if report is not None:
-                report(scan.place)
     for damage in damages[:_MOST]:
         findings.damaged(str(damage))
     if len(damages) > _MOST:
@@ -88,35 +76,32 @@ def _check_file(scan: FileScan, into: _Into, report: Callable[[int], None] | Non
         findings.damaged(
             f"{scan.file.name} was not closed: the recorder was killed, the disk was full or the file was cut"
         )
-    index.close(scan, findings, into.claims)
+    index.close(scan, findings, result.stated)
 
 
-def _check_metadata(path: Path, files: tuple[Path, ...], into: _Into) -> None:
-    """Hold ``metadata.yaml`` against the files."""
-    findings = into.findings
-    if not path.is_dir():
-        findings.note("metadata.yaml was not looked at, as the bag was given as a file")
+def _check_metadata(bag: BagFiles, result: _Result) -> None:
+    """Compare ``metadata.yaml`` with the files."""
+    findings = result.findings
+    if not bag.path.is_dir():
+        findings.note("metadata.yaml was not checked, as the bag was given as a file")
         return
     try:
-        metadata = metadata_of(path)
-        told = counts_of(metadata or {})
+        metadata = metadata_of(bag.path)
+        counts = counts_of(metadata or {})
     except BagError as error:
         findings.damaged(str(error))
         return
     if metadata is None:
-        findings.missing("metadata.yaml is not there: ros2 bag finds the topics by going through the file")
+        findings.missing("metadata.yaml is not there: ros2 bag must scan the file for its topics")
         return
-    listed = {str(name) for name in metadata.get("relative_file_paths") or ()}
-    there = {file.name for file in files}
+    listed = {Path(str(name)).name for name in metadata.get("relative_file_paths") or ()}
+    there = {file.name for file in bag.files}
     for name in sorted(listed - there):
         findings.missing(f"{name} is not there, metadata.yaml lists it")
     for name in sorted(there - listed):
         findings.damaged(f"{name} is there, metadata.yaml does not list it")
-    into.claims.add("metadata.yaml", {**dict.fromkeys(into.counts, 0), **told})
-    if metadata.get("message_count") != sum(told.values()):
+    for name in sorted(set(bag.unlisted) - there):
+        findings.note(f"{name} is not read, metadata.yaml does not list it")
+    result.stated.add("metadata.yaml", {**dict.fromkeys(result.counts, 0), **counts})
+    if metadata.get("message_count") != sum(counts.values()):
         findings.damaged("metadata.yaml contradicts itself about the number of messages")
-
-
-def _tell(progress: Progress, before: int, size: int, place: int) -> None:
-    """Report progress over all files."""
-    progress(before + place, size)

@@ -1,4 +1,4 @@
-"""Hold what the index and the summary of an MCAP file say against what is in it."""
+"""Check of index and summary of an MCAP file against its content."""
 
 from collections import Counter
 from typing import Any
@@ -13,15 +13,15 @@ from sms_handover.bag.repair.message_counts import MessageCounts
 
 
 class IndexCheck:
-    """What one file holds and what it says that it holds."""
+    """The content of one file, and what its index states."""
 
     def __init__(self) -> None:
         self._counts: Counter[str] = Counter()
         self._first_ns: int | None = None
         self._last_ns = 0
-        self._places: dict[int, tuple[int, int, str]] = {}  # length, opcode and name by where a record begins
-        self._chunks: dict[int, tuple[int, ChunkHead]] = {}  # length and head by where a chunk begins
-        self._in_chunk: Counter[tuple[str, int]] = Counter()  # topic and log time, of the newest chunk
+        self._places: dict[int, tuple[int, int, str]] = {}  # length, opcode and name by begin
+        self._chunks: dict[int, tuple[int, ChunkHead]] = {}  # length and head by begin
+        self._in_chunk: Counter[tuple[str, int]] = Counter()  # topic and log time, of the latest chunk
         self._in_index: Counter[tuple[str, int]] = Counter()
         self._wrong_indexes = 0
         self._summary: list[Any] = []
@@ -54,8 +54,8 @@ class IndexCheck:
         elif found.record is not None:
             self._summary.append(found.record)
 
-    def close(self, scan: FileScan, findings: Findings, claims: MessageCounts) -> None:
-        """Tell where the two differ; a file without its end says nothing that could be held against it."""
+    def close(self, scan: FileScan, findings: Findings, stated: MessageCounts) -> None:
+        """Report where they differ; a file without its end states nothing."""
         name = scan.file.name
         self._end_chunk()
         if not scan.closed:
@@ -65,7 +65,7 @@ class IndexCheck:
         of_kind = Counter(type(record).__name__ for record in self._summary)
         for record in self._summary:
             if isinstance(record, Statistics):
-                self._hold_statistics(record, scan, findings, claims)
+                self._check_statistics(record, scan, findings, stated)
             elif isinstance(record, Footer):
                 if record.summary_start not in (0, self._data_end):
                     findings.damaged(f"{name}: the footer does not point to the summary")
@@ -77,26 +77,25 @@ class IndexCheck:
                 findings.damaged(f"{name}: the index names {record.name!r} at byte {record.offset}: wrong")
         indexed = of_kind[ChunkIndex.__name__]
         if self._chunks and not indexed:
-            findings.note(f"{name} has no index: readers have to go through all of it")
+            findings.note(f"{name} has no index: readers must scan all of it")
         elif indexed != len(self._chunks):
             findings.damaged(f"{name}: {len(self._chunks)} chunks, but {indexed} in the index")
         if not of_kind[Statistics.__name__]:
-            findings.note(f"{name} does not tell how many messages it holds")
+            findings.note(f"{name} has no statistics")
 
-    def _hold_statistics(
-        self, statistics: Statistics, scan: FileScan, findings: Findings, claims: MessageCounts
+    def _check_statistics(
+        self, statistics: Statistics, scan: FileScan, findings: Findings, stated: MessageCounts
     ) -> None:
-        """Compare the numbers of messages, and when the first and the last were."""
-        told: Counter[str] = Counter()
+        """Compare the message counts, and the first and last log time."""
+        counts: Counter[str] = Counter()
         for channel, count in statistics.channel_message_counts.items():
-            told[scan.topic_of(channel)] += count
-        claims.add("statistics", told)
+            counts[scan.topic_of(channel)] += count
+        stated.add("statistics", counts)
         span = (statistics.message_start_time, statistics.message_end_time)
-        if self._first_ns is not None and told == self._counts and span != (self._first_ns, self._last_ns):
-            findings.damaged(f"{scan.file.name}: its statistics name another first or last log time")
+        if self._first_ns is not None and counts == self._counts and span != (self._first_ns, self._last_ns):
+            findings.damaged(f"{scan.file.name}: its statistics have another first or last log time")
 
     def _is_chunk(self, index: ChunkIndex) -> bool:
-        """Whether there is such a chunk."""
         length, head = self._chunks.get(index.chunk_start_offset, (0, None))
         return head is not None and (length, head.start_ns, head.end_ns, head.compression) == (
             index.chunk_length,
@@ -106,12 +105,11 @@ class IndexCheck:
         )
 
     def _is_there(self, index: AttachmentIndex | MetadataIndex) -> bool:
-        """Whether there is such an attachment or metadata record."""
         opcode = Opcode.ATTACHMENT if isinstance(index, AttachmentIndex) else Opcode.METADATA
         return self._places.get(index.offset) == (index.length, opcode, index.name)
 
     def _end_chunk(self) -> None:
-        """Compare the newest chunk with its message indexes, if it has any."""
+        """Compare the latest chunk with its message indexes, if it has any."""
         if self._indexed and self._in_chunk != self._in_index:
             self._wrong_indexes += 1
         self._in_chunk.clear()

@@ -1,4 +1,4 @@
-"""What a look at a bag has found, in words."""
+"""Findings of a check, in words."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -6,16 +6,16 @@ from pathlib import Path
 
 
 class Severity(Enum):
-    """What a finding says about the bag."""
+    """Kind of a finding."""
 
     DAMAGED = "damaged"  # bytes are not as they were written, or parts contradict each other
-    MISSING = "missing"  # something that was to be recorded is not there
-    NOTE = "note"  # worth knowing, and no fault of the bag
+    MISSING = "missing"  # something recorded or published is not there
+    NOTE = "note"  # no fault of the bag
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing found, as a sentence."""
+    """One finding, as a sentence."""
 
     severity: Severity
     text: str
@@ -23,7 +23,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class CheckResult:
-    """All that was found in the bag at ``path``; ``counts`` are the messages by topic."""
+    """The findings in the bag at ``path``; ``counts`` are the messages by topic."""
 
     path: Path
     files: tuple[Path, ...]
@@ -38,7 +38,7 @@ class CheckResult:
 
     @property
     def damaged(self) -> bool:
-        """Whether something is damaged, so that a recovery may help."""
+        """Whether something is damaged, so that ``recover`` helps."""
         return any(finding.severity is Severity.DAMAGED for finding in self.findings)
 
 
@@ -49,19 +49,19 @@ class Findings:
         self._found: list[Finding] = []
 
     def damaged(self, text: str) -> None:
-        """Add that something is not as it was written."""
+        """Add a finding of damage."""
         self._found.append(Finding(Severity.DAMAGED, text))
 
     def missing(self, text: str) -> None:
-        """Add that something is not there."""
+        """Add a finding that something is missing."""
         self._found.append(Finding(Severity.MISSING, text))
 
     def note(self, text: str) -> None:
-        """Add something worth knowing."""
+        """Add a note."""
         self._found.append(Finding(Severity.NOTE, text))
 
     @property
     def all(self) -> tuple[Finding, ...]:
-        """Return what was found, the worst first."""
+        """Return the findings, the worst first."""
         order = list(Severity)
         return tuple(sorted(self._found, key=lambda finding: order.index(finding.severity)))

@@ -1,4 +1,4 @@
-"""Numbers of messages as several places tell them, held against how many there are."""
+"""Message counts stated by several sources, compared with the messages found."""
 
 from collections.abc import Mapping
 
@@ -6,25 +6,25 @@ from sms_handover.bag.repair.findings import Findings
 
 
 class MessageCounts:
-    """Who says how many messages each topic has."""
+    """The number of messages of each topic, by source."""
 
     def __init__(self) -> None:
-        self._claims: dict[str, dict[str, int]] = {}
+        self._stated: dict[str, dict[str, int]] = {}
 
-    def add(self, who: str, counts: Mapping[str, int]) -> None:
-        """Take what one place says; said again, as by the files of a split bag, it adds up."""
+    def add(self, source: str, counts: Mapping[str, int]) -> None:
+        """Add the counts of a source; those of the files of a split bag add up."""
         for topic, count in counts.items():
-            claims = self._claims.setdefault(topic, {})
-            claims[who] = claims.get(who, 0) + count
+            stated = self._stated.setdefault(topic, {})
+            stated[source] = stated.get(source, 0) + count
 
     def close(self, counts: Mapping[str, int], findings: Findings) -> None:
-        """Tell in one line for each topic who says something else than what is there."""
-        for topic, claims in self._claims.items():
+        """Report in one line per topic which sources differ from ``counts``."""
+        for topic, stated in self._stated.items():
             there = counts.get(topic, 0)
-            more = [who for who, count in claims.items() if count > there]
-            fewer = [f"{who} ({count})" for who, count in claims.items() if count < there]
+            more = [source for source, count in stated.items() if count > there]
+            fewer = [f"{source} ({count})" for source, count in stated.items() if count < there]
             if more:
-                most = max(claims.values())
+                most = max(stated.values())
                 findings.missing(f"{topic}: {there} of {most} messages are there ({', '.join(more)})")
             if fewer:
-                findings.damaged(f"{topic}: {there} messages are there, more than told: {', '.join(fewer)}")
+                findings.damaged(f"{topic}: {there} messages are there, more than stated: {', '.join(fewer)}")

@@ -1,4 +1,4 @@
-"""What a recovery has brought back, and what is lost."""
+"""Recovery of a bag: what was recovered, and what is lost."""
 
 import json
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ RECOVERY_RECORD = "sms_handover.recovery"  # name of the metadata record in the 
 
 @dataclass(frozen=True)
 class TopicRecovery:
-    """One topic: messages recovered, and how many there were, None if nothing tells."""
+    """One topic: messages recovered, and messages recorded, None if unknown."""
 
     name: str
     recovered: int
@@ -21,7 +21,7 @@ class TopicRecovery:
 
     @property
     def lost(self) -> int:
-        """Return how many messages are known to be lost."""
+        """Return the number of messages known to be lost."""
         return 0 if self.recorded is None else max(0, self.recorded - self.recovered)
 
 
@@ -29,12 +29,13 @@ class TopicRecovery:
 class Recovery:
     """The result of a recovery from ``source`` into the new bag ``folder``.
 
-    ``size`` is what was read [byte], ``closed`` tells whether every file had its end,
-    ``from_cut_chunk`` counts messages out of a chunk that the end of a file cuts off. Times are log
-    times, None without a message. ``largest_loss_ns`` is the longest stretch of log time without
-    messages around damage; unless ``ends_known``, damage reaches an end of the bag, and nothing
-    tells how much was beyond. ``ledger`` is that of the new
-    bag, None if the old one had none.
+    ``size`` is what was read [byte], ``closed`` is whether every file had its end,
+    ``from_cut_chunk`` counts messages out of chunks cut off by the end of a file, ``missing`` names
+    files that ``metadata.yaml`` lists, ``private`` counts records that only their writer understands,
+    which are not kept. Times are log
+    times, None without messages. ``largest_loss_ns`` is the longest interval of log time without
+    messages around damage; unless ``ends_known``, damage reaches an end of the bag, and how much was
+    beyond is unknown. ``ledger`` is that of the new bag, None if the old one had none.
     """
 
     source: Path
@@ -44,6 +45,8 @@ class Recovery:
     damages: tuple[Damage, ...]
     topics: tuple[TopicRecovery, ...]
     from_cut_chunk: int
+    missing: tuple[str, ...]
+    private: int
     start_ns: int | None
     end_ns: int | None
     largest_loss_ns: int
@@ -62,21 +65,23 @@ class Recovery:
 
     @property
     def lost_bytes(self) -> int:
-        """Return how many bytes of messages, attachments and records could not be used."""
+        """Return the number of unusable bytes of messages, attachments and records."""
         return sum(damage.size for damage in self.losses)
 
     @property
     def clean(self) -> bool:
-        """Whether everything that is in the files was recovered."""
-        return not self.losses and not any(topic.lost for topic in self.topics)
+        """Whether everything in the files was recovered."""
+        return not self.losses and not self.missing and not any(topic.lost for topic in self.topics)
 
     def to_record(self) -> dict[str, str]:
-        """Return what the new bag says of its origin, as a metadata record."""
+        """Return the metadata record in the new bag that describes its origin."""
         values: Mapping[str, object] = {
             "source": self.source.name,
             "bytes_read": self.size,
             "bytes_lost": self.lost_bytes,
             "closed": self.closed,
+            "files_missing": self.missing,
+            "private_records": self.private,
             "damage": [str(damage) for damage in self.damages],
             "messages_lost": {topic.name: topic.lost for topic in self.topics if topic.lost},
             "largest_loss_ns": self.largest_loss_ns,

@@ -1,1 +1,1 @@
-"""A recorded run out of a bag: ticks, series and events as arrays."""
+"""A recorded run as arrays: ticks, series and events."""

@@ -1,15 +1,16 @@
-"""Sort the messages of a recorded run by topic and take from each what an analysis needs."""
+"""Collector of the messages of a recorded run, by topic, for an analysis."""
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import BagInfo
-from sms_handover.bag.run.columns import BlockCollector, joint_state_layout, odometry_layout
+from sms_handover.bag.run.columns import BlockCollector
 from sms_handover.bag.run.series import RowCollector
 from sms_handover.errors import BagError
 from sms_handover.graph import topics
 from sms_handover.graph.events import RunEvent
-from sms_handover.messages.message_types import MessageTypes
+from sms_handover.messages.layout import joint_state, odometry
 from sms_handover.messages.stamps import stamp_ns
 from sms_handover.messages.values import (
     energy_values,
@@ -30,19 +31,18 @@ _POSE_WITHOUT_COVARIANCE = (0, 2)  # where these are among the blocks of the lay
 
 
 class RunCollector:
-    """What the messages of one run hold, by topic name without the namespace."""
+    """The content of one run by topic name, without the namespace."""
 
     def __init__(self, info: BagInfo, prefix: str) -> None:
-        """Make a collector for each topic of a run; ``prefix`` is the namespace, '' for the root."""
+        """Prepare for each topic of a run; ``prefix`` is the namespace, '' for the root."""
         self._info = info
         self._prefix = prefix
-        self._types = MessageTypes(roots=())
         self.arms = tuple(self._found_arms())
         self._check_types()
         self.joints = {
-            name: BlockCollector(joint_state_layout, (POSITION, VELOCITY, EFFORT)) for name in JOINT_TOPICS
+            name: BlockCollector(joint_state, (POSITION, VELOCITY, EFFORT)) for name in JOINT_TOPICS
         }
-        self.odometry = BlockCollector(odometry_layout, _POSE_WITHOUT_COVARIANCE)
+        self.odometry = BlockCollector(odometry, _POSE_WITHOUT_COVARIANCE)
         self.rows = {
             topics.DEPUTY_POSE: RowCollector(7, pose_values),
             topics.LINEAR_MOMENTUM: RowCollector(3, vector_values),
@@ -59,28 +59,25 @@ class RunCollector:
         self._newest_ns = 0
 
     def collect(self) -> None:
-        """Go through the messages of the bag once."""
+        """Read the messages of the bag once."""
+        decoders: dict[str, Callable[[Any], None]] = {
+            topics.TASK_PHASE: lambda message: self.phases.append(task_phase(message)),
+            topics.GRASP_EVENT: lambda message: self.events.append(grasp_event(message)),
+            topics.RUN_EVENTS: lambda message: self.run_events.append(run_event(message)),
+            **{name: rows.add for name, rows in self.rows.items()},
+        }
         takers: dict[str, Callable[[bytes], None]] = {
+            **{name: collector.add for name, collector in self.joints.items()},
             topics.JOINT_STATES: self._take_state,
             topics.BASE_ODOMETRY: self.odometry.add,
-            topics.TASK_PHASE: self._decoded(topics.TASK_PHASE, lambda m: self.phases.append(task_phase(m))),
-            topics.GRASP_EVENT: self._decoded(
-                topics.GRASP_EVENT, lambda m: self.events.append(grasp_event(m))
-            ),
-            topics.RUN_EVENTS: self._decoded(
-                topics.RUN_EVENTS, lambda m: self.run_events.append(run_event(m))
-            ),
+            **{name: decoder(self._info, self.full_name(name), take) for name, take in decoders.items()},
         }
-        takers.update(
-            (name, self.joints[name].add) for name in (topics.JOINT_COMMAND, topics.JOINT_REFERENCE)
-        )
-        takers.update((name, self._decoded(name, rows.add)) for name, rows in self.rows.items())
         by_name = {self.full_name(name): taker for name, taker in takers.items()}
         for message in read_messages(self._info.path, by_name):
             by_name[message.topic](message.data)
 
     def _take_state(self, data: bytes) -> None:
-        """Take a joint state; one that starts anew, after a reset, makes the events so far void."""
+        """Take a joint state; one that begins a new run, after a reset, drops the events so far."""
         time_ns = stamp_ns(data)
         if self._first_ns is None:
             self._first_ns = time_ns
@@ -91,28 +88,10 @@ class RunCollector:
         self.joints[topics.JOINT_STATES].add(data)
 
     def full_name(self, name: str) -> str:
-        """Return the name that a topic of the run has in the bag."""
+        """Return the name of a topic of the run in the bag."""
         return f"{self._prefix}/{name}"
 
-    def _decoded(self, name: str, take: Callable[..., None]) -> Callable[[bytes], None]:
-        """Return what decodes a message of a topic, by the schema in the bag, and hands it to ``take``."""
-        topic = self._info.topics.get(self.full_name(name))
-        type_name = "" if topic is None else topic.type
-        if topic is not None:
-            self._types.learn(type_name, topic.schema_text)
-
-        def decode(data: bytes) -> None:
-            try:
-                take(self._types.deserialize(data, type_name))
-            except (AttributeError, IndexError) as error:
-                raise BagError(
-                    f"{self._info.path}: {name} is not as this version knows it: {error}"
-                ) from error
-
-        return decode
-
     def _check_types(self) -> None:
-        """Raise BagError if a topic of a run has another type in the bag."""
         for topic in topics.graph_topics(self.arms):
             recorded = self._info.topics.get(self.full_name(topic.name))
             if recorded is not None and (recorded.type, recorded.encoding) != (topic.type, "cdr"):
@@ -122,9 +101,21 @@ class RunCollector:
                 )
 
     def _found_arms(self) -> Iterator[str]:
-        """Yield the names of the arms whose tool pose is in the bag."""
         head, tail = f"{self._prefix}/", topics.tool_pose("")
         for name in self._info.topics:
             arm = name.removeprefix(head).removesuffix(tail)
             if f"{head}{arm}{tail}" == name and "/" not in arm:  # else it is of another namespace
                 yield arm
+
+
+def decoder(info: BagInfo, name: str, take: Callable[[Any], None]) -> Callable[[bytes], None]:
+    """Return a function that decodes a message of a topic by its schema in the bag and calls ``take``."""
+    types = info.topics[name].types if name in info.topics else None
+
+    def decode(data: bytes) -> None:
+        try:
+            take(None if types is None else types.decode(data))
+        except (AttributeError, KeyError) as error:
+            raise BagError(f"{info.path}: {name} is not as this version knows it: {error}") from error
+
+    return decode

@@ -1,4 +1,4 @@
-"""Read a recorded run into arrays."""
+"""Reader of a recorded run into arrays."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from sms_handover.bag.info import BagInfo, read_info
-from sms_handover.bag.ledger import is_of_ours
+from sms_handover.bag.ledger import has_ledger
 from sms_handover.bag.run.collector import BASE_POSE, BASE_TWIST, EFFORT, POSITION, VELOCITY, RunCollector
 from sms_handover.bag.run.series import Series
 from sms_handover.errors import BagError
@@ -26,11 +26,10 @@ def read_run(path: Path, namespace: str | None = None) -> RunData:
     There is a row per tick for each stamp with joint states and base odometry, and a row per
     reference period for each stamp with a joint reference; what was not recorded at such a stamp
     is NaN. ``phases`` has an entry per reference period. Joints are matched by name, in the order
-    of the first joint state. If the simulation was reset while it was recorded, only what came
-    after the last reset is read.
+    of the first joint state. Of a simulation that was reset, only the last run is read.
 
-    ``namespace`` is the one the graph ran in; without it the bag must hold one run only. Raises
-    BagError if there is no bag, it is damaged, was not closed, or holds no run of ours.
+    ``namespace`` is that of the graph; without it the bag must hold one run only. Raises BagError
+    if the bag is missing or damaged, was not closed, or holds no run.
     """
     info = read_info(path)
     collector = RunCollector(info, find_namespace(info) if namespace is None else namespace.rstrip("/"))
@@ -44,8 +43,7 @@ def read_run(path: Path, namespace: str | None = None) -> RunData:
 
 
 def _assemble(collector: RunCollector) -> RunData:
-    """Put what was collected into rows."""
-    joint_names = collector.joints[topics.JOINT_STATES].first_texts()
+    joint_names = collector.joints[topics.JOINT_STATES].first_names()
 
     def joint(topic: str, block: int) -> Series:
         return collector.joints[topic].series(block, joint_names).settled()
@@ -59,7 +57,7 @@ def _assemble(collector: RunCollector) -> RunData:
     ticks: Stamps = np.intersect1d(position.stamp_ns, pose.stamp_ns)
     reference = joint(topics.JOINT_REFERENCE, POSITION)
     periods = reference.stamp_ns
-    arms = sorted(collector.arms, key=lambda arm: (_first_joint(arm, joint_names), arm))
+    arms = _by_first_joint(collector.arms, joint_names)
     energy = rows(topics.ENERGY)
     return RunData(
         joint_names=joint_names,
@@ -89,12 +87,12 @@ def _assemble(collector: RunCollector) -> RunData:
 
 
 def holds_run(info: BagInfo) -> bool:
-    """Whether a bag is one of ours and holds one run."""
+    """Whether a bag was recorded by this package and holds one run."""
     try:
         find_namespace(info)
     except BagError:
         return False
-    return is_of_ours(info.records)
+    return has_ledger(info.records)
 
 
 def find_namespace(info: BagInfo) -> str:
@@ -113,19 +111,18 @@ def find_namespace(info: BagInfo) -> str:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Return names as a list that is short enough for a message."""
     more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
     return (", ".join(names[:_MOST_NAMES]) or "none") + more
 
 
-def _first_joint(arm: str, joint_names: Sequence[str]) -> int:
-    """Return the place of an arm's first joint, behind all others if it has none."""
-    places = [place for place, name in enumerate(joint_names) if arm_of_joint(name) == arm]
-    return min(places, default=len(joint_names))
+def _by_first_joint(arms: Sequence[str], joint_names: Sequence[str]) -> list[str]:
+    """Return the arms in the order of their first joints."""
+    owners = list(map(arm_of_joint, joint_names))
+    return sorted(arms, key=lambda arm: (owners.index(arm) if arm in owners else len(owners), arm))
 
 
 def _last_run(phases: Sequence[TaskPhase]) -> tuple[TaskPhase, ...]:
-    """Return the phases since the last reset, one per stamp, in the order of time."""
+    """Return the phases since the last reset, one per stamp, by time."""
     begin = 0
     for place in range(1, len(phases)):
         if phases[place - 1].stamp_ns > phases[place].stamp_ns <= phases[0].stamp_ns:

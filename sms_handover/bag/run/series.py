@@ -1,4 +1,4 @@
-"""Values with stamps, and how they are brought onto a common time axis."""
+"""Series of values with stamps, and how they are aligned."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,8 +20,8 @@ class Series:
     def settled(self) -> "Series":
         """Return the last run in the series, in the order of time, each stamp once.
 
-        A stamp that goes back to the first one or before begins a new run (the simulation was
-        reset); any other that goes back is a late message. Of equal stamps the first counts.
+        A stamp that goes back to the first one or before begins a new run (a reset); any other that
+        goes back is a late message. Of equal stamps the first counts.
         """
         stamps = self.stamp_ns
         restarts = np.flatnonzero((np.diff(stamps) < 0) & (stamps[1:] <= stamps[:1])) + 1
@@ -30,7 +30,7 @@ class Series:
         return Series(unique, self.values[begin:][first])
 
     def at(self, stamp_ns: Stamps) -> Array:
-        """Return the rows at the stamps asked for, NaN where there is none; the series must be settled."""
+        """Return the rows of a settled series at the given stamps, NaN where there is none."""
         rows = np.full((len(stamp_ns), self.values.shape[1]), np.nan)
         if len(self.stamp_ns):
             place = np.minimum(np.searchsorted(self.stamp_ns, stamp_ns), len(self.stamp_ns) - 1)

@@ -1,4 +1,4 @@
-"""Go through a recorded run tick by tick: the state, and what was answered to it."""
+"""Ticks of a recorded run: the state, and the answer to it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -25,10 +25,9 @@ class RecordedTick:
 
 
 def recorded_ticks(path: Path) -> Iterator[RecordedTick]:
-    """Yield the ticks of a run by their stamp, which is the log time in bags of ours.
+    """Yield the ticks of a run by their stamp, which is the log time in its bag.
 
-    Raises BagError if the bag holds no run, or if the simulation was reset while it was recorded: then
-    a stamp stands for several ticks.
+    Raises BagError if the bag holds no run, or if the simulation was reset while it was recorded.
     """
     missing = [name for name in _TOPICS if name not in read_info(path).topics]
     if missing:
@@ -37,7 +36,6 @@ def recorded_ticks(path: Path) -> Iterator[RecordedTick]:
 
 
 def _ticks(path: Path) -> Iterator[RecordedTick]:
-    """Yield the ticks of a run."""
     messages = messages_by_time(path, _TOPICS)
     for stamp_ns, group in groupby(messages, key=lambda message: message.log_time_ns):
         found: dict[str, bytes] = {}

@@ -23,5 +23,5 @@ def add_parser(parser: ArgumentParser) -> None:
 
 
 def command(options: Namespace) -> int:
-    """Run the subcommand; return the exit code."""
+    """Run the command; return the exit code."""
     return int(import_module(f"{__name__}.{options.bag_command}").command(options))

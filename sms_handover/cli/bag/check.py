@@ -9,7 +9,7 @@ from sms_handover.bag.repair.check import check
 from sms_handover.bag.repair.findings import CheckResult, Severity
 from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
 from sms_handover.launcher.run_folder import bags_of
-from sms_handover.terminal.progress import ProgressLine
+from sms_handover.terminal.progress import byte_progress
 
 _MARKS = {Severity.DAMAGED: "DAMAGED", Severity.MISSING: "MISSING", Severity.NOTE: "note"}
 
@@ -31,7 +31,7 @@ def command(options: Namespace) -> int:
     """Run the command; return the exit code."""
     results = []
     for path in bags_of(options.bag):
-        with ProgressLine("checking") as progress:
+        with byte_progress("checking") as progress:
             results.append(check(path, progress))
     if options.json:
         values = [_values(result) for result in results]

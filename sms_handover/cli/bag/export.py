@@ -9,7 +9,7 @@ from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
 from sms_handover.export.export import CSV, FORMATS, export
 from sms_handover.export.selection import Selection
 from sms_handover.launcher.run_folder import bag_of
-from sms_handover.terminal.progress import ProgressLine
+from sms_handover.terminal.progress import byte_progress
 from sms_handover.terminal.streams import printable
 
 
@@ -39,7 +39,7 @@ def command(options: Namespace) -> int:
     """Run the command; return the exit code."""
     choice = TopicChoice(tuple(options.topics), options.regex, tuple(options.exclude_topics))
     selection = Selection(choice, options.start, options.end)
-    with ProgressLine("exporting") as progress:
+    with byte_progress("exporting") as progress:
         result = export(
             bag_of(options.bag),
             options.output,
@@ -48,10 +48,12 @@ def command(options: Namespace) -> int:
             by_topic=options.by_topic,
             progress=progress,
         )
+    for text in result.missing:
+        print(f"not exported: {text}", file=sys.stderr)
     for topic, reason in result.skipped.items():
         count = result.left_out[topic]
         print(f"not exported: {printable(topic)}: {count} messages: {reason}", file=sys.stderr)
     for name, rows in result.rows.items():
         print(f"{name}: {rows} rows")
     print(f"{len(result.rows)} tables in {result.folder}")
-    return EXIT_LOSS if result.left_out.total() else EXIT_OK
+    return EXIT_LOSS if result.missing or result.left_out.total() else EXIT_OK

@@ -1,14 +1,14 @@
-"""``sms-handover bag info``: show the contents of a bag."""
+"""``sms-handover bag info``: what a bag holds."""
 
 import json
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from sms_handover.bag.info import BagInfo, TopicInfo, read_info
 from sms_handover.bag.ledger import ledger_table
 from sms_handover.bag.overview import overview
-from sms_handover.cli.exit_codes import EXIT_OK
+from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
 from sms_handover.launcher.run_folder import bag_of
 from sms_handover.units import NS_PER_S
 
@@ -16,13 +16,14 @@ _BYTES_PER_MIB = 2**20
 
 
 def add_parser(parser: ArgumentParser) -> None:
-    """Add the options."""
+    """Describe the command."""
     parser.formatter_class = RawDescriptionHelpFormatter
     parser.description = (
-        "Print what 'ros2 bag info' prints, and controller, schedule, versions, seed and loss ledger of a\n"
-        "bag of sms-handover. Only the summaries of the files are read; 'bag check' reads all of it."
+        "Print what 'ros2 bag info' prints, and what bags of sms-handover hold besides: controller,\n"
+        "schedule, versions, seed and loss ledger. Only the ends of the files are read:\n"
+        "'bag check' looks at the rest."
     )
-    parser.epilog = "exit codes: 0 ok; 1 unreadable bag"
+    parser.epilog = "exit codes: 0 ok; 1 the bag cannot be read"
     parser.add_argument("bag", type=Path, metavar="BAG", help="run folder, bag folder or .mcap file")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
@@ -31,11 +32,11 @@ def command(options: Namespace) -> int:
     """Run the command; return the exit code."""
     info = read_info(bag_of(options.bag))
     print(json.dumps(overview(info), indent=2) if options.json else _text(info))
-    return EXIT_OK
+    return EXIT_LOSS if info.missing else EXIT_OK
 
 
 def _text(info: BagInfo) -> str:
-    """Return the contents of a bag as text."""
+    """Return what a bag holds as lines of text."""
     values = overview(info)
     head = {
         "Files": ", ".join(file.name for file in info.files),
@@ -48,6 +49,7 @@ def _text(info: BagInfo) -> str:
         "Messages": str(info.message_count),
     }
     lines = [*_table(head), "", *_topics(info.channels)]
+    lines += [f"MISSING  {text}" for text in info.missing] + [f"note     {text}" for text in info.notes]
     for title, part in (("Run", values["run"]), ("Made by", values["provenance"])):
         if isinstance(part, Mapping) and part:
             lines += ["", f"{title}:", *_table({f"  {name}": str(value) for name, value in part.items()})]
@@ -56,17 +58,16 @@ def _text(info: BagInfo) -> str:
         lines += ["", f"Attachments: {files}"]
     lines += ["", f"Records: {', '.join(info.records) or 'none'}"]
     if info.ledger is None:
-        lines += ["", "Loss ledger: none, not recorded by sms-handover"]
+        lines += ["", "Loss ledger: none, the bag was not recorded by sms-handover"]
     else:
         verdict = "complete" if info.ledger.complete else "NOT complete"
         lines += ["", f"Loss ledger, {verdict}:", ledger_table(info.ledger)]
     return "\n".join(lines)
 
 
-def _topics(topics: Iterable[TopicInfo]) -> list[str]:
+def _topics(topics: Sequence[TopicInfo]) -> list[str]:
     """Return a line per topic."""
-    cells = [(topic.name, topic.type or "-", str(topic.message_count), topic.encoding) for topic in topics]
-    rows = [("topic", "type", "messages", "serialization"), *cells]
+    rows = [("topic", "type", "messages", "serialization"), *map(_cells, topics)]
     widths = [max(len(row[column]) for row in rows) for column in range(3)]
     return [
         f"{name:<{widths[0]}}  {kind:<{widths[1]}}  {count:>{widths[2]}}  {encoding}".rstrip()
@@ -74,8 +75,13 @@ def _topics(topics: Iterable[TopicInfo]) -> list[str]:
     ]
 
 
+def _cells(topic: TopicInfo) -> tuple[str, str, str, str]:
+    """Return the cells of a topic."""
+    return topic.name, topic.type or "-", str(topic.message_count), topic.encoding
+
+
 def _seconds(time_ns: int) -> str:
-    """Return a time in s with all nanoseconds, which a float of wall time would not hold."""
+    """Return a time in s with every nanosecond, which a float would not hold of a wall clock."""
     return f"{time_ns // NS_PER_S}.{time_ns % NS_PER_S:09d} s"
 
 

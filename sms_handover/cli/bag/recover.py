@@ -9,7 +9,7 @@ from sms_handover.bag.repair.recover import recover
 from sms_handover.bag.repair.recovery import Recovery
 from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
 from sms_handover.launcher.run_folder import bag_of
-from sms_handover.terminal.progress import ProgressLine
+from sms_handover.terminal.progress import byte_progress
 from sms_handover.units import NS_PER_S
 
 _MOST = 20  # damaged places that are listed
@@ -36,7 +36,7 @@ def command(options: Namespace) -> int:
     """Run the command; return the exit code."""
     path = bag_of(options.bag)
     output = options.output or _beside(path)
-    with ProgressLine("recovering") as progress:
+    with byte_progress("recovering") as progress:
         result = recover(path, output, progress)
     print(json.dumps(_values(result), indent=2) if options.json else _text(result))
     return EXIT_OK if result.clean else EXIT_LOSS
@@ -69,6 +69,9 @@ def _text(result: Recovery) -> str:
         for topic in result.topics
         if topic.lost
     ]
+    lines += [f"{name} is not there, metadata.yaml lists it" for name in result.missing]
+    if result.private:
+        lines.append(f"{result.private} private records are not kept")
     if result.from_cut_chunk:
         lines.append(f"{result.from_cut_chunk} messages come from a chunk cut off by the end of the file")
     if result.largest_loss_ns:

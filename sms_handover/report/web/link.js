@@ -1,10 +1,10 @@
-// What all plots share: the stretch of time, the lines shown, the scale, and the cursor.
+// State shared by all plots: the time range, the lines shown, the scale, and the cursor.
 class LinkedPlots {
   constructor(plots) {
     this.plots = plots;
     this.view = { range: [...report.span], looks: { hiddenRuns: new Set(), logarithmic: false } };
     this.stale = new Set();
-    this.inSight = new Set();
+    this.visible = new Set();
     this.watch = new IntersectionObserver((entries) => this.seen(entries), { rootMargin: "200px" });
   }
 
@@ -32,17 +32,17 @@ class LinkedPlots {
     return Math.min(Math.max(time, this.view.range[0]), this.view.range[1]);
   }
 
-  // All plots in sight show their values at the time that one is pointed at; once per frame is enough.
+  // All visible plots show their values at the time under the pointer; once per frame is enough.
   point(source, time) {
     this.pointed ??= requestAnimationFrame(() => {
       this.pointed = undefined;
       this.showTime(this.wanted.time ?? this.chosen ?? null);
-      for (const plot of this.inSight) if (plot !== this.wanted.source) plot.showValues(this.wanted.time);
+      for (const plot of this.visible) if (plot !== this.wanted.source) plot.showValues(this.wanted.time);
     });
     this.wanted = { source, time };
   }
 
-  // Choose a time: the plots mark it while none is pointed at, and the animation goes there.
+  // Select a time: the plots mark it while the pointer is elsewhere, and the animation goes there.
   seek(time) {
     this.chosen = time;
     this.onSeek?.(time);
@@ -62,12 +62,12 @@ class LinkedPlots {
     this.onZoom?.(range);
   }
 
-  // Other looks than the range: what is hidden, the scale, the colours.
+  // Everything but the range: what is hidden, the scale, the colours.
   restyle(looks) {
     this.change({ ...this.view, looks: { ...this.view.looks, ...looks } });
   }
 
-  // What is in sight is drawn at once, the rest after it.
+  // Visible plots are drawn first.
   change(view) {
     this.view = view;
     this.stale = new Set(this.plots);
@@ -76,7 +76,7 @@ class LinkedPlots {
 
   async refresh() {
     while (this.stale.size > 0) {
-      const next = [...this.stale].find((plot) => this.inSight.has(plot)) ?? [...this.stale][0];
+      const next = [...this.stale].find((plot) => this.visible.has(plot)) ?? [...this.stale][0];
       this.stale.delete(next);
       await next.update(this.view);
       await new Promise((resolve) => requestAnimationFrame(resolve));
@@ -87,8 +87,8 @@ class LinkedPlots {
   seen(entries) {
     for (const entry of entries) {
       const plot = this.plots.find((one) => one.frame === entry.target);
-      if (entry.isIntersecting) this.inSight.add(plot);
-      else this.inSight.delete(plot);
+      if (entry.isIntersecting) this.visible.add(plot);
+      else this.visible.delete(plot);
     }
   }
 }

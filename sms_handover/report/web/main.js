@@ -1,4 +1,4 @@
-// Put the page to work: plots, the buttons above them, and the animation.
+// Set up the page: plots, the buttons above them, and the animation.
 const plots = new LinkedPlots(
   report.plots
     .filter((plot) => plot.lines.length > 0)
@@ -57,7 +57,7 @@ function addChoices() {
   };
 }
 
-// The animation stands in a frame of its own; both sides tell the other the time.
+// The animation is in its own frame; both sides send each other the time.
 function linkAnimation() {
   const frame = document.querySelector("#animation iframe");
   if (!frame) return;

@@ -1,14 +1,14 @@
-// One plot over time. It draws what it is told; link.js tells all of them together.
-const MARGIN = { l: 62, r: 22, t: 22, b: 30 }; // px, fixed, so that a time has the same place in every plot
-const DECADES = 8; // drawn below the largest value on a logarithmic scale; what is smaller is rounding
+// One plot over time; link.js controls all of them together.
+const MARGIN = { l: 62, r: 22, t: 22, b: 30 }; // px, fixed, so that a time has the same position in every plot
+const DECADES = 8; // below the largest value on a logarithmic scale; smaller values are rounding errors
 const MARK = { y: 1, xref: "x", yref: "paper", yanchor: "bottom", showarrow: false, borderpad: 0 }; // above a plot
 const CONFIG = {
   displaylogo: false,
-  doubleClick: false, // link.js answers it, for all plots
+  doubleClick: false, // link.js handles it for all plots
   responsive: true,
   modeBarButtons: [["zoom2d", "pan2d", "toImage"]],
 };
-const coarse = matchMedia("(hover: none)").matches; // fingers: a drag scrolls the page
+const coarse = matchMedia("(hover: none)").matches; // touch screen: a drag scrolls the page
 
 class TimePlot {
   constructor(figure, plot) {
@@ -69,7 +69,7 @@ class TimePlot {
     return !this.view.looks.hiddenRuns.has(line.run) && !this.hiddenSeries.has(line.series);
   }
 
-  // A zoom alone is much quicker than drawing again what scale, colours and choices of lines have changed.
+  // Zooming alone is much quicker than a redraw for another scale, other colours or other lines.
   async update(view) {
     const zoomed = view.looks === this.view.looks;
     this.view = view;
@@ -90,14 +90,14 @@ class TimePlot {
     return [...phaseNames(this.view.range), ...eventMarks()];
   }
 
-  // Show the values at a time, as if it were pointed at; null for none.
+  // Show the values at a time, as if the pointer were there; null for none.
   showValues(time) {
     if (!this.unified) return;
     if (time === null) Plotly.Fx.unhover(this.frame);
     else Plotly.Fx.hover(this.frame, { xval: time }, "xy");
   }
 
-  // The values in sight fill the height.
+  // The visible values fill the height.
   valueAxis() {
     const { range } = this.view;
     const end = range[1] < report.span[1] ? range[1] : Infinity; // at its end the next phase begins
@@ -113,17 +113,17 @@ class TimePlot {
         if (value > 0) smallest = Math.min(smallest, value);
       }
     }
-    if (this.plot.size && this.view.looks.logarithmic && smallest < Infinity) {
+    if (this.plot.magnitude && this.view.looks.logarithmic && smallest < Infinity) {
       const top = Math.log10(high);
       const bottom = Math.max(Math.log10(smallest), top - DECADES);
       return { type: "log", range: [bottom - 0.1, top + 0.2], tickfont: { color: colour("muted"), size: 9 } };
     }
     if (!(high >= low)) return { type: "linear", range: [0, 1] };
     const room = 0.06 * (high - low) || Math.abs(high) || 1;
-    return { type: "linear", range: [this.plot.size ? -room / 2 : low - room, high + room] };
+    return { type: "linear", range: [this.plot.magnitude ? -room / 2 : low - room, high + room] };
   }
 
-  // The place of a time, and the time of a place, in px from the left of the frame.
+  // The position of a time, and the time at a position, in px from the left of the frame.
   placeOf(time) {
     const [begin, end] = this.view.range;
     return MARGIN.l + ((time - begin) / (end - begin)) * (this.frame.clientWidth - MARGIN.l - MARGIN.r);
@@ -159,7 +159,7 @@ function phaseShapes() {
   }));
 }
 
-// Above the plot, where there is room for the name.
+// Above the plot, if the name fits.
 function phaseNames([begin, end]) {
   return report.phases
     .map((phase) => ({ ...phase, from: Math.max(phase.begin, begin), to: Math.min(phase.end, end) }))

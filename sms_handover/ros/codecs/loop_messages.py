@@ -1,10 +1,10 @@
-"""The three messages of the hot path as CDR bytes, packed and read by a template.
+"""Loop messages as CDR bytes, packed and read by the layout of a prototype.
 
 A JointState or Odometry of the loop has the same names every time, so its layout is fixed. A message of
 another layout (other names, other order, another sender's padding) is read the general way, by name.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -15,9 +15,9 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from sms_handover.errors import BagError, GraphError, MessageError, Reason
+from sms_handover.messages.layout import Layout, joint_state, numbers_behind_header, odometry
 from sms_handover.messages.message_types import MessageTypes
 from sms_handover.messages.stamps import stamp_ns
-from sms_handover.messages.template import Template
 from sms_handover.model.poses import pose_row
 from sms_handover.ros.codecs.convert import joints_in_order, pose_of_message
 from sms_handover.ros.codecs.validation import check_finite, check_unit
@@ -31,8 +31,7 @@ Stamped = tuple[int, T]  # stamp of a message in ns, and what is in it
 
 _BLOCKS = ("position", "velocity", "effort")  # of a JointState, as they stand in it
 _COVARIANCE = 36  # numbers of an Odometry behind its pose, and behind its twist
-_POSE = slice(BASE_NQ)
-_TWIST = slice(BASE_NQ + _COVARIANCE, BASE_NQ + _COVARIANCE + BASE_NV)
+_POSE, _TWIST = 0, 2  # among the blocks of an Odometry
 _LARGEST = 65536  # [byte] of a message of another layout
 
 
@@ -43,20 +42,19 @@ class JointStateCodec:
         """Fix the joint names and which of position, velocity and effort are filled."""
         self._names = tuple(names)
         self._blocks = tuple(block for block in _BLOCKS if block in blocks)
-        n = len(self._names)
-        marked = {block: np.full(n, float(i + 1)) for i, block in enumerate(self._blocks)}
-        self._template = Template(_joint_state(self._names, marked), tuple(marked.values()))
-        self._parts = self._template.parts
+        wanted = [_BLOCKS.index(block) for block in self._blocks]
+        self._layout = Layout(_joint_state(self._names, self._blocks), joint_state, wanted)
+        self._parts = self._layout.parts
 
     def pack(self, stamp_ns: int, **blocks: Array) -> bytes:
         """Return the bytes of a message with a stamp and the arrays (n,) of every block."""
-        return self._template.pack(stamp_ns, *[blocks[block] for block in self._blocks])
+        return self._layout.pack(stamp_ns, *[blocks[block] for block in self._blocks])
 
     def read(self, data: bytes) -> dict[str, Array]:
         """Return the arrays (n,) of every block in the order of the joints; raises MessageError."""
-        if self._template.stamp_of(data) is None:
+        if self._layout.stamp_of(data) is None:
             return self._read_anyway(data)
-        numbers = self._template.numbers(data)
+        numbers = self._layout.numbers(data)
         return {block: numbers[part] for block, part in zip(self._blocks, self._parts, strict=True)}
 
     def checked(self, data: bytes) -> Stamped[tuple[Array, ...]]:
@@ -64,13 +62,13 @@ class JointStateCodec:
 
         Raises MessageError unless it has every joint with finite numbers.
         """
-        stamp = self._template.stamp_of(data)
+        stamp = self._layout.stamp_of(data)
         if stamp is None:
             blocks = self._read_anyway(data)
             for block, values in blocks.items():
                 check_finite(values, f"{block} in a joint message")
             return arrival_ns(data), tuple(map(frozen, blocks.values()))
-        numbers = self._template.numbers(data)
+        numbers = self._layout.numbers(data)
         check_finite(numbers, "a joint message")
         return stamp, tuple([numbers[part] for part in self._parts])
 
@@ -86,36 +84,34 @@ class OdometryCodec:
     def __init__(self, frame: str, child_frame: str) -> None:
         """Fix the names of the frames."""
         self._frames = (frame, child_frame)
-        numbers = np.arange(1.0, 1.0 + 2 * _COVARIANCE + BASE_NQ + BASE_NV)
-        self._template = Template(_odometry(frame, child_frame, numbers), (numbers,))
-        self._numbers = np.zeros_like(numbers)
+        self._layout = Layout(_odometry(frame, child_frame), odometry, (_POSE, _TWIST))
+        self._pose, self._twist = self._layout.parts
 
     def pack(self, stamp_ns: int, pose: Array, twist: Array) -> bytes:
         """Return the bytes of a message with a stamp.
 
         ``pose`` (7,) is position and quaternion x y z w, ``twist`` (6,) the linear, then the angular part.
         """
-        self._numbers[_POSE], self._numbers[_TWIST] = pose, twist
-        return self._template.pack(stamp_ns, self._numbers)
+        return self._layout.pack(stamp_ns, pose, twist)
 
     def read(self, data: bytes) -> tuple[Array, Array]:
         """Return pose (7,) and twist (6,) as they are packed; raises MessageError on others."""
-        if self._template.stamp_of(data) is None:
+        if self._layout.stamp_of(data) is None:
             return self._read_anyway(data)
-        numbers = self._template.numbers(data)
-        return numbers[_POSE], numbers[_TWIST]
+        numbers = self._layout.numbers(data)
+        return numbers[self._pose], numbers[self._twist]
 
     def checked(self, data: bytes) -> Stamped[tuple[Array, Array]]:
         """Return the stamp, and pose (7,) and twist (6,), of a good message, read-only.
 
         Raises MessageError unless frames, rotation and numbers are good.
         """
-        stamp = self._template.stamp_of(data)
+        stamp = self._layout.stamp_of(data)
         if stamp is None:
             pose, twist = map(frozen, self._read_anyway(data))
         else:
-            numbers = self._template.numbers(data)
-            pose, twist = numbers[_POSE], numbers[_TWIST]
+            numbers = self._layout.numbers(data)
+            pose, twist = numbers[self._pose], numbers[self._twist]
         check_finite(pose, "the pose of an odometry message")
         check_finite(twist, "the twist of an odometry message")
         check_unit(pose[3:], "an odometry message")
@@ -141,15 +137,15 @@ class StampedCodec:
     ) -> None:
         """Fix type and frame; ``fields`` makes the fields beside the header from ``count`` numbers."""
         types = MessageTypes()
-        self._example = np.arange(1.0, 1.0 + count)
-        message = types.make(type_name, header=_header(types, frame), **fields(types, self._example))
-        self._template = Template(types.serialize(message), (self._example,))
+        self._count = count
+        message = types.make(type_name, header=_header(types, frame), **fields(types, np.zeros(count)))
+        self._layout = Layout(types.serialize(message), numbers_behind_header(count), (0,))
 
     def pack(self, stamp_ns: int, numbers: Array) -> bytes:
         """Return the bytes of a message with a stamp and all its numbers in the order of the fields."""
-        if numbers.size != self._example.size:
+        if numbers.size != self._count:
             raise GraphError(f"{numbers.size} numbers do not fill a message of this layout")
-        return self._template.pack(stamp_ns, numbers)
+        return self._layout.pack(stamp_ns, numbers)
 
 
 class PoseCodec(StampedCodec):
@@ -163,8 +159,8 @@ class PoseCodec(StampedCodec):
 
     def read_pose(self, data: bytes) -> Pose:
         """Return the pose in the bytes of a message of any layout; raises MessageError."""
-        if self._template.stamp_of(data) is not None:
-            numbers = self._template.numbers(data)
+        if self._layout.stamp_of(data) is not None:
+            numbers = self._layout.numbers(data)
             return Pose(numbers[:3], numbers[3:])
         message = decoded(data, PoseStamped)
         if message.header.frame_id != self._frame:
@@ -259,27 +255,26 @@ def stamped(data: bytes) -> Stamped[bytes]:
     return arrival_ns(data), data
 
 
-def _joint_state(names: tuple[str, ...], blocks: dict[str, Array]) -> bytes:
-    """Return the bytes of a JointState with stamp zero; blocks that are not given are empty."""
+def _joint_state(names: tuple[str, ...], filled: Collection[str]) -> bytes:
+    """Return the bytes of a JointState of zeros; blocks that are not ``filled`` are empty."""
     types = MessageTypes()
-    arrays = {block: blocks.get(block, np.zeros(0)) for block in _BLOCKS}
+    arrays = {block: np.zeros(len(names) if block in filled else 0) for block in _BLOCKS}
     message = types.make("sensor_msgs/msg/JointState", header=_header(types, ""), name=list(names), **arrays)
     return types.serialize(message)
 
 
-def _odometry(frame: str, child_frame: str, numbers: Array) -> bytes:
-    """Return the bytes of an Odometry with stamp zero: pose, its covariance, twist, its covariance."""
+def _odometry(frame: str, child_frame: str) -> bytes:
+    """Return the bytes of an Odometry of zeros."""
     types = MessageTypes()
-    pose, twist = numbers[_POSE], numbers[_TWIST]
-    linear, angular = (_geometry(types, "Vector3", part) for part in (twist[:3], twist[3:]))
-    motion = types.make("geometry_msgs/msg/Twist", linear=linear, angular=angular)
-    of_pose, of_twist = numbers[_POSE.stop : _TWIST.start], numbers[_TWIST.stop :]
+    vector, covariance = _geometry(types, "Vector3", np.zeros(3)), np.zeros(_COVARIANCE)
+    twist = types.make("geometry_msgs/msg/Twist", linear=vector, angular=vector)
+    pose = _pose(types, np.zeros(BASE_NQ))
     message = types.make(
         "nav_msgs/msg/Odometry",
         header=_header(types, frame),
         child_frame_id=child_frame,
-        pose=types.make("geometry_msgs/msg/PoseWithCovariance", pose=_pose(types, pose), covariance=of_pose),
-        twist=types.make("geometry_msgs/msg/TwistWithCovariance", twist=motion, covariance=of_twist),
+        pose=types.make("geometry_msgs/msg/PoseWithCovariance", pose=pose, covariance=covariance),
+        twist=types.make("geometry_msgs/msg/TwistWithCovariance", twist=twist, covariance=covariance),
     )
     return types.serialize(message)
 

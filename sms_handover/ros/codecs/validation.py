@@ -1,4 +1,4 @@
-"""Checks on the numbers of a message, cheap enough for every message of a loop of 1 kHz."""
+"""Validation of the numbers in a message, cheap enough for a loop of 1 kHz."""
 
 from math import isfinite
 
@@ -13,16 +13,16 @@ _UNIT_TOLERANCE = 1e-6  # [-] on the squared length of a quaternion; single prec
 def check_finite(values: Array, what: str) -> None:
     """Raise MessageError if one of the values (n,) is NaN or infinite.
 
-    The sum of the squares is finite only if all values are; only where it is not are they looked at.
+    The sum of squares is finite only if all values are; the values are inspected only if it is not.
     """
     if not isfinite(values.dot(values)) and not np.isfinite(values).all():
         raise MessageError(Reason.NOT_FINITE, f"{what} is not finite")
 
 
 def check_unit(quaternion_xyzw: Array, what: str) -> None:
-    """Raise MessageError if a quaternion (4,) is no rotation: its length differs from 1."""
+    """Raise MessageError if the length of a quaternion (4,) is not 1."""
     squared = quaternion_xyzw.dot(quaternion_xyzw)
     if not abs(squared - 1.0) <= _UNIT_TOLERANCE:
         raise MessageError(
-            Reason.NOT_UNIT, f"{what} has a quaternion of length {np.sqrt(squared):.6g}, expected is 1"
+            Reason.NOT_UNIT, f"{what} has a quaternion of length {np.sqrt(squared):.6g}, must be 1"
         )

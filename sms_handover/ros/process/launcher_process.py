@@ -1,58 +1,70 @@
-"""The process that started this one: a launcher, whose end is the end of its nodes, or anything else.
-
-As a program, ``python -m sms_handover.ros.process.launcher_process COMMAND ...``, it becomes a command
-that is ended with its launcher: for nodes of others, which do not look for it themselves.
-"""
+"""The launcher of this process: a launcher of ours or ``ros2 run``, whose end is the end of its nodes."""
 
 import ctypes
 import os
 import signal
-import sys
+from collections.abc import Mapping
 from itertools import pairwise
-from pathlib import Path
+from typing import NamedTuple
 
-LAUNCHER_PID = "SMS_HANDOVER_LAUNCHER_PID"  # environment variable, set for the nodes that a launcher starts
+from sms_handover.ros.process.process_status import PROC, process_status
+
+# Environment variables that a launcher sets for its nodes, whatever runs between: its id and its start.
+LAUNCHER_PID, LAUNCHER_START = "SMS_HANDOVER_LAUNCHER_PID", "SMS_HANDOVER_LAUNCHER_START"
 
 _PR_SET_PDEATHSIG = 1  # of prctl(2)
 
 
-def launcher_of_this_process() -> int:
-    """Return the process id of the launcher that started this process, 0 if none did.
+class LauncherProcess(NamedTuple):
+    """A process and its start, so that a later process with the same id is not taken for it."""
+
+    pid: int
+    start: int | None  # None if it had ended before anybody looked
+
+    @classmethod
+    def of(cls, pid: int) -> "LauncherProcess":
+        """Return the process that has an id now."""
+        status = process_status(pid)
+        return cls(pid, status and status.start)
+
+    @property
+    def running(self) -> bool:
+        """Whether it has not ended."""
+        status = process_status(self.pid)
+        return status is not None and status.start == self.start
+
+
+def launcher_environment() -> dict[str, str]:
+    """Return the environment variables by which nodes know this process as their launcher."""
+    pid, start = LauncherProcess.of(os.getpid())
+    return {LAUNCHER_PID: str(pid), LAUNCHER_START: str(start)}
+
+
+def launcher_of_this_process(environment: Mapping[str, str] = os.environ) -> LauncherProcess | None:
+    """Return the launcher that started this process, None if none did.
 
     A launcher names itself in the environment. ``ros2 run`` does not: it is known by its command line,
     where the system shows that. A node that a shell or a service manager has started outlives them, as
     ``nohup`` and daemons need it.
     """
-    named = os.environ.get(LAUNCHER_PID)
-    if named is not None:
-        return int(named)
+    if LAUNCHER_PID in environment:
+        pid = int(environment[LAUNCHER_PID])
+        start = environment.get(LAUNCHER_START)
+        return LauncherProcess.of(pid) if start is None else LauncherProcess(pid, int(start))
     parent = os.getppid()
     try:
-        words = Path(f"/proc/{parent}/cmdline").read_bytes().decode(errors="replace").split("\0")
+        words = (PROC / f"{parent}/cmdline").read_text(encoding="utf-8", errors="replace").split("\0")
     except OSError:
-        return 0
-    names = [Path(word).name for word in words]
-    is_ros2_run = any(pair == ("ros2", "run") for pair in pairwise(names))
-    return parent if is_ros2_run else 0
+        return None
+    names = (os.path.basename(word) for word in words)
+    return LauncherProcess.of(parent) if ("ros2", "run") in pairwise(names) else None
 
 
 def wake_when_parent_ends() -> None:
     """Let this process go on if it is suspended when its parent ends; nobody else would wake it (Linux).
 
-    SIGCONT does nothing to a process that runs. It comes too late only for a parent that has ended
-    already, which the parent's process id tells.
+    SIGCONT does nothing to a process that runs.
     """
-    _signal_when_parent_ends(signal.SIGCONT)
-
-
-def _signal_when_parent_ends(number: signal.Signals) -> None:
-    """Let the system send a signal to this process, and what it becomes, when its parent ends (Linux)."""
     libc = ctypes.CDLL(None, use_errno=True)
     if hasattr(libc, "prctl"):
-        libc.prctl(_PR_SET_PDEATHSIG, int(number), 0, 0, 0)
-
-
-if __name__ == "__main__":
-    _signal_when_parent_ends(signal.SIGTERM)
-    if os.getppid() == launcher_of_this_process():
-        os.execvp(sys.argv[1], sys.argv[1:])
+        libc.prctl(_PR_SET_PDEATHSIG, int(signal.SIGCONT), 0, 0, 0)

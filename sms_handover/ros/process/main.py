@@ -1,4 +1,4 @@
-"""Runs one node as a process: start, spin, orderly end, and one line of text for every error."""
+"""The main program of a node: start, spin, orderly end, and one line of text for every error."""
 
 import atexit
 import faulthandler
@@ -34,18 +34,18 @@ EXIT_STOPPED = 130  # the recorder: the bag is whole, but the run was not over w
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 WAIT_S = 0.2  # [s] longest wait for an event, so that a signal is noticed
 
-_TEARDOWN_S = 15  # [s] of wall time for the middleware to let go; less than a launcher waits
+_TEARDOWN_S = 15  # [s] of wall time for the middleware to shut down; less than a launcher waits
 _STANDARD_ERROR = 2  # file descriptor, whatever stands in for the stream
 
 
 class Stop:
-    """Asked for by a signal that ends things, and when the launcher that started this process is gone."""
+    """A request to end: by a signal, or because the launcher that started this process has ended."""
 
     def __init__(self) -> None:
         """Install the handlers; a hang-up that is ignored, as under nohup(1), stays ignored."""
         self._signalled = False
         self._watch = None
-        if launcher := launcher_of_this_process():
+        if (launcher := launcher_of_this_process()) is not None:
             wake_when_parent_ends()
             self._watch = LauncherWatch(launcher)
         for number in _SIGNALS:
@@ -66,11 +66,11 @@ class RunnableNode(Node, ABC):
 
     @property
     def niceness(self) -> int:
-        """Return how far the process stands back behind others, as in nice(1); a node may override this."""
+        """The niceness of the process, as in nice(1); a node may override this."""
         return 0
 
     def start(self) -> None:
-        """Do what is due before the node is spun; raises SmsHandoverError. A node may override this."""
+        """Prepare before the node is spun; raises SmsHandoverError. A node may override this."""
 
     def accompany(self, others: Sequence["RunnableNode"]) -> None:
         """Let the loop of this node serve other nodes of the same process too."""
@@ -85,7 +85,7 @@ def run_node(
 ) -> int:
     """Run the node that ``make`` returns until a signal ends it; return the exit code.
 
-    ``name`` stands before an error as long as there is no node. ``--help`` tells what the node is for.
+    ``name`` precedes an error as long as there is no node. ``--help`` describes the node.
     """
     arguments = list(sys.argv if args is None else args)
     if {"-h", "--help"} & set(arguments[1:]):
@@ -99,10 +99,8 @@ def run_node(
 def run_nodes(makes: Sequence[Callable[[], RunnableNode]], arguments: list[str], *, name: str) -> int:
     """Run nodes in this process and thread until a signal ends them; return the exit code.
 
-    The loop is that of the first node. ``name`` stands before an error as long as there is no node.
-
-    The executor is only ever used with a timeout: without one, EventsExecutor does not return in
-    the wheels of rclpy 7.1.
+    The loop is that of the first node. ``name`` precedes an error as long as there is no node. The executor
+    is only used with a timeout: without one, EventsExecutor does not return in the wheels of rclpy 7.1.
     """
     make_streams_safe()
     stop = Stop()
@@ -123,43 +121,42 @@ def run_nodes(makes: Sequence[Callable[[], RunnableNode]], arguments: list[str],
             name = first.get_name()
         os.nice(first.niceness)
         gc.collect()
-        gc.freeze()  # what start-up has made lives to the end; no collection needs to look at it again
+        gc.freeze()  # objects made at the start live to the end; no collection needs to visit them again
         return first.run(executor, stop)
     except ConfigurationError as error:
-        _tell(name, error)
+        _print_error(name, error)
         return EXIT_USAGE
     except SmsHandoverError as error:
-        _tell(name, error)
+        _print_error(name, error)
         return EXIT_FAILED
     finally:
         _tear_down(nodes, executor)
 
 
 def _tear_down(nodes: Sequence[RunnableNode], executor: Executor | None) -> None:
-    """Let go of the middleware; if it hangs, write to the log where, and exit with 1.
+    """Shut the middleware down; if it hangs, write to the log where, and exit with 1.
 
-    The watch is a thread of faulthandler's, which needs neither the interpreter nor any lock, so that
-    not even a deadlock leaves a process behind when the launcher is gone.
+    That is done by a thread of faulthandler's, which needs neither the interpreter nor any lock, so that
+    not even a deadlock leaves a process behind.
     """
     faulthandler.dump_traceback_later(_TEARDOWN_S, exit=True, file=_STANDARD_ERROR)
     if executor is not None:
-        executor.shutdown()  # it would keep the middleware up behind the last node
+        executor.shutdown()  # it would keep the middleware alive after the last node
     for node in nodes:
         node.destroy_node()
     rclpy.try_shutdown()
     faulthandler.cancel_dump_traceback_later()
 
 
-def _tell(name: str, error: SmsHandoverError) -> None:
-    """Print an error in one line that begins with the name of the node, once."""
+def _print_error(name: str, error: SmsHandoverError) -> None:
     print(f"{name}: error: {str(error).removeprefix(f'{name}: ')}", file=sys.stderr)
 
 
 def _leave() -> None:
-    """Keep the exit code and come to an end: what the interpreter calls last.
+    """Keep the exit code while the interpreter exits, and make sure that it does.
 
-    A second signal while the interpreter ends would otherwise kill the process, and the middleware,
-    which takes down the rest of itself after Python, can hang there: then SIGALRM ends the process.
+    A second signal would otherwise kill the process, and the middleware, which is torn down after Python,
+    can hang there: then SIGALRM ends the process.
     """
     for number in _SIGNALS:
         signal.signal(number, signal.SIG_IGN)
@@ -167,18 +164,18 @@ def _leave() -> None:
 
 
 def _init(args: list[str]) -> None:
-    """Start ROS with the arguments of a command line; raises ConfigurationError where it cannot read them."""
+    """Start ROS with the arguments of a command line; raises ConfigurationError if they are invalid."""
     before_ros = args[1 : args.index("--ros-args")] if "--ros-args" in args else args[1:]
     if before_ros:
         raise ConfigurationError(
             f"unknown argument {before_ros[0]!r}; give a parameter as --ros-args -p NAME:=VALUE, see --help"
         )
     avoid_full_shared_memory()
-    reach = apply_network_scope()
-    if reach.is_open and LAUNCHER_PID not in os.environ:  # else the launcher has said so
-        print(f"this process is {reach}", file=sys.stderr)
+    scope = apply_network_scope()
+    if scope.is_open and LAUNCHER_PID not in os.environ:  # else the launcher has said so
+        print(f"this process is {scope}", file=sys.stderr)
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
-        reason = str(error).split(", at /", 1)[0]  # the rest tells where in the sources of rcl
+        reason = str(error).split(", at /", 1)[0]  # the rest is a place in the sources of rcl
         raise ConfigurationError(" ".join(reason.split())) from error

@@ -1,6 +1,6 @@
-"""How far the graph of a process reaches: this machine, or other hosts too.
+"""The network scope of a graph: this machine, or other hosts too.
 
-The middleware is told by environment variables, before ROS is started in a process.
+The middleware reads it from environment variables when ROS starts in a process.
 """
 
 import os
@@ -16,14 +16,14 @@ _RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 _PEERS = "ROS_STATIC_PEERS"
 _LOCALHOST_ONLY = "ROS_LOCALHOST_ONLY"  # deprecated, and stronger than the two above
 _PROFILE = "FASTRTPS_DEFAULT_PROFILES_FILE"  # what Fast DDS reads its transports from
-_TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"  # of which UDPv4 is followed; a profile has to name its own
+_TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"  # of which UDPv4 is honoured; a profile has to name its own
 _OPEN_RANGES = ("SUBNET", "SYSTEM_DEFAULT")
-_MOST_HOSTS = 32  # that rmw takes
+_MAX_HOSTS = 32  # of rmw
 
 
 @dataclass(frozen=True)
 class NetworkScope:
-    """Who can be in the graph: this machine, the ``hosts`` that are told of it, the ``subnet`` by multicast.
+    """Who can join the graph: this machine, the ``hosts`` it is announced to, the ``subnet`` by multicast.
 
     ``profile`` is the user's own for Fast DDS, "" for ours: what it lets through is not known. With
     ``udp_only`` no process uses shared memory.
@@ -36,12 +36,12 @@ class NetworkScope:
 
     @property
     def is_open(self) -> bool:
-        """Whether others than this machine can take part."""
+        """Whether other machines can join."""
         return bool(self.hosts) or self.subnet or bool(self.profile)
 
     @property
     def environment(self) -> dict[str, str]:
-        """Return the environment variables that make it so."""
+        """The environment variables that set this scope."""
         name = "fastdds_hosts" if self.hosts or self.subnet else "fastdds"
         ours = config_file(f"{name}{'_udp' if self.udp_only else ''}.xml")
         return {
@@ -51,7 +51,6 @@ class NetworkScope:
         }
 
     def __str__(self) -> str:
-        """Return in words who can read and command the graph."""
         if self.hosts or self.subnet:
             to = ["the whole subnet"] * self.subnet + list(self.hosts)
             return (
@@ -65,10 +64,10 @@ THIS_MACHINE = NetworkScope()
 
 
 def network_scope_of(environment: Mapping[str, str]) -> NetworkScope:
-    """Return the reach that environment variables ask for; where they say nothing, this machine only."""
+    """Return the scope that environment variables ask for; by default this machine only."""
     profile = environment.get(_PROFILE, "")
     if Path(profile) in config_file("fastdds.xml").parent.glob("fastdds*.xml"):
-        profile = ""  # a launcher has chosen it, or another process like this one
+        profile = ""  # set by a launcher or another process like this one
     udp_only = environment.get(_TRANSPORTS) == "UDPv4"
     if environment.get(_LOCALHOST_ONLY) == "1":
         return NetworkScope(profile=profile, udp_only=udp_only)
@@ -77,14 +76,14 @@ def network_scope_of(environment: Mapping[str, str]) -> NetworkScope:
 
 
 def network_scope_to(hosts: Sequence[str]) -> NetworkScope:
-    """Return the reach of a graph that is announced to these hosts and to nobody else.
+    """Return the scope of a graph that is announced to these hosts only.
 
-    Raises ConfigurationError on a host whose address is not known, and where the environment forbids it.
+    Raises ConfigurationError if the address of a host is not known, or if the environment forbids it.
     """
     if hosts and os.environ.get(_LOCALHOST_ONLY) == "1":
         raise ConfigurationError(f"{_LOCALHOST_ONLY} is 1, which keeps every other host out; unset it")
-    if len(hosts) > _MOST_HOSTS:
-        raise ConfigurationError(f"{len(hosts)} hosts are given, allowed are {_MOST_HOSTS}")
+    if len(hosts) > _MAX_HOSTS:
+        raise ConfigurationError(f"{len(hosts)} hosts are given, must be <= {_MAX_HOSTS}")
     for host in hosts:
         try:
             getaddrinfo(host, None, AF_INET)
@@ -97,10 +96,10 @@ def network_scope_to(hosts: Sequence[str]) -> NetworkScope:
 
 
 def apply_network_scope() -> NetworkScope:
-    """Set up this process for what its environment asks for, and return that; before ROS is started."""
-    reach = network_scope_of(os.environ)
+    """Apply the scope that the environment asks for to this process before ROS starts; return it."""
+    scope = network_scope_of(os.environ)
     asked = os.environ.get(_RANGE)
-    os.environ.update(reach.environment)
+    os.environ.update(scope.environment)
     if asked:
         os.environ[_RANGE] = asked  # OFF is as closed as LOCALHOST, but not the same
-    return reach
+    return scope

@@ -1,4 +1,4 @@
-"""What the operating system is told about a node's process: processor, priority, memory, timers."""
+"""Realtime settings of a node's process: processor, priority, memory, timers."""
 
 import ctypes
 import os
@@ -8,15 +8,15 @@ from sms_handover.errors import ConfigurationError
 from sms_handover.simulation.parameters import CommonParameters
 
 _PR_SET_TIMERSLACK = 29  # of prctl(2)
-_SLACK_NS = 1  # [ns] by which the kernel may put off a wake-up; its default of 50 us is seen in every period
+_SLACK_NS = 1  # [ns] by which the kernel may delay a wake-up; its default of 50 us is seen in every period
 _MCL_CURRENT, _MCL_FUTURE = 1, 2  # of mlockall(2)
 _ANY_CPU = -1
 
 
 def settle(common: CommonParameters) -> None:
-    """Set up this process and all its threads as the parameters ask.
+    """Apply the parameters to this process and all its threads.
 
-    Raises ConfigurationError, in words that name the remedy, where the system does not permit it.
+    Raises ConfigurationError, which names the remedy, if the system does not permit it.
     """
     exact_timers()
     if common.cpu != _ANY_CPU:
@@ -28,14 +28,13 @@ def settle(common: CommonParameters) -> None:
 
 
 def exact_timers() -> None:
-    """Let sleeps of this thread end when they are due; where the system cannot, they end a little later."""
+    """Let sleeps of this thread end on time; where the system cannot, they end a little later."""
     libc = ctypes.CDLL(None, use_errno=True)
     if hasattr(libc, "prctl"):
         libc.prctl(_PR_SET_TIMERSLACK, _SLACK_NS, 0, 0, 0)
 
 
 def _stay_on(cpu: int) -> None:
-    """Run on one processor only."""
     try:
         for thread in _threads():
             os.sched_setaffinity(thread, {cpu})
@@ -47,7 +46,6 @@ def _stay_on(cpu: int) -> None:
 
 
 def _run_first(priority: int) -> None:
-    """Run before everything that has no real-time priority."""
     try:
         for thread in _threads():
             os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
@@ -59,7 +57,6 @@ def _run_first(priority: int) -> None:
 
 
 def _stay_in_memory() -> None:
-    """Let no page of this process be swapped out."""
     libc = ctypes.CDLL(None, use_errno=True)
     if libc.mlockall(_MCL_CURRENT | _MCL_FUTURE):
         raise ConfigurationError(

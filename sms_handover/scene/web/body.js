@@ -1,16 +1,16 @@
 "use strict";
-/* One run in the picture: its solids, frames and traces, placed at any time from the recorded poses. */
+/* One run in the 3D view: its solids, frames and traces, placed at any time from the recorded poses. */
 
-const COLOURS = { // [-] of arms in order, of the deputy, of edges; chosen apart for colour-blind eyes too
+const COLOURS = { // of arms in order, of the deputy, of edges; distinguishable by colour-blind viewers
   light: { arms: [0x1c74b8, 0xd2601a, 0x8a5a9e, 0x4b8b3b], deputy: 0x0f9d6b, edge: 0x1d2530, start: 0x69788c },
   dark: { arms: [0x58b4ff, 0xff9a4d, 0xc79be0, 0x93d07f], deputy: 0x2fe0a0, edge: 0x05080f, start: 0x8ea2bd },
 };
 const GHOST_OPACITY = 0.3;
-const EDGE_ANGLE = 30; // degrees between two faces from which on their common edge is drawn
+const EDGE_ANGLE = 30; // degrees, smallest angle between two faces whose common edge is drawn
 const AXIS_LENGTH = 0.16; // m
 const TRACE_WIDTH = 2.5; // px
 
-/** Numbers that came as base64 of little-endian floats. */
+/** Decode base64 of little-endian floats. */
 function numbers(text, Type) {
   const raw = atob(text);
   const bytes = new Uint8Array(raw.length);
@@ -18,11 +18,11 @@ function numbers(text, Type) {
   return new Type(bytes.buffer);
 }
 
-/** The poses of named bodies over time; between two recorded instants they are interpolated. */
+/** The poses of named bodies over time, interpolated between recorded instants. */
 class Motion {
   constructor(data) {
     this.bodies = data.bodies;
-    this.times = numbers(data.times, Float64Array); // s; of these and of the poses the first count are in use
+    this.times = numbers(data.times, Float64Array); // s; the first `count` of these and of the poses are in use
     this.poses = numbers(data.poses, Float32Array); // per instant and body x y z, quaternion x y z w
     this.count = this.times.length;
     this.other = { position: new THREE.Vector3(), quaternion: new THREE.Quaternion() };
@@ -32,7 +32,7 @@ class Motion {
 
   get end() { return this.times[this.count - 1]; }
 
-  /** Add instants that have come since. */
+  /** Append new instants. */
   append(data) {
     const times = numbers(data.times, Float64Array);
     const width = this.bodies.length * 7;
@@ -66,7 +66,7 @@ class Motion {
     quaternion.fromArray(this.poses, at + 3);
   }
 
-  /** Put the pose of a body at time t into position and quaternion; false where it was not recorded. */
+  /** Write the pose of a body at time t to position and quaternion; false where it was not recorded. */
   at(t, body, position, quaternion) {
     const index = this.index(t);
     this.read(index, body, position, quaternion);
@@ -95,7 +95,7 @@ class Motion {
   }
 }
 
-/** A line that is drawn as far as time has come, and faintly to its end. */
+/** A line drawn up to the current time, and faintly to its end. */
 class Trace {
   constructor(motion, body, group) {
     this.motion = motion;
@@ -103,7 +103,7 @@ class Trace {
     this.past = this.line(TRACE_WIDTH, 0.95);
     this.whole = this.line(TRACE_WIDTH * 0.5, 0.28);
     group.add(this.whole, this.past);
-    this.lay();
+    this.rebuild();
   }
 
   line(width, opacity) {
@@ -113,8 +113,8 @@ class Trace {
     return line;
   }
 
-  /** Lay both lines along the path as far as it is known. */
-  lay() {
+  /** Rebuild both lines from the path. */
+  rebuild() {
     const { points, rows } = this.motion.path(this.body);
     this.rows = rows;
     [this.past, this.whole].forEach((line) => {
@@ -138,7 +138,7 @@ class Trace {
   }
 }
 
-/** Everything that is drawn of one run, as a group that moves with time. */
+/** Everything drawn of one run, as a group that moves with time. */
 class RunBody {
   constructor(data) {
     this.name = data.name;
@@ -149,7 +149,7 @@ class RunBody {
     this.targetGroup = new THREE.Group();
     this.startGroup = new THREE.Group();
     this.group.add(this.traceGroup, this.targetGroup, this.startGroup);
-    this.painted = []; // { material, role, arm } to colour again when the theme changes
+    this.painted = []; // { material, role, arm } to recolour when the theme changes
     this.bodies = this.motion.bodies.map(() => new THREE.Group());
     this.bodies.forEach((body) => this.group.add(body));
     data.shapes.forEach((shape) => this.addShape(shape));
@@ -177,7 +177,7 @@ class RunBody {
     if (shape.kind === "cylinder") this.addJoint(shape, mesh);
   }
 
-  /** Round the end of a cylinder that begins at its link's joint, so that the arm has no open corners. */
+  /** Round the end of a cylinder that begins at its link's joint, so that the arm has no gaps. */
   addJoint(shape, mesh) {
     const [radius, length] = shape.size;
     if (Math.abs(mesh.position.length() - length / 2) > 1e-6) return;
@@ -220,7 +220,7 @@ class RunBody {
     return new Trace(this.motion, this.body(`${arm}_tool`), this.traceGroup);
   }
 
-  /** The outline of the spacecraft where it was at the start: what it has moved by since. */
+  /** The outline of the spacecraft at the start, which shows how far it has moved since. */
   drawStart() {
     const outline = new THREE.LineBasicMaterial({ transparent: true, opacity: 0.7, depthWrite: false });
     this.bodies[0].children.forEach((mesh) => { // the base is the first body
@@ -233,7 +233,7 @@ class RunBody {
     this.startLines = outline;
   }
 
-  /** Take the colours of a theme; a ghost is translucent and casts no shadow. */
+  /** Apply the colours of a theme; a ghost is translucent and casts no shadow. */
   paint(theme, ghost) {
     const colours = COLOURS[theme];
     this.painted.forEach(({ role, arm, own, material, lines, mesh }) => {
@@ -260,15 +260,15 @@ class RunBody {
     });
   }
 
-  /** Take instants, phases and grasps that have come since. */
+  /** Add new instants, phases and grasps. */
   extend(data) {
     this.motion.append(data);
     this.data.phases = data.phases;
     this.data.events = data.events;
-    [...this.traces, this.basePath].forEach((trace) => trace.lay());
+    [...this.traces, this.basePath].forEach((trace) => trace.rebuild());
   }
 
-  /** Put everything where it was at time t (s). */
+  /** Move everything to its pose at time t (s). */
   place(t) {
     this.bodies.forEach((body, index) => {
       body.visible = this.motion.at(t, index, body.position, body.quaternion);
@@ -277,9 +277,9 @@ class RunBody {
     [...this.traces, this.basePath].forEach((trace) => trace.show(index));
   }
 
-  /** The position of a body at the time it is placed at, in m. */
+  /** The current position of a body, in m. */
   position(name) { return this.bodies[this.body(name)].position; }
 
-  /** The phase in force at time t. */
+  /** The phase at time t. */
   phase(t) { return this.data.phases.filter((phase) => phase.start <= t + 1e-9).pop(); }
 }

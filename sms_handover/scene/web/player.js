@@ -7,7 +7,7 @@ const element = (id) => document.getElementById(id);
 class Player {
   constructor(data) {
     this.runs = data.runs.map((run) => new RunBody(run));
-    this.live = Boolean(data.live); // then the end moves on, and playing goes on at it
+    this.live = Boolean(data.live); // the end moves, and playback continues there
     this.t = this.start;
     this.playing = false;
     this.runs.forEach((run) => run.place(this.t));
@@ -25,7 +25,7 @@ class Player {
 
   get end() { return Math.max(...this.runs.map((run) => run.motion.end)); }
 
-  /** Take what has come since of a run that goes on; who looks at its end stays there. */
+  /** Add new data of a live run; a viewer at its end stays there. */
   extend(data) {
     const following = this.playing && this.t >= this.end;
     this.runs[0].extend(data);
@@ -34,7 +34,7 @@ class Player {
     this.picture.ask();
   }
 
-  /** One over the other, side by side, each alone. */
+  /** Overlaid, side by side, each alone. */
   listArrangements() {
     const alone = this.runs.map((run) => ({ name: run.name, tiles: [[run]] }));
     if (this.runs.length === 1) return alone;
@@ -64,7 +64,7 @@ class Player {
     this.drawBar();
   }
 
-  /** The phases of the first run, to jump to, and marks where a grasp was tried. */
+  /** The phases of the first run, to jump to, and marks for the grasps. */
   drawBar() {
     const { phases, events } = this.runs[0].data;
     const length = this.end - this.start || 1;
@@ -123,7 +123,7 @@ class Player {
     let before = performance.now();
     const tick = (now) => {
       if (!this.playing) return;
-      const passed = Math.min(now - before, 250) / 1000; // s; a page that was hidden does not jump
+      const passed = Math.min(now - before, 250) / 1000; // s; no jump after the page was hidden
       before = now;
       if (this.t < this.end) this.seek(this.t + passed * Number(element("speed").value));
       if (this.t >= this.end && !this.live) this.pause(); else requestAnimationFrame(tick);
@@ -141,7 +141,7 @@ class Player {
     element("play").setAttribute("aria-label", this.playing ? "Pause" : "Play");
   }
 
-  /** The arrow keys of the time bar go by a tenth of a second, with shift by one second. */
+  /** The arrow keys on the time bar step by a tenth of a second, with shift by one second. */
   step(event) {
     const sign = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
     if (!sign) return;
@@ -149,14 +149,14 @@ class Player {
     this.seek(this.t + sign * (event.shiftKey ? 1 : 0.1));
   }
 
-  /** Go to time t (s); ``tell`` says whether the page around this one shall hear of it. */
-  seek(t, tell = true) {
+  /** Go to time t (s); with `notify` the parent page is informed. */
+  seek(t, notify = true) {
     if (!Number.isFinite(t)) return;
     this.t = Math.min(Math.max(t, this.start), this.end);
     this.runs.forEach((run) => run.place(this.t));
     this.show();
     this.picture.ask();
-    if (tell && window.parent !== window) window.parent.postMessage({ type: "time", t: this.t }, "*");
+    if (notify && window.parent !== window) window.parent.postMessage({ type: "time", t: this.t }, "*");
   }
 
   receive(event) {
@@ -174,10 +174,10 @@ class Player {
     const phase = this.runs[0].phase(this.t);
     this.phaseButtons.forEach((button, index) => button.classList.toggle("now", this.runs[0].data.phases[index] === phase));
     this.readOut(phase);
-    this.tellEvent();
+    this.showEvent();
   }
 
-  /** How far each tool is from its target, and the spacecraft from where it was. */
+  /** Distance of each tool from its target, and displacement of the spacecraft. */
   readOut(phase) {
     const runs = this.tiles.flat();
     const mm = (a, b) => (a && b ? `${(1000 * a.distanceTo(b)).toFixed(1)} mm` : "–");
@@ -216,21 +216,21 @@ class Player {
     element("readout").replaceChildren(title, table);
   }
 
-  /** Show what came of the last grasp, for a while. */
-  tellEvent() {
-    const told = new Map(); // what was told, and by which runs
+  /** Show the outcome of the last grasp for a while. */
+  showEvent() {
+    const shown = new Map(); // text of an event, and the runs that had it
     this.tiles.flat().forEach((run) => run.data.events.forEach((event) => {
       if (event.time <= this.t && this.t < event.time + EVENT_SHOWN) {
-        told.set(event.text, [...(told.get(event.text) || []), run.name]);
+        shown.set(event.text, [...(shown.get(event.text) || []), run.name]);
       }
     }));
-    const text = [...told].map(([what, runs]) => `${what} (${runs.join(", ")})`).join("\n");
+    const text = [...shown].map(([what, runs]) => `${what} (${runs.join(", ")})`).join("\n");
     const place = element("event");
     place.classList.toggle("shown", text !== "");
     if (text && place.textContent !== text) place.textContent = text;
   }
 
-  /** Names of arms and deputy beside them, once per tile. */
+  /** Labels of arms and deputy, once per tile. */
   makeLabels() {
     const css = (colour) => `#${colour.toString(16).padStart(6, "0")}`;
     this.labels = this.tiles.flatMap(([run], place) => [
@@ -260,7 +260,7 @@ class Player {
   }
 }
 
-/** A name as people say it: arm_a is Arm A. */
+/** A name for display: arm_a is Arm A. */
 function label(name) {
   return name.replace(/_/g, " ").replace(/^./, (first) => first.toUpperCase()).replace(/ (\w)$/, (_, last) => ` ${last.toUpperCase()}`);
 }

@@ -1,7 +1,7 @@
 "use strict";
-/* Begins to play what the page carries, or to follow what a running graph sends. */
+/* Starts playing the data of the page, or following a running graph. */
 
-/** Say something in place of the picture; nothing takes it away. */
+/** Show a message instead of the 3D view; an empty text hides it. */
 function notice(text) {
   element("trouble").hidden = !text;
   element("trouble").textContent = text;
@@ -16,7 +16,7 @@ function begin(data) {
   }
 }
 
-/** Follow a stream: the scene as it is, then what is new; another scene is another run. */
+/** Follow a stream: the current scene, then updates; another scene is another run. */
 function follow(address) {
   const stream = new EventSource(address);
   const on = (name, take) => stream.addEventListener(name, (event) => take(JSON.parse(event.data)));

@@ -1,28 +1,23 @@
-"""``sms-handover play --closed-loop``: recorded commands into a live plant, against the recorded states."""
+"""Closed loop on a recording: its commands into a live plant, whose states are compared with its own."""
 
-import os
 import signal
 import tempfile
 from pathlib import Path
 from time import monotonic
 
-import rclpy
 from rclpy.executors import Executor
-from rclpy.experimental import EventsExecutor
-from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 
 from sms_handover.analysis.deviation import LargestDeviation, StateDeviation
 from sms_handover.bag.info import read_info
 from sms_handover.bag.run.ticks import recorded_ticks
-from sms_handover.cli.reproduce import scenario_in
 from sms_handover.errors import BagError, ConfigurationError, GraphError
 from sms_handover.graph.topics import CONTROLLER, PLANT
 from sms_handover.launcher.command_replay import PEERS, CommandReplay
 from sms_handover.launcher.display import Display
 from sms_handover.launcher.domain import reserved_domain
-from sms_handover.launcher.launcher import LaunchPlan, graph_environment
+from sms_handover.launcher.launcher import LaunchPlan, graph_environment, joined_graph
 from sms_handover.launcher.processes import NodeProcesses
+from sms_handover.launcher.recorded_scenario import scenario_in
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.ros.parameters import as_arguments
 from sms_handover.ros.process.network_scope import network_scope_to
@@ -32,8 +27,8 @@ from sms_handover.units import ns_to_seconds
 
 EXIT_SAME, EXIT_DEVIATES = 0, 1
 
-_POLL_S = 0.1  # [s] longest wait for a message before the plant is looked at again
-_STALL_PATIENCE_S = 30.0  # [s] of wall time without a new state
+_POLL_S = 0.1  # [s] longest wait for a message before the plant is checked again
+_STALL_TIMEOUT_S = 30.0  # [s] of wall time without a new state
 
 
 def closed_loop(bag: Path, domain_id: int | None) -> int:
@@ -47,23 +42,16 @@ def closed_loop(bag: Path, domain_id: int | None) -> int:
         except BagError as error:
             raise ConfigurationError(str(error)) from error  # exit code 2: what was given cannot be used
         with reserved_domain(domain_id) as domain:
-            plan = LaunchPlan(scenario, (), domain, folder, bag=None, reach=network_scope_to(()))
-            os.environ.update(plan.reach.environment)
+            plan = LaunchPlan(scenario, (), domain, folder, bag=None, scope=network_scope_to(()))
             begin = monotonic()
-            rclpy.init(domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
             for number in (signal.SIGTERM, signal.SIGHUP):
                 signal.signal(number, signal.default_int_handler)
-            try:
-                node = Node(CONTROLLER, start_parameter_services=False, enable_rosout=False)
-                executor = EventsExecutor()
-                executor.add_node(node)
+            with joined_graph(plan, CONTROLLER) as (node, executor):
                 replay = CommandReplay(node, ticks, scenario.robot, scenario.parameters.common.reference_ns)
                 with NodeProcesses(folder, graph_environment(plan)) as processes:
                     processes.start(PLANT, ["--ros-args", *_plant_arguments(scenario)])
-                    _watch(replay, executor, processes, Display(info.end_ns))
-                node.destroy_node()
-            finally:
-                rclpy.try_shutdown()
+                    with Display(info.end_ns) as display:
+                        _run(replay, executor, processes, display)
     print(f"{replay.deviation.compared} states, wall time {monotonic() - begin:.1f} s")
     if replay.held:
         print(f"{replay.held} ticks without a recorded command: the last one was held")
@@ -87,24 +75,22 @@ def deviation_lines(largest: LargestDeviation, robot: RobotModel) -> list[str]:
 
 
 def _value(deviation: StateDeviation | None, name: str) -> str:
-    """Return one figure of a deviation."""
     return f"{0.0 if deviation is None else getattr(deviation, name):.6g}"
 
 
 def _at(deviation: StateDeviation | None) -> str:
-    """Return where a deviation was."""
     return "" if deviation is None else f" at {ns_to_seconds(deviation.stamp_ns):.9g} s"
 
 
 def _plant_arguments(scenario: Scenario) -> list[str]:
-    """Return the ROS arguments of a plant that waits for the commands and for nobody else."""
+    """Return the ROS arguments of a plant that waits for the commands and for no other node."""
     overrides = scenario.overrides
     common = {**overrides.get(COMMON, {}), "mode": LOCKSTEP, "peers": PEERS, "autostart": True}
     return as_arguments({**common, **overrides.get(PLANT, {})})
 
 
-def _watch(replay: CommandReplay, executor: Executor, processes: NodeProcesses, display: Display) -> None:
-    """Handle events to the end of the run; raises GraphError if the plant died or nothing went on."""
+def _run(replay: CommandReplay, executor: Executor, processes: NodeProcesses, display: Display) -> None:
+    """Handle events to the end of the run; raises GraphError if the plant died or stalled."""
     seen, since = replay.stamp_ns, monotonic()
     while not replay.done:
         executor.spin_once(timeout_sec=_POLL_S)
@@ -114,10 +100,8 @@ def _watch(replay: CommandReplay, executor: Executor, processes: NodeProcesses, 
             if seen < 0:
                 display.start(replay.stamp_ns)
             seen, since = replay.stamp_ns, monotonic()
-            display.show(seen, "", {})
-        elif monotonic() - since > _STALL_PATIENCE_S:
+            display.show_run(seen)
+        elif monotonic() - since > _STALL_TIMEOUT_S:
             waiting = ", ".join(replay.unmatched) or "the next state"
-            raise GraphError(
-                f"nothing has come from the plant for {_STALL_PATIENCE_S:g} s: waiting for {waiting}"
-            )
-    display.show(replay.stamp_ns, "", {}, last=True)
+            raise GraphError(f"no state from the plant for {_STALL_TIMEOUT_S:g} s: waiting for {waiting}")
+    display.show_run(replay.stamp_ns, last=True)

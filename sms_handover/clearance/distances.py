@@ -1,0 +1,74 @@
+"""Signed distances between all bodies at one configuration, with the points that are nearest."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from sms_handover.clearance.allowed_pairs import counted_pairs
+from sms_handover.clearance.bodies import DEPUTY_BODY, Body, bodies_of, read_geometry
+from sms_handover.model.poses import se3_of
+from sms_handover.types import Array, Pose, read_only
+
+
+@dataclass(frozen=True, eq=False)
+class NearestPoints:
+    """Where two bodies are nearest to each other, or deepest in each other.
+
+    ``points_in_world`` (2, 3) m lie on the first and on the second body; ``normal_in_world`` (3,) is the unit
+    vector from the first body to the second, along which they come apart.
+    """
+
+    points_in_world: Array
+    normal_in_world: Array
+
+    def __post_init__(self) -> None:
+        """Copy the arrays and make them read-only."""
+        object.__setattr__(self, "points_in_world", read_only(self.points_in_world))
+        object.__setattr__(self, "normal_in_world", read_only(self.normal_in_world))
+
+
+class ClearanceModel:
+    """The bodies of a robot and of the deputy, and the signed distance between every two that count.
+
+    A distance is that of the nearest points; where two bodies enter each other it is minus the least
+    translation that parts them (coal's GJK and EPA). An instance owns work space, so it is not to be shared
+    between threads.
+    """
+
+    def __init__(self, model: pin.Model, urdf: str, arms: Sequence[str], deputy_size: Array) -> None:
+        """Read the shapes of a description and add the deputy as a box with these edges (3,) m.
+
+        ``model`` is Pinocchio's reading of ``urdf``. Raises RobotDescriptionError if the shapes cannot
+        be read.
+        """
+        self._model, self._data = model, model.createData()
+        geometry = read_geometry(model, urdf)
+        robot_bodies = bodies_of(model, geometry, arms)
+        pairs = counted_pairs(model, geometry)
+        box = coal.Box(*(float(edge) for edge in deputy_size))
+        universe = 0  # Pinocchio's number of the joint that never moves: the deputy is placed by hand
+        deputy = pin.GeometryObject(DEPUTY_BODY.name, universe, pin.SE3.Identity(), box)
+        self._deputy = geometry.addGeometryObject(deputy)
+        pairs += [(body, self._deputy) for body in range(len(robot_bodies))]
+        for pair in pairs:
+            geometry.addCollisionPair(pin.CollisionPair(*pair))
+        self.bodies: tuple[Body, ...] = (*robot_bodies, DEPUTY_BODY)
+        self.pairs: tuple[tuple[Body, Body], ...] = tuple((self.bodies[a], self.bodies[b]) for a, b in pairs)
+        self._geometry, self._results = geometry, pin.GeometryData(geometry)
+
+    def distances(self, q: Array, deputy_in_world: Pose) -> Array:
+        """Return the signed distance (pairs,) m of every pair at a configuration (7 + n,)."""
+        pin.updateGeometryPlacements(self._model, self._data, self._geometry, self._results, q)
+        self._results.oMg[self._deputy] = se3_of(deputy_in_world)
+        pin.computeDistances(self._geometry, self._results)
+        results = self._results.distanceResults
+        return np.fromiter((result.min_distance for result in results), float, len(self.pairs))
+
+    def nearest_points(self, pair: int) -> NearestPoints:
+        """Return where a pair is nearest, at the configuration of the last call of :meth:`distances`."""
+        result = self._results.distanceResults[pair]
+        points = np.array([result.getNearestPoint1(), result.getNearestPoint2()])
+        return NearestPoints(points, np.array(result.normal))
