@@ -10,8 +10,9 @@ from contextlib import contextmanager, nullcontext
 from datetime import datetime
 from pathlib import Path
 
-from sms_handover.cli.exit_codes import EXIT_INTERRUPTED, EXIT_LOSS, task_code
+from sms_handover.cli.exit_codes import EXIT_INTERRUPTED, EXIT_LOSS
 from sms_handover.cli.options import add_scenario_options, scenario_of
+from sms_handover.cli.task_code import task_code
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import graver_in_words
 from sms_handover.graph.topics import CONTROLLER, NODES, RECORDER

@@ -98,7 +98,8 @@ def test_streams_that_take_nothing(tmp_path: Path, redirect: str, code: int) -> 
     place = tmp_path / os.fsdecode(b"l\xe4tin")
     place.mkdir()
     (place / "b.mcap").write_bytes(BAG.read_bytes())
-    (place / "yaml.py").write_text("raise RuntimeError", encoding="ascii")
+    for module in ("yaml", "numpy", "mcap"):
+        (place / f"{module}.py").write_text("raise RuntimeError", encoding="ascii")
     program = f"{Path(sys.executable).parent}/sms-handover bag info $PWD/b.mcap {redirect}"
     environment = {
         **os.environ,
