@@ -1,1 +1,1 @@
-"""Export of bags to tables, as CSV or Parquet."""
+"""Export of bags to tables, as CSV, Parquet or MATLAB files."""

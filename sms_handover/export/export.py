@@ -3,18 +3,20 @@
 import shutil
 from pathlib import Path
 
-from sms_handover.bag.info import read_info
+from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.run.reader import holds_run, read_run
 from sms_handover.errors import BagError, ConfigurationError
 from sms_handover.export.csv_files import CsvFormat
+from sms_handover.export.matlab_files import MatlabFormat
 from sms_handover.export.output import Tables
 from sms_handover.export.parquet_files import ParquetFormat
 from sms_handover.export.run_tables import run_tables
 from sms_handover.export.selection import Selection, Wanted
+from sms_handover.export.table import Format
 from sms_handover.export.topic_tables import Progress, export_topics
 
-CSV, PARQUET = "csv", "parquet"
-FORMATS = (CSV, PARQUET)
+CSV, PARQUET, MATLAB = "csv", "parquet", "matlab"
+FORMATS = (CSV, PARQUET, MATLAB)
 
 _BATCH = 5000  # rows written at once
 
@@ -45,8 +47,7 @@ def export(
     except OSError as error:
         raise ConfigurationError(f"cannot create {folder}: {error.strerror}") from error
     try:
-        made = ParquetFormat(folder, info.path.name) if file_format == PARQUET else CsvFormat(folder)
-        tables = Tables(folder, made)
+        tables = Tables(folder, _format(file_format, folder, info))
         tables.missing = info.missing
         if holds_run(info) and selection.everything and not by_topic:
             _export_run(bag, tables, selection.wanted(info.start_ns))
@@ -63,6 +64,13 @@ def export(
         shutil.rmtree(folder)
         raise
     return tables
+
+
+def _format(name: str, folder: Path, info: BagInfo) -> Format:
+    """Return a file format by name."""
+    if name == PARQUET:
+        return ParquetFormat(folder, info.path.name)
+    return MatlabFormat(folder) if name == MATLAB else CsvFormat(folder)
 
 
 def _export_run(bag: Path, tables: Tables, wanted: Wanted) -> None:

@@ -15,12 +15,13 @@ from mcap.writer import Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from scipy.io import loadmat
 
 from sms_handover.bag.recording import Recording
 from sms_handover.bag.topic_choice import TopicChoice
 from sms_handover.cli.main import main
 from sms_handover.errors import BagError, ConfigurationError
-from sms_handover.export.export import CSV, FORMATS, PARQUET, export
+from sms_handover.export.export import CSV, MATLAB, PARQUET, export
 from sms_handover.export.selection import Selection
 from sms_handover.run_data import RunData
 
@@ -28,6 +29,7 @@ from .bag_damage import chunks_of, write_file
 from .bag_messages import ARMS, JOINTS, TYPES, made_up_run, open_topics, record_run
 
 EVERYTHING = Selection()
+FORMATS = (CSV, PARQUET)  # the third has variables in place of columns, and a test of its own
 CASES = Path(__file__).resolve().parents[1] / "data" / "cases"
 
 
@@ -124,6 +126,17 @@ def test_what_was_not_recorded_is_nan(tmp_path: Path, file_format: str) -> None:
     firsts = [ticks[f"{joint}.position"][0] for joint in JOINTS]
     assert bits(firsts) == position[0].tobytes()
     assert np.isnan(ticks[f"{JOINTS[0]}.command"][3])
+
+
+def test_a_run_goes_to_matlab_bit_for_bit(tmp_path: Path) -> None:
+    run = made_up_run()
+    export(write_run(tmp_path / "bag", run), tmp_path / "out", MATLAB, EVERYTHING)
+    ticks = loadmat(tmp_path / "out" / "ticks.mat", simplify_cells=True)
+    assert ticks["stamp_ns"].tolist() == run.tick_ns.tolist()
+    assert bits(ticks["arm_a_joint_1_position"]) == run.joint_position[:, 0].tobytes()
+    assert dict(zip(ticks["columns"], ticks["units"], strict=True))["arm_a_joint_1.effort"] == "N m"
+    events = loadmat(tmp_path / "out" / "grasp_events.mat", simplify_cells=True)
+    assert events["status"].tolist() == ["succeeded", "missed"] and np.isnan(events["relative_speed"][1])
 
 
 def test_units_are_told(tmp_path: Path) -> None:
@@ -316,6 +329,14 @@ def test_numbers_at_the_edges_of_their_types_survive(tmp_path: Path, file_format
         schema = writer.register_schema("a_msgs/msg/A", "ros2msg", NUMBERS.encode())
         writer.add_message(writer.register_channel("/a", "cdr", schema), MOST, b"\0\1\0\0" + data, MOST - 1)
         writer.finish()
+    export(tmp_path / "a.mcap", tmp_path / "mat", MATLAB, EVERYTHING)
+    content = loadmat(tmp_path / "mat" / "a.mat", simplify_cells=True)
+    assert (content["log_time_ns"], content["b"], content["i"], content["u"]) == (MOST, 255, -128, MOST)
+    assert content["byte_list"].tolist() == [255, 128] and content["int_list"].tolist() == [-128, 127]
+    assert content["long_list"].tolist() == [MOST, 2**63] and bits(content["floats"]) == bits(ODD)
+    assert content["nested"]["byte_list"] == 255 and content["nested"]["f"] == np.inf
+    assert content["columns"].tolist()[6:8] == ["byte_pair[0]", "byte_pair[1]"]
+    assert (content["byte_pair_0"], content["byte_pair_1"]) == (255, 128)
     export(tmp_path / "a.mcap", tmp_path / "out", file_format, EVERYTHING)
     table = {name: values[0] for name, values in read(tmp_path / "out", "a", file_format).items()}
     (inner,) = table.pop("nested")
@@ -404,9 +425,12 @@ def test_wrong_use_is_told(tmp_path: Path) -> None:
         export(tmp_path / "a.mcap", tmp_path / "no" / "new", CSV, EVERYTHING)
 
 
-def test_parquet_without_pyarrow_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("file_format", "module"), [(PARQUET, "pyarrow"), (MATLAB, "scipy.io")])
+def test_a_format_whose_library_is_missing_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file_format: str, module: str
+) -> None:
     write_file(tmp_path / "a.mcap")
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(ConfigurationError, match=r"pip install 'sms_handover\[parquet\]'"):
-        export(tmp_path / "a.mcap", tmp_path / "out", PARQUET, EVERYTHING)
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(ConfigurationError, match=rf"pip install 'sms_handover\[{file_format}\]'"):
+        export(tmp_path / "a.mcap", tmp_path / "out", file_format, EVERYTHING)
     assert not (tmp_path / "out").exists()

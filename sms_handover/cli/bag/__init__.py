@@ -7,7 +7,7 @@ _COMMANDS = {
     "info": "show the contents of a bag: topics, times, controller, versions, loss ledger",
     "check": "check whether a bag is complete, and what is missing",
     "recover": "recover a truncated or damaged bag",
-    "export": "export tables as CSV or Parquet",
+    "export": "export tables as CSV, Parquet or MATLAB files",
 }
 
 

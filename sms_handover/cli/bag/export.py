@@ -1,4 +1,4 @@
-"""``sms-handover bag export``: export tables as CSV or Parquet."""
+"""``sms-handover bag export``: export tables as CSV, Parquet or MATLAB files."""
 
 import sys
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
