@@ -21,7 +21,7 @@ MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evi
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover figures report simulate test verify measure bench docs screenshots faults lowest cycles fuzz soak reference lint install colcon clean
+.PHONY: help handover figures report simulate test verify measure bench docs screenshots faults lowest cycles fuzz hostile soak reference lint install colcon clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -75,6 +75,9 @@ cycles: $(VENV)/.test  ## start and stop the graph 100 times: no orphan, nothing
 
 fuzz: $(VENV)/.test  ## feed broken inputs to every reader for FUZZ_SECONDS each, write docs/fuzzing.md
 	$(BIN)/python test/fuzz --seconds $(FUZZ_SECONDS) --write docs/fuzzing.md
+
+hostile: $(VENV)/.test  ## run every command with bad inputs, environments and streams, 500 times
+	$(BIN)/python test/hostile --count 500
 
 soak: $(VENV)/.test  ## run 30 minutes of simulated time, watch every process, write docs/soak.md
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.soak --write

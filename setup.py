@@ -88,6 +88,7 @@ setup(
             "plotly>=7,<8",  # of it only plotly.js is used
         ],
         "compiled": ["casadi>=3.7,<4"],  # writes the equations of motion out as C
+        "matlab": ["scipy>=1.13,<2"],
         "parquet": ["pyarrow>=18,<27"],
         "test": [
             "casadi>=3.7,<4",
@@ -101,6 +102,7 @@ setup(
             "pytest-xdist>=3.8,<4",
             "rerun-sdk>=0.41,<0.42",  # another reader of our bags
             "ruff>=0.6",
+            "scipy>=1.13,<2",
             "types-PyYAML",
             "types-setuptools",
         ],

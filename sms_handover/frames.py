@@ -23,3 +23,9 @@ def mount_frame(arm: str) -> str:
 def joint_name(arm: str, number: int) -> str:
     """Return the name of joint ``number`` of an arm, counted from 1 at the mount."""
     return f"{arm}_joint_{number}"
+
+
+def arm_of_joint(name: str) -> str:
+    """Return the arm that a joint belongs to by its name, '' if it is no joint of an arm."""
+    arm, _, number = name.rpartition("_joint_")
+    return arm if number.isdecimal() else ""

@@ -114,7 +114,7 @@ def test_the_lowest_versions_are_those_that_are_declared() -> None:
     lowest = dict(line.split("==") for line in lines if not line.startswith("#"))
     users = {
         name: bound
-        for extra in ("", "analysis", "compiled", "parquet")
+        for extra in ("", "analysis", "compiled", "matlab", "parquet")
         for name, bound in bounds[extra].items()
     }
     assert users.keys() <= lowest.keys()

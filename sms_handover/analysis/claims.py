@@ -9,6 +9,8 @@ from sms_handover.analysis.grasps import Hold, holds
 from sms_handover.analysis.metrics import RunMetrics, common_settling
 from sms_handover.analysis.numbers import largest
 from sms_handover.analysis.tracking import Motion, ToolTracking
+from sms_handover.run_data import RunData
+from sms_handover.types import GraspAction
 from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
 
 GRASP_BY = 20.0  # [s] the paper: "at t = 20 s, manipulator A, having just grasped the deputy"
@@ -87,11 +89,11 @@ class _Outcome:
 
 
 def _outcome(metrics: RunMetrics) -> _Outcome:
-    """Return how far a run got with the handover from its first arm to its second."""
-    arms, changes = metrics.run.arms, holds(metrics.run.grasp_events)
+    """Return how far a run got with the first handover that was commanded."""
+    arms, changes = _giver_and_taker(metrics.run), holds(metrics.run.grasp_events)
     if len(arms) <= 1 or not metrics.phases:
         return _Outcome((nan, nan, nan, nan), complete=False)
-    giver, taker = arms[0], arms[1]
+    giver, taker = arms
     grasped = _time_of(changes, lambda change: change.holder == giver)
     passed = _time_of(changes, lambda change: change.holder == taker and change.giver in {giver, ""})
     tool = metrics.phases[-1].tools[taker]
@@ -104,6 +106,15 @@ def _outcome(metrics: RunMetrics) -> _Outcome:
     )
     final = (tool.final_error * MM_PER_M, tool.final_orientation_error * DEG_PER_RAD)
     return _Outcome((grasped, passed, *final), complete)
+
+
+def _giver_and_taker(run: RunData) -> list[str]:
+    """Return the first arms, two at most, that are commanded to hold the deputy."""
+    done = (event.command for event in run.grasp_events)
+    scheduled = (command for phase in run.phases for command in phase.commands)
+    holding = (item for item in (*done, *scheduled) if item.action is not GraspAction.RELEASE)
+    arms = dict.fromkeys(arm for item in holding for arm in (item.from_arm, item.arm) if arm in run.arms)
+    return list(arms)[:2]
 
 
 def _time_of(changes: Iterable[Hold], wanted: Callable[[Hold], bool]) -> float:

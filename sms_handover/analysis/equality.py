@@ -19,6 +19,10 @@ _PER_TICK = (
     "base_pose",
     "base_twist",
 )
+_PER_JOINT = (
+    *("joint_position", "joint_velocity", "joint_effort", "joint_command"),
+    *("reference_position", "reference_velocity"),
+)
 
 
 @dataclass(frozen=True)
@@ -74,7 +78,12 @@ def _differences(a: RunData, b: RunData) -> Iterator[Difference]:
 
 
 def _compared(run: RunData, name: str) -> Any:
-    """Return what of a field another run has to have too."""
+    """Return what of a field another run has to have too, joints and arms in the order of their names."""
+    if name in ("joint_names", "arms"):
+        return tuple(sorted(getattr(run, name)))
+    if name in _PER_JOINT:
+        columns = sorted(range(len(run.joint_names)), key=run.joint_names.__getitem__)
+        return getattr(run, name)[:, columns]
     if name == "run_events":
         own = (event for event in run.run_events if event.node == TRAJECTORY)
         return tuple(event for event in own if event.kind != MESSAGE_REFUSED)

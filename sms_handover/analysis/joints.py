@@ -4,15 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import TypeVar
 
-from sms_handover.frames import joint_name
+from sms_handover.frames import arm_of_joint
 
 F = TypeVar("F", bound="JointFigures")
 
 
 def joints_of(joint_names: Sequence[str], arm: str) -> list[int]:
-    """Return the places of an arm's joints, known by their names."""
-    prefix = joint_name(arm, 1).removesuffix("1")
-    return [place for place, name in enumerate(joint_names) if name.startswith(prefix)]
+    """Return the columns of an arm's joints, known by their names."""
+    return [place for place, name in enumerate(joint_names) if arm_of_joint(name) == arm]
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,16 +29,23 @@ class TopicChoice:
 
     def wants(self, name: str) -> bool:
         """Whether a topic is chosen."""
-        if name in _full(self.exclude_topics) or (self.exclude_regex and re.search(self.exclude_regex, name)):
+        full = absolute(name)
+        if full in _full(self.exclude_topics) or (self.exclude_regex and re.search(self.exclude_regex, name)):
             return False
         if not self.topics and not self.regex:
             return True
-        return name in _full(self.topics) or bool(self.regex and re.search(self.regex, name))
+        return full in _full(self.topics) or bool(self.regex and re.search(self.regex, name))
 
     def absent(self, names: Collection[str]) -> list[str]:
-        """Return the topics chosen by name that are not among ``names``."""
-        return sorted(_full(self.topics) - set(names))
+        """Return the topics asked for by name that are not among ``names``."""
+        return sorted(_full(self.topics) - _full(names))
+
+
+def absolute(name: str) -> str:
+    """Return a name with a leading slash."""
+    return name if name.startswith("/") else f"/{name}"
 
 
 def _full(names: Iterable[str]) -> set[str]:
-    return {name if name.startswith("/") else f"/{name}" for name in names}
+    """Return names with a leading slash."""
+    return set(map(absolute, names))

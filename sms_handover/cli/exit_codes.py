@@ -1,21 +1,5 @@
-"""Exit codes of the commands."""
-
-from collections.abc import Iterable
-
-from sms_handover.graph.events import GRASP_FAILED, RunEvent
-from sms_handover.types import GraspEvent, GraspStatus
+"""Exit codes of the commands; the main program imports them before it has looked where modules come from."""
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
 EXIT_LOSS = 3  # what was asked for is done, but something of the recording is missing
 EXIT_MISSED, EXIT_INTERRUPTED = 4, 130
-
-
-def task_code(grasps: Iterable[GraspEvent], decisions: Iterable[RunEvent], *, failed: bool) -> int:
-    """Return the exit code of a run: failed for another reason than a grasp, a grasp missed, or succeeded.
-
-    A grasp that missed and succeeded when it was repeated has not missed.
-    """
-    last = {event.command: event.status for event in grasps}
-    if failed and all(event.kind != GRASP_FAILED for event in decisions):
-        return EXIT_FAILED
-    return EXIT_OK if all(status is GraspStatus.SUCCEEDED for status in last.values()) else EXIT_MISSED

@@ -2,7 +2,7 @@
 
 import os
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from sms_handover.errors import ConfigurationError
 from sms_handover.launcher.domain import LAST_DOMAIN
@@ -30,10 +30,10 @@ def add_graph_options(parser: ArgumentParser) -> None:
     )
 
 
-def given(options: Namespace, names: Mapping[str, str]) -> dict[str, object]:
-    """Return the parameters that the options set; ``names`` maps options to parameters."""
-    values = {name: getattr(options, option) for option, name in names.items()}
-    return {name: value for name, value in values.items() if not _unset(value)}
+def given(options: Namespace, names: Iterable[str]) -> dict[str, object]:
+    """Return the parameters among ``names`` that the options set."""
+    values = {name: getattr(options, name) for name in names}
+    return {name: value for name, value in values.items() if value is not None and value != []}
 
 
 def run_in_process(
@@ -49,7 +49,3 @@ def run_in_process(
         os.environ["ROS_DOMAIN_ID"] = str(options.domain_id)
     rules = [part for rule in remap for part in ("--remap", rule)]
     return main(["sms-handover", "--ros-args", *rules, *as_arguments(parameters)])
-
-
-def _unset(value: object) -> bool:
-    return value is None or value is False or value == []

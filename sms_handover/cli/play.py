@@ -1,6 +1,8 @@
-"""``sms-handover play``: publish the messages of a bag again."""
+"""``sms-handover play``: publish the messages of a bag."""
 
+import re
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from dataclasses import fields
 from pathlib import Path
 
 from sms_handover.cli.node_options import add_graph_options, add_topic_options, given, run_in_process
@@ -9,60 +11,45 @@ from sms_handover.launcher.closed_loop import closed_loop
 from sms_handover.launcher.run_folder import bag_of
 from sms_handover.nodes.player import KEYS
 from sms_handover.nodes.player import main as run_player
+from sms_handover.playback.parameters import PlayerParameters
 
-_PARAMETERS = {
-    "bag": "bag",
-    "rate": "rate",
-    "start_offset": "start_offset",
-    "playback_duration": "duration",
-    "loop": "loop",
-    "start_paused": "start_paused",
-    "topics": "topics",
-    "regex": "regex",
-    "exclude_topics": "exclude_topics",
-    "exclude_regex": "exclude_regex",
-    "clock": "clock",
-    "qos_profile_overrides_path": "qos_overrides",
-    "wait": "wait",
-    "ack_timeout": "ack_timeout",
-    "read_ahead_queue_size": "read_ahead",
-}
 _OF_CLOSED_LOOP = {"bag", "closed_loop", "domain_id"}
-_CLOCK_HZ = 40.0  # [Hz] of a generated /clock if no rate is given, as with ros2 bag play
-_WAIT_S = 60.0  # [s] of wall time to wait for subscribers if no time is given
+_CLOCK_HZ = 40.0  # [Hz] default of --clock, as of ros2 bag play
+_WAIT_S = 60.0  # [s] of wall time, default of --wait
 
 
 def add_parser(parser: ArgumentParser) -> None:
-    """Describe the command."""
+    """Add the options."""
     parser.formatter_class = RawDescriptionHelpFormatter
     parser.description = (
-        "Publish the messages of an MCAP bag, of a run of ours or of any other ROS 2 graph: the same bytes,\n"
-        "each when its time comes, with the quality of service that was recorded. No message is left out to\n"
-        "keep the rate: if subscribers or this machine are too slow, playback is late, and says so.\n\n"
+        "Publish the messages of any ROS 2 MCAP bag: the same bytes, each when its time comes, with the\n"
+        "recorded QoS. No message is dropped to keep the rate: if subscribers or this machine are too slow,\n"
+        "the playback is late and reports it.\n\n"
         f"keys, if standard input is a terminal:\n  {KEYS}"
     )
     parser.epilog = (
         "services of the node /player: pause resume toggle_paused play_next stop set_rate seek\n"
-        "exit codes: 0 played to the end, everything confirmed; 1 the bag is damaged, or nobody subscribed\n"
-        "in time; 2 wrong input, nothing was played; 3 a subscriber has not confirmed everything;\n"
-        "130 interrupted. With --closed-loop: 0 every bit is the same; 1 the states differ, or the plant died"
+        "exit codes: 0 complete; 1 damaged bag, or no subscriber in time; 2 wrong input, nothing played;\n"
+        "3 messages were not acknowledged or not played; 130 interrupted. With --closed-loop: 0\n"
+        "bit-identical; 1 the states differ, or the plant exited"
     )
-    parser.add_argument("bag", type=Path, metavar="BAG", help="bag folder or file, or output folder of a run")
+    parser.set_defaults(loop=None, start_paused=None, keyboard=None)  # not given: as the parameter files say
+    parser.add_argument("bag", type=Path, metavar="BAG", help="bag folder, .mcap file or run folder")
     group = parser.add_argument_group("time")
     group.add_argument("-r", "--rate", type=float, metavar="R", help="bag time per wall time (default: 1)")
-    group.add_argument("--start-offset", type=float, metavar="S", help="leave out so many s at the start")
+    group.add_argument("--start-offset", type=float, metavar="S", help="skip S s at the start")
     group.add_argument(
-        "--playback-duration", "--duration", type=float, metavar="S", help="play so many s of the bag"
+        "--playback-duration", "--duration", type=float, dest="duration", metavar="S", help="play S s"
     )
-    group.add_argument("-l", "--loop", action="store_true", help="begin again at the end")
-    group.add_argument("-p", "--start-paused", action="store_true", help="begin paused")
+    group.add_argument("-l", "--loop", action="store_true", help="start over at the end")
+    group.add_argument("-p", "--start-paused", action="store_true", help="start paused")
     group.add_argument(
         "--clock",
         type=float,
         nargs="?",
         const=_CLOCK_HZ,
         metavar="HZ",
-        help=f"publish a generated /clock ({_CLOCK_HZ:g} Hz if no rate is given) instead of the recorded one",
+        help=f"publish a generated /clock (default rate: {_CLOCK_HZ:g} Hz) instead of the recorded one",
     )
     add_topic_options(parser, "play")
     parser.add_argument(
@@ -71,8 +58,9 @@ def add_parser(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--qos-profile-overrides-path",
         type=Path,
+        dest="qos_overrides",
         metavar="FILE",
-        help="YAML file: topic -> policies (reliability, durability, depth ...) instead of the recorded ones",
+        help="YAML file of QoS policies by topic (reliability, depth ...) that override the recorded ones",
     )
     parser.add_argument(
         "--wait",
@@ -80,24 +68,30 @@ def add_parser(parser: ArgumentParser) -> None:
         nargs="?",
         const=_WAIT_S,
         metavar="S",
-        help=f"begin when every topic has a subscriber, fail after S s ({_WAIT_S:g} if not given)",
+        help=f"start when every topic has a subscriber, fail after S s (default: {_WAIT_S:g})",
     )
     parser.add_argument(
         "--ack-timeout",
         type=float,
         metavar="S",
-        help="wait so long for confirmation at the end (default: 30)",
+        help="wait S s for acknowledgements at the end (default: 30)",
     )
     parser.add_argument(
-        "--read-ahead-queue-size", type=int, metavar="N", help="messages held in memory (default: 1000)"
+        "--read-ahead-queue-size",
+        type=int,
+        dest="read_ahead",
+        metavar="N",
+        help="messages held in memory (default: 1000)",
     )
     parser.add_argument(
         "--closed-loop",
         action="store_true",
-        help="of a run of ours: give the recorded commands and phases, and only them, to a live plant in "
-        "lock step, and tell how far its states are from the recorded ones; exit code 0 if not by a bit",
+        help="for a run of sms-handover: feed the recorded commands and phases to a live plant in lock step "
+        "and compare its states with the recorded ones",
     )
-    parser.add_argument("--disable-keyboard-controls", action="store_true", help="take no keys")
+    parser.add_argument(
+        "--disable-keyboard-controls", action="store_false", dest="keyboard", help="read no keys"
+    )
     add_graph_options(parser)
 
 
@@ -105,14 +99,19 @@ def command(options: Namespace) -> int:
     """Run the command; return the exit code."""
     options.bag = bag_of(options.bag)
     if options.closed_loop:
-        of_player = given(options, {name: name for name in vars(options)}).keys() - _OF_CLOSED_LOOP
+        of_player = given(options, vars(options)).keys() - _OF_CLOSED_LOOP
         if of_player:
-            raise ConfigurationError(f"--closed-loop takes no other option, given is {min(of_player)}")
+            raise ConfigurationError(f"--closed-loop takes no other option, but {min(of_player)} is given")
         return closed_loop(options.bag, options.domain_id)
     for rule in options.remap:
         if rule.count(":=") != 1 or not all(rule.split(":=")):
             raise ConfigurationError(f"remapping {rule!r} is not of the form OLD:=NEW")
-    values = given(options, _PARAMETERS)
-    if options.disable_keyboard_controls:
-        values["keyboard"] = False
-    return run_in_process(run_player, options, values, options.remap)
+    options.rename = [rule for rule in options.remap if not _ros_permits(rule.split(":=")[0])]
+    values = given(options, [field.name for field in fields(PlayerParameters)])
+    rules = [rule for rule in options.remap if rule not in options.rename]
+    return run_in_process(run_player, options, values, rules)
+
+
+def _ros_permits(name: str) -> bool:
+    """Whether ROS takes a name in a remapping rule."""
+    return re.fullmatch(r"(\w+:)?[~/]?\w+(/\w+)*", name, re.ASCII) is not None

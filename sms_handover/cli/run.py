@@ -1,16 +1,18 @@
 """``sms-handover run``: the handover as a graph of ROS 2 nodes, recorded."""
 
+import os
 import shlex
 import shutil
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from datetime import datetime
 from pathlib import Path
 
-from sms_handover.cli.exit_codes import EXIT_INTERRUPTED, EXIT_LOSS, task_code
+from sms_handover.cli.exit_codes import EXIT_INTERRUPTED, EXIT_LOSS
 from sms_handover.cli.options import add_scenario_options, scenario_of
+from sms_handover.cli.task_code import task_code
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import graver_in_words
 from sms_handover.graph.topics import CONTROLLER, NODES, RECORDER
@@ -46,7 +48,7 @@ def add_parser(parser: ArgumentParser) -> None:
         "-o", "--output", type=Path, metavar="FOLDER", help="new folder (default: runs/<law>_<date>_<time>)"
     )
     group.add_argument(
-        "--overwrite", action="store_true", help="remove the output folder first if an earlier run made it"
+        "--overwrite", action="store_true", help="replace the output folder if an earlier run made it"
     )
     group.add_argument("--no-record", action="store_true", help="run without a recorder")
     group.add_argument(
@@ -107,6 +109,7 @@ def command(options: Namespace) -> int:
     check_scenario(scenario)
     with (
         reservation(options.domain_id, shared=bool(elsewhere)) as held,
+        _earlier_run_aside(options.output) if _replaces(options) else nullcontext(),
         _output_folder(options, scenario) as (output, lock),
     ):
         plan = LaunchPlan(
@@ -166,6 +169,11 @@ def _how_to_join(domain: int) -> str:
     )
 
 
+def _replaces(options: Namespace) -> bool:
+    """Whether an earlier run is to be replaced."""
+    return bool(options.overwrite and options.output and (options.output / LOGS).is_dir())
+
+
 @contextmanager
 def _output_folder(options: Namespace, scenario: Scenario) -> Iterator[tuple[Path, int]]:
     """Make the output folder, and yield its full path and the file descriptor that locks it.
@@ -177,9 +185,6 @@ def _output_folder(options: Namespace, scenario: Scenario) -> Iterator[tuple[Pat
     wanted: Path = options.output or Path("runs") / f"{law}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
     names = (wanted,) if options.output else (wanted, *(Path(f"{wanted}_{n}") for n in range(2, _AT_ONCE)))
     try:
-        if options.overwrite and (wanted / LOGS).is_dir():
-            with locked_logs(wanted):
-                shutil.rmtree(wanted)
         wanted.parent.mkdir(parents=True, exist_ok=True)
         folder = next(name for name in names if _makes(name))
         (folder / LOGS).mkdir()
@@ -191,6 +196,27 @@ def _output_folder(options: Namespace, scenario: Scenario) -> Iterator[tuple[Pat
         raise ConfigurationError(f"output folder {wanted} cannot be made: {error.strerror}") from error
     with locked_logs(folder) as lock:
         yield folder.resolve(), lock
+
+
+@contextmanager
+def _earlier_run_aside(folder: Path) -> Iterator[None]:
+    """Keep what an earlier run has left in a folder until the new run has come to its bag."""
+    place = folder.resolve()
+    aside = place.with_name(f".{place.name}_before_{os.getpid()}")
+    try:
+        with locked_logs(place):
+            place.rename(aside)
+    except OSError as error:
+        raise ConfigurationError(f"output folder {folder} cannot be replaced: {error.strerror}") from error
+    try:
+        yield
+    except BaseException:
+        if not (place / BAG).exists():  # ROS had not started
+            shutil.rmtree(place, ignore_errors=True)
+            aside.rename(place)
+        raise
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
 
 
 def _makes(folder: Path) -> bool:

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from sms_handover.analysis.clearance import TaskTexts
 from sms_handover.analysis.table import comparison_table
-from sms_handover.cli.exit_codes import task_code
 from sms_handover.cli.options import add_scenario_options, scenario_of
+from sms_handover.cli.task_code import task_code
 from sms_handover.launcher.display import Display
 from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.save import save_run

@@ -1,1 +1,1 @@
-"""Tables out of bags, as CSV or Parquet: a run as rows per tick, any other bag as rows per message."""
+"""Export of bags to tables, as CSV, Parquet or MATLAB files."""

@@ -1,15 +1,16 @@
-"""Tables as CSV (RFC 4180), every number with as many digits as it takes to read the same bits again."""
+"""CSV files (RFC 4180); numbers have enough digits to read back bit for bit."""
 
 import base64
 import csv
 import json
 from collections.abc import Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from sms_handover.export.table import Column, Format, Kind, ListOf, StructOf, TableFile
 
-_PLAIN = {"string", "float32", "float64"}  # written as they are; csv writes the shortest exact float
+_PLAIN = {"string", "float32", "float64"}  # written as is; csv writes the shortest exact float
 
 
 class CsvFormat(Format):
@@ -21,7 +22,7 @@ class CsvFormat(Format):
         self._folder = folder
 
     def open(self, stem: str, columns: Sequence[Column]) -> TableFile:
-        """Create the file of a table, with the names of the columns in its first line."""
+        """Create the file of a table, with the column names in its first line."""
         return _CsvFile(self._folder / f"{stem}{self.suffix}", columns)
 
 
@@ -34,7 +35,7 @@ class _CsvFile(TableFile):
             for place, column in enumerate(columns)
             if not (isinstance(column.kind, str) and (column.kind in _PLAIN or "int" in column.kind))
         ]
-        self._stream = path.open("x", encoding="utf-8", newline="")
+        self._stream = path.open("x", encoding="utf-8", errors="backslashreplace", newline="")
         self._writer = csv.writer(self._stream)
         self._writer.writerow([column.name for column in columns])
 
@@ -55,20 +56,26 @@ class _CsvFile(TableFile):
 
 
 def _cell(value: Any, kind: Kind) -> str:
-    """Return a value that is no number or text as a cell: lists and structs as JSON, bytes as base64."""
+    """Return a list or struct as JSON, bytes as base64, a bool as true or false."""
     if isinstance(kind, ListOf | StructOf):
-        return json.dumps(_plain(value), ensure_ascii=False)
+        try:
+            return json.dumps(value, ensure_ascii=False, allow_nan=False, default=_base64)
+        except ValueError:  # JSON has no such numbers
+            return json.dumps(_named(value), ensure_ascii=False, default=_base64)
     if kind == "binary":
-        return base64.b64encode(value).decode("ascii")
+        return _base64(value)
     return "true" if value else "false"
 
 
-def _plain(value: Any) -> Any:
-    """Return a value with bytes as base64 in it."""
-    if isinstance(value, bytes):
-        return base64.b64encode(value).decode("ascii")
+def _base64(value: bytes) -> str:
+    """Return bytes as base64."""
+    return base64.b64encode(value).decode("ascii")
+
+
+def _named(value: Any) -> Any:
+    """Return a value with ``"NaN"``, ``"Infinity"`` and ``"-Infinity"`` for these, as in JSON of protobuf."""
     if isinstance(value, list):
-        return [_plain(item) for item in value]
+        return [_named(item) for item in value]
     if isinstance(value, dict):
-        return {name: _plain(item) for name, item in value.items()}
-    return value
+        return {name: _named(item) for name, item in value.items()}
+    return json.dumps(value) if isinstance(value, float) and not isfinite(value) else value

@@ -1,14 +1,13 @@
-"""Write the tables of a bag into a new folder."""
+"""Export a bag as tables in a new folder."""
 
 import shutil
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.run.reader import holds_run, read_run
 from sms_handover.errors import BagError, ConfigurationError
 from sms_handover.export.csv_files import CsvFormat
+from sms_handover.export.matlab_files import MatlabFormat
 from sms_handover.export.output import Tables
 from sms_handover.export.parquet_files import ParquetFormat
 from sms_handover.export.run_tables import run_tables
@@ -16,19 +15,10 @@ from sms_handover.export.selection import Selection, Wanted
 from sms_handover.export.table import Format
 from sms_handover.export.topic_tables import Progress, export_topics
 
-CSV, PARQUET = "csv", "parquet"
-FORMATS = (CSV, PARQUET)
+CSV, PARQUET, MATLAB = "csv", "parquet", "matlab"
+FORMATS = (CSV, PARQUET, MATLAB)
 
 _BATCH = 5000  # rows written at once
-
-
-@dataclass(frozen=True)
-class Exported:
-    """Rows by table, and the topics that could not be exported with the reason."""
-
-    folder: Path
-    rows: Mapping[str, int]
-    skipped: Mapping[str, str]
 
 
 def export(
@@ -39,13 +29,12 @@ def export(
     *,
     by_topic: bool = False,
     progress: Progress | None = None,
-) -> Exported:
+) -> Tables:
     """Write the tables of the bag at ``bag`` into the new ``folder``.
 
-    A run of ours gives ``ticks``, ``references`` and ``grasp_events``, everything of one stamp in
-    one row. Any other bag, and a run if topics are chosen or ``by_topic``, gives a table per topic.
-    Raises BagError if the bag is damaged or nothing in it can be exported, ConfigurationError on a
-    folder that exists or a topic that is not there; nothing is left of ``folder`` then.
+    A run gives the tables of :func:`run_tables`. Any other bag, and a run if topics are selected or
+    ``by_topic``, gives a table per topic. Raises BagError if the bag is damaged or nothing can be
+    exported, ConfigurationError if the folder exists or a topic does not; the folder is then removed.
     """
     info = read_info(bag)
     absent = selection.topics.absent(info.topics)
@@ -54,17 +43,18 @@ def export(
     try:
         folder.mkdir()
     except FileExistsError:
-        raise ConfigurationError(f"{folder} exists already: choose another output folder") from None
+        raise ConfigurationError(f"{folder} exists, choose another output folder") from None
     except OSError as error:
-        raise ConfigurationError(f"{folder} cannot be made: {error.strerror}") from error
+        raise ConfigurationError(f"cannot create {folder}: {error.strerror}") from error
     try:
         tables = Tables(folder, _format(file_format, folder, info))
+        tables.missing = info.missing
         if holds_run(info) and selection.everything and not by_topic:
             _export_run(bag, tables, selection.wanted(info.start_ns))
         else:
             export_topics(info, tables, selection, progress)
         if not tables.rows:
-            reasons = "; ".join(tables.skipped.values()) or "no topic is chosen, or it has none"
+            reasons = "; ".join(tables.skipped.values()) or "it has no topics, or none is selected"
             raise BagError(f"nothing to export from {bag}: {reasons}")
         tables.describe(info)
     except OSError as error:
@@ -73,7 +63,14 @@ def export(
     except BaseException:
         shutil.rmtree(folder)
         raise
-    return Exported(folder, tables.rows, tables.skipped)
+    return tables
+
+
+def _format(name: str, folder: Path, info: BagInfo) -> Format:
+    """Return a file format by name."""
+    if name == PARQUET:
+        return ParquetFormat(folder, info.path.name)
+    return MatlabFormat(folder) if name == MATLAB else CsvFormat(folder)
 
 
 def _export_run(bag: Path, tables: Tables, wanted: Wanted) -> None:
@@ -86,10 +83,3 @@ def _export_run(bag: Path, tables: Tables, wanted: Wanted) -> None:
                 tables.rows[stem] += len(rows)
         finally:
             file.close()
-
-
-def _format(name: str, folder: Path, info: BagInfo) -> Format:
-    """Return a kind of file by name."""
-    if name == PARQUET:
-        return ParquetFormat(folder, {"bag": info.path.name})
-    return CsvFormat(folder)

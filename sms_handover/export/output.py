@@ -1,7 +1,8 @@
-"""The tables of an export as they are written to a folder, and what tells of their columns."""
+"""Output folder of an export: its tables and the description of their columns."""
 
 import json
 import re
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,17 +13,23 @@ TABLES_FILE = "tables.json"  # names, kinds and units of all columns
 
 
 class Tables:
-    """The tables of an export as they are written."""
+    """The tables of an export.
+
+    ``rows`` are counts by table; of a topic that was not exported, or not wholly, ``skipped`` is the reason
+    and ``left_out`` the number of messages.
+    """
 
     def __init__(self, folder: Path, file_format: Format) -> None:
         self.rows: dict[str, int] = {}
         self.skipped: dict[str, str] = {}
-        self._folder, self._format = folder, file_format
+        self.left_out: Counter[str] = Counter()
+        self.missing: Sequence[str] = ()  # of the bag itself, in words
+        self.folder, self._format = folder, file_format
         self._columns: dict[str, Sequence[Column]] = {}
         self._topics: dict[str, str] = {}
 
     def open(self, name: str, columns: Sequence[Column], topic: str = "") -> tuple[str, TableFile]:
-        """Open a table; return the name of its file without suffix too, which is unique."""
+        """Open a table; return the unique stem of its file, and the file."""
         stem = re.sub(r"[^A-Za-z0-9_.-]+", "_", name.strip("/").replace("/", ".")) or "root"
         taken = {known.lower() for known in self._columns}
         while stem.lower() in taken:
@@ -32,7 +39,7 @@ class Tables:
         return stem, self._format.open(stem, columns)
 
     def describe(self, info: BagInfo) -> None:
-        """Write what every column is."""
+        """Write the description of every column."""
         tables = {
             f"{stem}{self._format.suffix}": {
                 **({"topic": self._topics[stem]} if self._topics[stem] else {}),
@@ -46,4 +53,4 @@ class Tables:
         }
         content = {"bag": info.path.name, "tables": tables, "skipped": self.skipped}
         text = json.dumps(content, indent=1, ensure_ascii=False)
-        (self._folder / TABLES_FILE).write_text(text + "\n", encoding="utf-8")
+        (self.folder / TABLES_FILE).write_text(text + "\n", encoding="utf-8", errors="backslashreplace")

@@ -1,31 +1,31 @@
-"""Tables as Parquet, with the unit of each column in its metadata; needs pyarrow."""
+"""Parquet files, with the unit of each column in its metadata; needs pyarrow."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from sms_handover.errors import ConfigurationError
 from sms_handover.export.table import Column, Format, Kind, ListOf, StructOf, TableFile
 
 
 class ParquetFormat(Format):
-    """Parquet files in a folder; ``metadata`` goes into each of them."""
+    """Parquet files in a folder, with the name of the bag in their metadata."""
 
     suffix = ".parquet"
 
-    def __init__(self, folder: Path, metadata: Mapping[str, str]) -> None:
+    def __init__(self, folder: Path, bag: str) -> None:
         """Write to ``folder``; raises ConfigurationError if pyarrow is not installed."""
         try:
             self._arrow: Any = import_module("pyarrow")
             self._parquet: Any = import_module("pyarrow.parquet")
         except ImportError as error:
             raise ConfigurationError(
-                "Parquet files need pyarrow, which is not installed: pip install 'sms_handover[parquet]', "
+                "Parquet needs pyarrow, which is not installed: pip install 'sms_handover[parquet]', "
                 "or export with --format csv"
             ) from error
         self._folder = folder
-        self._metadata = dict(metadata)
+        self._metadata = {"bag": bag.encode(errors="backslashreplace")}
 
     def open(self, stem: str, columns: Sequence[Column]) -> TableFile:
         """Create the file of a table."""
@@ -38,10 +38,11 @@ class ParquetFormat(Format):
         ]
         schema = arrow.schema(fields, metadata=self._metadata)
         path = self._folder / f"{stem}{self.suffix}"
-        return _ParquetFile(arrow, self._parquet.ParquetWriter(path, schema, compression="zstd"), schema)
+        stream = path.open("xb")  # Arrow opens no path that is not UTF-8
+        return _ParquetFile(arrow, self._parquet.ParquetWriter(stream, schema, compression="zstd"), stream)
 
     def _type(self, kind: Kind) -> Any:
-        """Return a kind as a type of Arrow."""
+        """Return the Arrow type of a kind."""
         arrow = self._arrow
         if isinstance(kind, ListOf):
             return arrow.list_(self._type(kind.item))
@@ -54,8 +55,8 @@ class ParquetFormat(Format):
 class _ParquetFile(TableFile):
     """One Parquet file; each batch of rows becomes a row group."""
 
-    def __init__(self, arrow: Any, writer: Any, schema: Any) -> None:
-        self._arrow, self._writer, self._schema = arrow, writer, schema
+    def __init__(self, arrow: Any, writer: Any, stream: BinaryIO) -> None:
+        self._arrow, self._writer, self._schema, self._stream = arrow, writer, writer.schema, stream
 
     def write(self, rows: Sequence[Sequence[Any]]) -> None:
         """Append rows."""
@@ -68,4 +69,5 @@ class _ParquetFile(TableFile):
 
     def close(self) -> None:
         """Complete the file."""
-        self._writer.close()
+        with self._stream:
+            self._writer.close()

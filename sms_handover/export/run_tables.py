@@ -1,7 +1,8 @@
-"""A recorded run as tables: ticks, references, grasp events and what the nodes have decided."""
+"""Tables of a recorded run: ticks, references, grasp events and run events."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,14 @@ from sms_handover.export.selection import Wanted
 from sms_handover.export.table import FLOAT, INTEGER, TEXT, Column
 from sms_handover.run_data import Array, RunData, Stamps
 
-_AXES, _TURN = ("x", "y", "z"), ("x", "y", "z", "w")
+_AXES, _QUATERNION = ("x", "y", "z"), ("x", "y", "z", "w")
+
+_DTYPES: dict[str, Any] = {INTEGER: np.int64, FLOAT: np.float64, TEXT: object}
 
 
 @dataclass(frozen=True)
 class RunTable:
-    """One table of a run; ``values`` has an array or list per column."""
+    """One table of a run; ``values`` has an array per column."""
 
     name: str
     columns: tuple[Column, ...]
@@ -24,18 +27,16 @@ class RunTable:
     def rows(self, size: int) -> Iterator[list[tuple[Any, ...]]]:
         """Yield the rows in batches of at most ``size``."""
         for begin in range(0, len(self.values[0]), size):
-            parts = [column[begin : begin + size] for column in self.values]
-            plain = [part.tolist() if isinstance(part, np.ndarray) else part for part in parts]
-            yield list(zip(*plain, strict=True))
+            yield list(zip(*(column[begin : begin + size].tolist() for column in self.values), strict=True))
 
 
 def run_tables(run: RunData, wanted: Wanted) -> tuple[RunTable, ...]:
-    """Return the tables of a run, of the rows whose stamps are ``wanted`` (a mask)."""
+    """Return the tables of a run, with the rows whose stamps are ``wanted``."""
     return _ticks(run, wanted), _references(run, wanted), _events(run, wanted), _run_events(run, wanted)
 
 
 class _Columns:
-    """Columns as they are added, each cut to the rows wanted."""
+    """Columns of one table, restricted to the wanted rows."""
 
     def __init__(self, stamps: Stamps, wanted: Wanted) -> None:
         self._mask = wanted(stamps)
@@ -45,30 +46,30 @@ class _Columns:
     def add(self, name: str, unit: str, values: Any, kind: str = FLOAT) -> None:
         """Add one column."""
         self.columns.append(Column(name, kind, unit))
-        self.values.append(np.asarray(values)[self._mask])
+        self.values.append(np.asarray(values, dtype=_DTYPES[kind])[self._mask])
 
-    def add_texts(self, name: str, values: Sequence[str]) -> None:
-        """Add one column of texts."""
-        self.columns.append(Column(name, TEXT))
-        self.values.append([value for value, kept in zip(values, self._mask, strict=True) if kept])
+    def add_attributes(self, items: Sequence[Any], *paths: str, unit: str = "", kind: str = TEXT) -> None:
+        """Add a column per attribute of the items, named as the last part of its path."""
+        for path in paths:
+            self.add(path.rpartition(".")[2], unit, list(map(attrgetter(path), items)), kind)
 
     def add_all(self, names: Sequence[str], unit: str, values: Array) -> None:
-        """Add the columns of an array."""
+        """Add a column per column of an array."""
         for place, name in enumerate(names):
             self.add(name, unit, values[:, place])
 
     def add_pose(self, name: str, values: Array) -> None:
         """Add a pose."""
         self.add_all([f"{name}.position.{axis}" for axis in _AXES], "m", values[:, :3])
-        self.add_all([f"{name}.orientation.{axis}" for axis in _TURN], "1", values[:, 3:])
+        self.add_all([f"{name}.orientation.{axis}" for axis in _QUATERNION], "1", values[:, 3:])
 
     def table(self, name: str) -> RunTable:
-        """Return what has been added."""
+        """Return the table."""
         return RunTable(name, tuple(self.columns), tuple(self.values))
 
 
 def _ticks(run: RunData, wanted: Wanted) -> RunTable:
-    """Return a row per tick: state, effort and command of every joint, pose and twist of the base."""
+    """Return a row per tick: joint states and commands, pose and twist of the base."""
     columns = _Columns(run.tick_ns, wanted)
     for quantity, unit, values in (
         ("position", "rad", run.joint_position),
@@ -84,7 +85,7 @@ def _ticks(run: RunData, wanted: Wanted) -> RunTable:
 
 
 def _references(run: RunData, wanted: Wanted) -> RunTable:
-    """Return a row per reference period: reference, targets, tools, deputy, receipts and phase."""
+    """Return a row per reference period: references, targets, tools, deputy, conserved quantities, phase."""
     columns = _Columns(run.reference_ns, wanted)
     for quantity, unit, values in (
         ("reference_position", "rad", run.reference_position),
@@ -102,34 +103,34 @@ def _references(run: RunData, wanted: Wanted) -> RunTable:
     columns.add("ik_status", "", run.ik_status, INTEGER)
     phases = {phase.stamp_ns: phase for phase in run.phases}
     found = [phases.get(int(stamp_ns)) for stamp_ns in run.reference_ns]
-    indexes = np.array([-1 if phase is None else phase.index for phase in found], dtype=np.int64)
-    columns.add("phase.index", "", indexes, INTEGER)
-    columns.add_texts("phase.name", ["" if phase is None else phase.name for phase in found])
+    columns.add("phase.index", "", [-1 if phase is None else phase.index for phase in found], INTEGER)
+    columns.add("phase.name", "", ["" if phase is None else phase.name for phase in found], TEXT)
     return columns.table("references")
 
 
 def _events(run: RunData, wanted: Wanted) -> RunTable:
     """Return a row per grasp event."""
     events = run.grasp_events
-    columns = _Columns(np.array([event.stamp_ns for event in events], dtype=np.int64), wanted)
-    columns.add_texts("action", [event.command.action.value for event in events])
-    columns.add_texts("arm", [event.command.arm for event in events])
-    columns.add_texts("grasp_frame", [event.command.grasp_frame for event in events])
-    columns.add_texts("from_arm", [event.command.from_arm for event in events])
-    columns.add_texts("status", [event.status.value for event in events])
+    columns = _Columns(_stamps(events), wanted)
+    columns.add("action", "", [event.command.action.value for event in events], TEXT)
+    columns.add_attributes(events, "command.arm", "command.grasp_frame", "command.from_arm")
+    columns.add("status", "", [event.status.value for event in events], TEXT)
     for name, unit in (("position_error", "m"), ("angle_error", "rad"), ("relative_speed", "m/s")):
-        columns.add(name, unit, np.array([getattr(event, name) for event in events], dtype=np.float64))
-    columns.add_texts("detail", [event.detail for event in events])
+        columns.add_attributes(events, name, unit=unit, kind=FLOAT)
+    columns.add_attributes(events, "detail")
     return columns.table("grasp_events")
 
 
 def _run_events(run: RunData, wanted: Wanted) -> RunTable:
-    """Return a row per decision of a node."""
+    """Return a row per run event."""
     events = run.run_events
-    columns = _Columns(np.array([event.stamp_ns for event in events], dtype=np.int64), wanted)
-    for name in ("node", "kind", "phase", "detail", "unit"):
-        columns.add_texts(name, [getattr(event, name) for event in events])
-    columns.add_texts("severity", [event.severity.value for event in events])
-    for name in ("value", "limit"):
-        columns.add(name, "", np.array([getattr(event, name) for event in events], dtype=np.float64))
+    columns = _Columns(_stamps(events), wanted)
+    columns.add_attributes(events, "node", "kind", "phase", "detail", "unit")
+    columns.add("severity", "", [event.severity.value for event in events], TEXT)
+    columns.add_attributes(events, "value", "limit", kind=FLOAT)
     return columns.table("run_events")
+
+
+def _stamps(events: Sequence[Any]) -> Stamps:
+    """Return the stamps of events."""
+    return np.array([event.stamp_ns for event in events], dtype=np.int64)

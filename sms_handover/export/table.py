@@ -1,4 +1,4 @@
-"""Tables as they go to a file: columns with kinds and units, and rows in batches."""
+"""Table files: columns with kinds and units, and rows in batches."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -8,14 +8,14 @@ from typing import Any
 
 @dataclass(frozen=True)
 class ListOf:
-    """A cell that holds a list of values of one kind."""
+    """A list of values of one kind."""
 
     item: "Kind"
 
 
 @dataclass(frozen=True)
 class StructOf:
-    """A cell that holds named values."""
+    """Named values."""
 
     fields: tuple[tuple[str, "Kind"], ...]
 
@@ -27,7 +27,7 @@ INTEGER, FLOAT, TEXT = "int64", "float64", "string"
 
 @dataclass(frozen=True)
 class Column:
-    """One column; ``unit`` is "" where the source does not tell any."""
+    """One column; ``unit`` is "" if unknown."""
 
     name: str
     kind: Kind
@@ -35,7 +35,7 @@ class Column:
 
 
 class TableFile(ABC):
-    """An open table."""
+    """An open table file."""
 
     @abstractmethod
     def write(self, rows: Sequence[Sequence[Any]]) -> None:
@@ -47,13 +47,13 @@ class TableFile(ABC):
 
 
 class Format(ABC):
-    """A kind of file."""
+    """A file format."""
 
     suffix: str
 
     @abstractmethod
     def open(self, stem: str, columns: Sequence[Column]) -> TableFile:
-        """Create the file of a table, of which ``stem`` is the name without suffix."""
+        """Create the file of a table, ``stem`` being its name without suffix."""
 
 
 def kind_text(kind: Kind) -> str:

@@ -12,6 +12,11 @@ from sms_handover.launcher.node_log import NodeLog
 from sms_handover.launcher.process_sessions import GRACE_S, SessionGuard, end_sessions
 from sms_handover.ros.process.launcher_process import launcher_environment
 
+_WITHOUT_FOLDER = (  # python -P is new in 3.11
+    "import sys; del sys.path[0]; from runpy import run_module; "
+    "run_module(sys.argv.pop(1), run_name='__main__', alter_sys=True)"
+)
+
 
 @dataclass(frozen=True)
 class Death:
@@ -67,7 +72,7 @@ class NodeProcesses:
         """
         if program and self._guard is None:
             self._guard = SessionGuard(self._inherited)
-        command = program or (sys.executable, "-m", f"sms_handover.nodes.{node}")
+        command = program or as_program(f"sms_handover.nodes.{node}")
         log = self._logs[node] = NodeLog(self._folder / f"{node}.log")
         self._processes[node] = subprocess.Popen(
             (*command, *arguments),
@@ -114,6 +119,13 @@ class NodeProcesses:
             print(f"node {names[session]!r} did not end within {GRACE_S:g} s and was killed", file=sys.stderr)
         for process in self._processes.values():
             process.wait()
+
+
+def as_program(module: str) -> tuple[str, ...]:
+    """Return the command that runs a module, with no module from the folder the user stands in."""
+    if sys.version_info >= (3, 11):
+        return sys.executable, "-P", "-m", module
+    return sys.executable, "-c", _WITHOUT_FOLDER, module
 
 
 def _is_stopped(pid: int) -> bool:

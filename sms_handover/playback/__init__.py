@@ -1,1 +1,1 @@
-"""When to send what of a recording: clock, schedule, choice of topics and quality of service, without ROS."""
+"""Playback without ROS: clock, schedule, source and QoS."""

@@ -1,4 +1,4 @@
-"""Whether a recorded type is the one that has the same name here."""
+"""Message definitions: whether a recorded type is the installed one of the same name."""
 
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
@@ -9,10 +9,9 @@ from sms_handover.messages.message_types import MessageTypes
 
 
 def same_definition(topic: TopicInfo, types: MessageTypes) -> bool:
-    """Whether the messages of a topic mean here what they meant when they were recorded.
+    """Whether a topic was recorded with the installed definition of its type.
 
-    The type hash of the bag is compared, or where it has none that of its schema; what cannot be
-    compared is taken to be the same.
+    Compares the type hash of the bag, or else that of its schema; what cannot be compared counts as equal.
     """
     recorded = topic.type_hash or _hash_of(topic)
     try:
@@ -22,7 +21,9 @@ def same_definition(topic: TopicInfo, types: MessageTypes) -> bool:
 
 
 def _hash_of(topic: TopicInfo) -> str:
-    """Return the type hash of the schema text in a bag, '' if it cannot be told."""
+    """Return the type hash of a recorded schema, '' if it cannot be computed."""
+    if not topic.schema_text.strip():
+        return ""
     store = get_typestore(Stores.EMPTY)
     try:
         store.register(get_types_from_msg(topic.schema_text, topic.type))

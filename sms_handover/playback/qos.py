@@ -1,4 +1,4 @@
-"""The quality of service that the publishers of a recorded topic offered, as a bag tells it."""
+"""QoS profiles that the publishers of a recorded topic offered, as stored in a bag."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ E = TypeVar("E", bound=Enum)
 
 
 class Liveliness(Enum):
-    """Who says that a publisher is alive."""
+    """Liveliness policies."""
 
     AUTOMATIC = "automatic"
     MANUAL_BY_TOPIC = "manual_by_topic"
@@ -24,7 +24,7 @@ class Liveliness(Enum):
 
 @dataclass(frozen=True)
 class Offer:
-    """A profile to publish with; durations are in ns, None is infinite."""
+    """An offered QoS profile; durations are in ns, None is infinite."""
 
     reliability: Reliability = Reliability.RELIABLE
     durability: Durability = Durability.VOLATILE
@@ -37,7 +37,7 @@ class Offer:
 
     @property
     def latched(self) -> bool:
-        """Whether a late subscriber still gets the last messages."""
+        """Whether late subscribers still get the latest messages."""
         return self.durability is Durability.TRANSIENT_LOCAL
 
 
@@ -49,14 +49,14 @@ _POLICIES: dict[str, type[Enum]] = {
 }
 _DURATIONS = {"deadline": "deadline_ns", "lifespan": "lifespan_ns", "liveliness_lease_duration": "lease_ns"}
 _IGNORED = ("avoid_ros_namespace_conventions",)
-_INFINITE_FROM_S = 2**31 - 1  # [s] the middlewares of ROS 2 Foxy wrote infinity as this, later ones larger
+_INFINITE_FROM_S = 2**31 - 1  # [s] infinity as written by ROS 2 Foxy; later versions write more
 
 
 def read_offer(text: str) -> Offer:
-    """Return one profile to play a topic with, from the ``offered_qos_profiles`` of its channel.
+    """Return the profile to play a topic with, from the ``offered_qos_profiles`` of its channel.
 
-    Where publishers offered different profiles, the stronger reliability and durability count, for these
-    serve every subscriber. A text that is not readable is as good as none.
+    If publishers differed, the strongest reliability and durability are taken, which are compatible with
+    every subscriber. An unreadable text counts as none.
     """
     offers = [with_policies(Offer(), profile, "offered_qos_profiles") for profile in profiles_of(text)]
     if not offers:
@@ -72,7 +72,7 @@ def read_offer(text: str) -> Offer:
 
 
 def read_overrides(path: Path) -> Mapping[str, Mapping[str, Any]]:
-    """Return the policies to change by topic, from a file as ``ros2 bag play`` takes it; checks them."""
+    """Return the policy overrides by topic from a file in the form of ``ros2 bag play``, checked."""
     overrides = read_yaml(path)
     for topic, policies in overrides.items():
         if not isinstance(policies, dict):
@@ -82,7 +82,7 @@ def read_overrides(path: Path) -> Mapping[str, Mapping[str, Any]]:
 
 
 def with_policies(offer: Offer, policies: Mapping[str, Any], where: str) -> Offer:
-    """Return a profile with some policies changed; raises ConfigurationError on what it does not know."""
+    """Return a profile with some policies changed; raises ConfigurationError on unknown ones."""
     changes: dict[str, Any] = {}
     for name, value in policies.items():
         if name in _POLICIES:
@@ -99,7 +99,7 @@ def with_policies(offer: Offer, policies: Mapping[str, Any], where: str) -> Offe
 
 
 def _policy(kind: type[E], value: object, where: str) -> E | None:
-    """Return the value of a policy, None where the middleware was to choose or it is not known."""
+    """Return the value of a policy, None if it was left to the middleware or is not known."""
     if value in ("system_default", "unknown", "best_available"):
         return None
     try:
@@ -110,7 +110,7 @@ def _policy(kind: type[E], value: object, where: str) -> E | None:
 
 
 def _duration_ns(value: object, where: str) -> int | None:
-    """Return a duration of ``sec`` and ``nsec`` in ns, None where it is infinite or not set."""
+    """Return a duration of ``sec`` and ``nsec`` in ns, None if infinite or unset."""
     if not isinstance(value, dict) or not {"sec", "nsec"} <= value.keys():
         raise ConfigurationError(f"{where} is {value!r}, must be a mapping with sec and nsec")
     seconds, nanoseconds = (_count(value[key], f"{where}.{key}") for key in ("sec", "nsec"))
@@ -125,5 +125,5 @@ def _count(value: object, where: str) -> int:
 
 
 def _strongest(strong: E, found: list[E]) -> E:
-    """Return the strong policy if it is among the found ones, which are alike otherwise."""
+    """Return ``strong`` if it was found, else the policy that all share."""
     return strong if strong in found else found[0]

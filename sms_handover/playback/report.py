@@ -1,15 +1,15 @@
-"""What a playback tells about itself, in words."""
+"""Progress report of a playback, as text."""
 
 from sms_handover.bag.time_order import TimeSpan
 from sms_handover.playback.schedule import PlaybackSchedule
 from sms_handover.units import ns_to_seconds
 
-_PROMPT_NS = 100_000_000  # [ns] of wall time that a message may be late without being spoken of
-_SETTLED_NS = 500_000_000  # [ns] of wall time before an achieved rate means something
+_PROMPT_NS = 100_000_000  # [ns] of wall time that a message may be late without a report
+_SETTLED_NS = 500_000_000  # [ns] of wall time before the achieved rate is meaningful
 
 
 def progress_line(schedule: PlaybackSchedule, span: TimeSpan, now_ns: int) -> str:
-    """Return how far the playback is, at which rate, and how much has been sent."""
+    """Return position, rate and number of messages sent."""
     position_s = ns_to_seconds(schedule.position_ns(now_ns) - int(span.start_ns))
     length_s = ns_to_seconds(int(span.end_ns) - int(span.start_ns))
     if schedule.clock.paused:
@@ -25,12 +25,12 @@ def progress_line(schedule: PlaybackSchedule, span: TimeSpan, now_ns: int) -> st
 
 
 def closing_line(schedule: PlaybackSchedule, now_ns: int) -> str:
-    """Return what has been played and how late it was, with the achieved rate if that matters."""
+    """Return the number of messages sent and the largest lag, with the achieved rate if it was late."""
     text = f"{schedule.sent_count} messages sent in {ns_to_seconds(schedule.clock.ran_ns(now_ns)):.2f} s"
     lag_ns = schedule.largest_lag_ns
     if lag_ns <= _PROMPT_NS:
         return f"{text}, none later than {ns_to_seconds(lag_ns) * 1000:.0f} ms"
     return (
         f"{text}, up to {ns_to_seconds(lag_ns):.2f} s late: achieved rate "
-        f"{schedule.achieved_rate(now_ns):.2f}, asked {schedule.clock.rate:g}; none was left out"
+        f"{schedule.achieved_rate(now_ns):.2f} of {schedule.clock.rate:g}; none was dropped"
     )

@@ -208,10 +208,10 @@ def made_up_run(ticks: int = 101, seed: int = 0) -> RunData:
     )
 
 
-def open_topics(recording: Recording, prefix: str = "") -> None:
+def open_topics(recording: Recording, prefix: str = "", arms: Sequence[str] = ARMS) -> None:
     """Add every topic of the graph."""
     periods = {topics.Rate.TICK: TICK_NS, topics.Rate.REFERENCE: REFERENCE_NS}
-    for topic in topics.graph_topics(ARMS):
+    for topic in topics.graph_topics(arms):
         name = topic.name if topic.name.startswith("/") else f"{prefix}/{topic.name}"
         durability = Durability.TRANSIENT_LOCAL if topic.latched else Durability.VOLATILE
         recording.add_topic(name, topic.type, (Qos(durability=durability),), periods.get(topic.rate, 0))

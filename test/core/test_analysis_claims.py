@@ -100,6 +100,12 @@ def test_every_claim_holds_for_a_good_and_a_bad_controller() -> None:
     assert [name for name, claim in found.items() if not claim.holds] == []
 
 
+def test_the_order_in_which_arms_are_listed_decides_nothing() -> None:
+    runs = [changed(run_of(law), arms=("arm_b", "arm_a")) for law in (GOOD, BAD)]
+    found = judge(*map(measure, runs))
+    assert [claim.name for claim in found if not claim.holds] == []
+
+
 def test_claims_are_about_who_is_who() -> None:
     swapped = verdicts(BAD, GOOD)
     assert [swapped[name].holds for name in ("overshoot", "settling", "drift")] == [False] * 3

@@ -70,7 +70,8 @@ def hold_against(file: Path, must: Expected, folder: Path) -> None:
     result = check(file)
     assert result.complete, f"check: {result.findings}"
     topics = frozenset(info.topics)
-    played = PlaybackSource(file, topics, {}, info.start_ns, TimeSpan(info.start_ns, info.end_ns))
+    keys = {(topic.name, topic.type) for topic in info.channels}
+    played = PlaybackSource(file, keys, {}, info.start_ns, TimeSpan(info.start_ns, info.end_ns))
     found = [(m.log_time_ns, m.publish_time_ns, m.data) for m in played.read(info.start_ns)]
     assert found == sorted(must.messages, key=lambda message: message[0]), "play"
     recovery = recover(file, folder / "recovered")

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sms_handover.analysis.joints import joints_of
 from sms_handover.bag.info import read_info
 from sms_handover.bag.recording import Recording
 from sms_handover.bag.run.reader import read_run
@@ -102,6 +103,27 @@ def test_joints_are_matched_by_name_even_if_the_order_changes(tmp_path: Path) ->
     assert read.joint_position.tobytes() == run.joint_position.tobytes()
     assert read.joint_velocity.tobytes() == run.joint_velocity.tobytes()
     assert read.base_twist.tobytes() == run.base_twist.tobytes()
+
+
+def test_no_arm_is_taken_for_another_whose_name_begins_alike(tmp_path: Path) -> None:
+    """Arms come in the order of their joints; neither the name before nor what it begins with decides."""
+    run = made_up_run(3)
+    names = {"arm_a": "arm_joint", "arm_b": "arm"}
+    joints = tuple(f"{names[name[:5]]}{name[5:]}" for name in run.joint_names)
+    values = {
+        name: {names[arm]: rows for arm, rows in getattr(run, name).items()}
+        for name in ("target_pose", "tool_pose")
+    }
+    arms = tuple(names.values())
+    folder = tmp_path / "bag"
+    with Recording(folder, types=TYPES) as recording:
+        open_topics(recording, arms=arms)
+        recording.begin()
+        record_run(recording, RunData(**{**vars(run), **values, "joint_names": joints, "arms": arms}))
+    again = read_run(folder)
+    assert again.arms == arms == ("arm_joint", "arm")
+    assert joints_of(again.joint_names, "arm") == list(range(7, 14))
+    assert joints_of(again.joint_names, "arm_joint") == list(range(7))
 
 
 def test_repeated_and_late_messages_change_nothing(tmp_path: Path) -> None:

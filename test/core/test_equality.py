@@ -99,8 +99,8 @@ def test_what_is_missing_in_both_is_the_same(run: RunData) -> None:
 def test_names_phases_and_events_count(run: RunData) -> None:
     event = run.grasp_events[0]
     others: dict[str, Any] = {
-        "joint_names": run.joint_names[::-1],
-        "arms": run.arms[::-1],
+        "joint_names": (*run.joint_names[:-1], "arm_b_joint_8"),
+        "arms": run.arms[:-1],
         "phases": run.phases[:-1],
         "grasp_events": (replace(event, status=GraspStatus.REJECTED), *run.grasp_events[1:]),
     }
@@ -111,6 +111,21 @@ def test_names_phases_and_events_count(run: RunData) -> None:
     assert difference.detail == f"{len(run.phases)} items and {len(run.phases) - 1} items"
     (difference,) = compare_runs(run, replace(run, grasp_events=others["grasp_events"]))
     assert difference.detail.startswith("item 0 is ")
+
+
+def test_the_order_of_arms_and_joints_decides_nothing(run: RunData) -> None:
+    """A reader finds them in the order of a message, a robot file lists them in another."""
+    order = np.random.default_rng(0).permutation(len(run.joint_names))
+    columns = [
+        *("joint_position", "joint_velocity", "joint_effort", "joint_command"),
+        *("reference_position", "reference_velocity"),
+    ]
+    names = tuple(run.joint_names[place] for place in order)
+    other: dict[str, Any] = {name: getattr(run, name)[:, order] for name in columns}
+    other |= {name: dict(reversed(getattr(run, name).items())) for name in PER_ARM}
+    assert compare_runs(run, replace(run, arms=run.arms[::-1], joint_names=names, **other)) == ()
+    found = {difference.field for difference in compare_runs(run, replace(run, joint_names=names))}
+    assert found == set(columns)
 
 
 def test_of_decisions_those_count_that_follow_from_the_numbers(run: RunData) -> None:

@@ -10,8 +10,9 @@ from matplotlib.collections import PolyCollection
 
 from sms_handover.analysis.figures.draw import draw_figures, write_figure
 from sms_handover.analysis.figures.drawn_run import DrawnRun
-from sms_handover.analysis.figures.snapshots import draw_snapshots
+from sms_handover.analysis.figures.snapshots import _colour, _pale, draw_snapshots
 from sms_handover.analysis.figures.solids import Camera, faces_of, picture_of
+from sms_handover.analysis.figures.style import COLOURS
 from sms_handover.errors import ConfigurationError
 from sms_handover.scene.scene import Scene, make_scene
 from sms_handover.simulation.simulate import simulate
@@ -124,6 +125,15 @@ def test_every_solid_is_drawn_where_the_scene_has_it(drawn: DrawnRun) -> None:
         camera = Camera(radians(60.0), radians(40.0))
         middle = (places.min(axis=0) + places.max(axis=0)) / 2.0
         assert middle == pytest.approx(camera.seen(scene.deputy_in_world[frame, :3]), abs=1e-9)
+
+
+def test_a_link_has_the_colour_of_its_own_arm(drawn: DrawnRun) -> None:
+    assert drawn.scene is not None
+    for arms in (("arm", "arm_b"), ("arm_b", "arm")):
+        scene = Scene(**{**vars(drawn.scene), "arms": arms})
+        colours = [_colour(scene, f"{arm}_link_1", (0.0, 0.0, 0.0)) for arm in arms]
+        assert colours == [_pale(colour) for colour in COLOURS[:2]]
+        assert _colour(scene, "panel_1", (0.0, 0.0, 0.0)) == _pale((0.0, 0.0, 0.0))
 
 
 def test_traces_are_the_way_of_each_tool_since_the_picture_before(drawn: DrawnRun) -> None:

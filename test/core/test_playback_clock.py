@@ -61,7 +61,7 @@ def test_a_paused_clock_waits_for_ever_but_not_for_what_has_been() -> None:
 @pytest.mark.parametrize("rate", [0.0, -1.0, 1e-7, 1e7, 5e-324, 1e308, float("nan"), float("inf")])
 def test_a_rate_is_one_that_nanoseconds_can_be_counted_by(rate: float) -> None:
     clock = PlaybackClock(0, 0)
-    with pytest.raises(ConfigurationError, match="allowed is from 1e-06 to 1e\\+06"):
+    with pytest.raises(ConfigurationError, match="must be from 1e-06 to 1e\\+06"):
         clock.set_rate(rate, 1)
     assert clock.rate == 1.0
     with pytest.raises(ConfigurationError, match="rate"):

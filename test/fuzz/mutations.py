@@ -2,6 +2,8 @@
 
 import struct
 from collections.abc import Sequence
+from functools import partial
+from random import Random
 
 from hypothesis import strategies as st
 
@@ -41,6 +43,16 @@ def mutated(seeds: Sequence[bytes]) -> st.SearchStrategy[bytes]:
     """Return what draws one of the seeds with up to eight edits, or now and then any bytes."""
     nearly = st.builds(_mutate, st.sampled_from(seeds), st.lists(_edit, max_size=8), st.sampled_from(seeds))
     return st.one_of(nearly, nearly, nearly, st.binary(max_size=200))
+
+
+def mutated_by(random: Random, seeds: Sequence[bytes]) -> bytes:
+    """Return one of the seeds with up to eight edits that a generator of random numbers draws."""
+    payloads, place = [*_WORDS, *_NUMBERS], partial(random.randrange, 2**20)
+    edits = [
+        (random.choice(_OPERATIONS), place(), place(), random.choice(payloads))
+        for _ in range(random.randrange(9))
+    ]
+    return _mutate(random.choice(seeds), edits, random.choice(seeds))
 
 
 def _mutate(data: bytes, edits: Sequence[tuple[str, int, int, bytes]], other: bytes) -> bytes:

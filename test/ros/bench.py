@@ -52,6 +52,7 @@ class Bench:
         self.folder = folder
         self._domain = domain
         self._nodes: list[Node] = []
+        self._contexts: list[rclpy.Context] = []
         self._executor: LoopsExecutor | None = None
 
     def start(self, parameters: Parameters | None = None) -> None:
@@ -93,6 +94,15 @@ class Bench:
         """Return a node with nothing in it."""
         return self.add(lambda: Node(name, start_parameter_services=False))
 
+    def stranger(self, name: str) -> Node:
+        """Return a node that is a participant of its own, as one of another process is."""
+        context = rclpy.Context()
+        rclpy.init(context=context, domain_id=self._domain, signal_handler_options=SignalHandlerOptions.NO)
+        self._contexts.append(context)
+        node = Node(name, context=context, start_parameter_services=False)
+        self._nodes.append(node)
+        return node
+
     @property
     def executor(self) -> Any:
         """Return the executor of all nodes."""
@@ -117,5 +127,8 @@ class Bench:
         for node in self._nodes:
             node.destroy_node()
         self._nodes.clear()
+        for context in self._contexts:
+            rclpy.try_shutdown(context=context)
+        self._contexts.clear()
         self._executor = None
         rclpy.try_shutdown()

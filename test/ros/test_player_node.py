@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from builtin_interfaces.msg import Time
+from mcap.writer import Writer as McapWriter
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSProfile, QoSReliabilityPolicy
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -34,6 +35,7 @@ pytestmark = pytest.mark.ros
 TEXT = "std_msgs/msg/String"
 MS = 1_000_000  # ns
 COUNT = 200
+CASES = Path(__file__).resolve().parents[1] / "data" / "cases"
 TYPES = MessageTypes()
 
 
@@ -189,10 +191,10 @@ def test_services_pause_step_seek_and_change_the_rate(bench: Bench, tmp_path: Pa
         assert len(ears.heard) == 2
         for rate in (-1.0, 0.0, float("nan"), float("inf"), 1e300, 5e-324):
             answer = yield from player.call("set_rate", SetRate, rate=rate)
-            assert not answer.success and "allowed is from 1e-06 to 1e+06" in answer.message
+            assert not answer.success and "must be from 1e-06 to 1e+06" in answer.message
         assert (yield from player.call("set_rate", SetRate, rate=20.0)).success
         answer = yield from player.call("seek", Seek, time=Time(sec=3))
-        assert not answer.success and "allowed is from 7 to 7.999 s" in answer.message
+        assert not answer.success and "must be from 7 to 7.999 s" in answer.message
         assert (yield from player.call("seek", Seek, time=Time(sec=7, nanosec=990 * MS))).success
         assert (yield from player.call("toggle_paused", Trigger)).success
         answer = yield from player.call("play_next", Trigger)
@@ -271,14 +273,101 @@ def test_a_bag_of_another_project_is_played_but_for_types_that_are_not_here(
     told = capfd.readouterr().err
     assert "not played: /tank: message type tank_msgs/msg/Tank is not installed" in told
     assert "/text" not in told
-    assert player.run() == EXIT_OK
+    assert player.run() == EXIT_LOSS
+    assert "1 messages of the bag were not played" in capfd.readouterr().err
     ears.wait_for(10)
     assert ears.texts == [str(number) for number in range(10)]
 
 
+_TIME = "{sec: 0, nsec: 0}"
+_PROFILE = (
+    "- {history: keep_last, depth: %s, reliability: reliable, durability: volatile, deadline: %s, lifespan: "
+    f"{_TIME}, liveliness: automatic, liveliness_lease_duration: {_TIME}, "
+    "avoid_ros_namespace_conventions: false}"
+)
+HOSTILE = (  # name, type, QoS, and what is told of it
+    ("/front-camera", TEXT, "", "must not contain characters other than alphanumerics"),
+    ("~/own", TEXT, "", "must not contain characters"),
+    ("", TEXT, "", "must not end with"),
+    ("/new\nline", TEXT, "", r"'/new\nline'"),
+    ("/path", "os/path/join", "", "not of the form PACKAGE/msg/NAME"),
+    ("/relative", ".os/msg/join", "", "not of the form PACKAGE/msg/NAME"),
+    ("/no_class", "std_msgs/msg/__file__", "", "is no message"),
+    ("/two", "std_msgs/msg/Int32", "", "/two is published with type std_msgs/msg/String already"),
+    ("/rosout", TEXT, "", "rosout"),
+    ("/late", TEXT, _PROFILE % (1, f"{{sec: 1, nsec: {10**26}}}"), "/late"),
+)
+
+
+def hostile(path: Path) -> Path:
+    """Write a bag with a message on each of the topics that cannot be played, and two that can."""
+    with path.open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start("ros2")
+        schemas: dict[str, int] = {}
+        good = (("/two", TEXT, "", ""), ("old", "std_msgs/String", _PROFILE % (1, "[") + "- {bad: [", ""))
+        for name, kind, qos, _ in (*good, *HOSTILE):
+            schemas.setdefault(kind, writer.register_schema(kind, "ros2msg", b""))
+            channel = writer.register_channel(name, "cdr", schemas[kind], {"offered_qos_profiles": qos})
+            writer.add_message(channel, 7, string(name), 7)
+        writer.finish()
+    return path
+
+
+def test_one_bad_topic_never_takes_down_the_rest(
+    bench: Bench, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    renamed = ("front-camera:=/front",)
+    player = Player(bench, hostile(tmp_path / "a.mcap"), wait=30.0, rename=renamed)
+    ears = Ears(bench, "/two", "/old", "/front")
+    player.add()
+    told = capfd.readouterr().err
+    assert player.run() == EXIT_LOSS
+    ears.wait_for(3)
+    assert sorted(ears.heard) == [("/front", "/front-camera"), ("/old", "old"), ("/two", "/two")]
+    left_out = [line for line in told.splitlines() if line.startswith("not played: ")]
+    for name, _, _, reason in HOSTILE[1:]:
+        assert any(reason in line for line in left_out), (name, told)
+    assert f"{len(left_out)} messages of the bag were not played" in capfd.readouterr().err
+
+
+def test_a_topic_that_somebody_publishes_with_another_type_is_left_out(
+    bench: Bench, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Discovery tells; one of the same type is no conflict."""
+    player = Player(bench, ticks(tmp_path / "bag", count=10))
+    user = bench.stranger("user")
+    user.create_publisher(Clock, "/odd", LOSSLESS)
+    user.create_publisher(String, "/even", LOSSLESS)
+    ears = Ears(bench, "/even", "/map")
+    player.add()
+    assert player.run() == EXIT_LOSS
+    ears.wait_for(6)
+    told = capfd.readouterr().err
+    assert "not played: /odd: /odd is published with type rosgraph_msgs/msg/Clock already" in told
+    assert "5 messages of the bag were not played" in told
+
+
+@pytest.mark.parametrize(
+    ("case", "code", "heard"),
+    [
+        ("two_types_on_one_topic", EXIT_LOSS, 3),
+        ("topic_name_ros_forbids", EXIT_LOSS, 3),
+        ("schema_without_text", EXIT_OK, 3),
+    ],
+)
+def test_bags_of_others(bench: Bench, case: str, code: int, heard: int) -> None:
+    player = Player(bench, CASES / f"{case}.mcap", wait=30.0)
+    ears = Ears(bench, "/status" if case.startswith("two") else "/chatter")
+    player.add()
+    assert player.run() == code
+    ears.wait_for(heard)
+    assert len(ears.heard) == heard
+
+
 def test_if_nothing_is_left_it_says_so(bench: Bench, tmp_path: Path) -> None:
     Player(bench, unknown_types(tmp_path / "bag", known=False))
-    with pytest.raises(ConfigurationError, match="nothing is left to play"):
+    with pytest.raises(ConfigurationError, match=r"no topic of .* can be played"):
         PlayerNode()
 
 
@@ -287,8 +376,8 @@ def test_if_nothing_is_left_it_says_so(bench: Bench, tmp_path: Path) -> None:
     [
         ({"topics": ("nix",)}, r"has no topic /nix; it has /even, /map, /odd"),
         ({"regex": "^/nothing"}, "no topic of .* is chosen"),
-        ({"rate": 0.0}, "'rate' is 0, allowed is more than 0"),
-        ({"start_offset": 99.0}, "start offset is 99 s, allowed is up to 0.199 s"),
+        ({"rate": 0.0}, "'rate' is 0, must be > 0"),
+        ({"start_offset": 99.0}, "start offset is 99 s, must be <= 0.199 s"),
         ({"bag": "nowhere"}, "there is no bag at nowhere"),
         ({"bag": ""}, "'bag' is empty"),
         ({"qos_overrides": "nowhere.yaml"}, "cannot read nowhere.yaml"),
@@ -306,7 +395,7 @@ def test_who_is_waited_for_in_vain_is_named(bench: Bench, tmp_path: Path) -> Non
     player = Player(bench, ticks(tmp_path / "bag"), wait=0.5)
     ears = Ears(bench, "/odd", "/map")
     player.add()
-    with pytest.raises(GraphError, match=r"after 0\.5 s nobody has subscribed to /even$"):
+    with pytest.raises(GraphError, match=r"^no subscriber of /even after 0\.5 s$"):
         player.run()
     assert ears.heard == []
 
@@ -314,11 +403,11 @@ def test_who_is_waited_for_in_vain_is_named(bench: Bench, tmp_path: Path) -> Non
 def test_what_nobody_confirms_is_a_loss(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(BagPublisher, "confirmed", lambda self, patience: self.name != "/odd")
+    monkeypatch.setattr(BagPublisher, "acknowledged", lambda self, timeout: self.name != "/odd")
     player = Player(bench, ticks(tmp_path / "bag", count=10), ack_timeout=0.1)
     player.add()
     assert player.run() == EXIT_LOSS
-    assert "not confirmed by a subscriber of: /odd" in capfd.readouterr().err
+    assert "not acknowledged by a subscriber of: /odd" in capfd.readouterr().err
 
 
 def test_a_bag_that_is_damaged_further_on_is_played_up_to_there(bench: Bench, tmp_path: Path) -> None:
@@ -376,7 +465,7 @@ class FakePublisher:
 
 def bag_publisher(bench: Bench, tmp_path: Path, fake: FakePublisher, name: str) -> BagPublisher:
     node: Any = Player(bench, ticks(tmp_path / "bag")).add()
-    publisher: BagPublisher = node._outlets[name]
+    publisher: BagPublisher = node._bag_publishers[name, TEXT]
     publisher._publisher = fake  # type: ignore[assignment]
     return publisher
 
@@ -391,7 +480,7 @@ def test_a_full_queue_refuses_and_nothing_is_sent(bench: Bench, tmp_path: Path) 
 def test_a_latched_topic_replaces_nothing_that_has_not_been_got(bench: Bench, tmp_path: Path) -> None:
     fake = FakePublisher()
     publisher = bag_publisher(bench, tmp_path, fake, "/map")
-    assert publisher.in_force == 1
+    assert publisher.kept == 1
     assert publisher.publish(b"a")
     assert not publisher.publish(b"b")
     fake.acked = True

@@ -1,20 +1,25 @@
 """Any topics recorded: those that are there, those that come later, in the order in which they were sent."""
 
 from pathlib import Path
+from threading import Event, Thread
+from time import time_ns
 from typing import Any
 
 import pytest
 import yaml
 from rclpy.qos import QoSProfile, QoSReliabilityPolicy
-from std_msgs.msg import Int32, String
+from std_msgs.msg import Empty, Int32, Int64, String
 
 from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import read_info
 from sms_handover.bag.time_order import messages_by_time
-from sms_handover.errors import ConfigurationError
+from sms_handover.errors import BagError, ConfigurationError, GraphError
 from sms_handover.graph.topics import TOPIC_RECORDER
+from sms_handover.messages.message_types import MessageTypes
+from sms_handover.nodes import topic_recorder
 from sms_handover.nodes.topic_recorder import TopicRecorderNode
-from sms_handover.ros.process.main import EXIT_FAILED, EXIT_OK
+from sms_handover.ros.message_types import message_class
+from sms_handover.ros.process.main import EXIT_FAILED, EXIT_LOSS, EXIT_OK
 from sms_handover.ros.qos import LATCHED, LOSSLESS
 
 from .bench import Bench
@@ -22,6 +27,7 @@ from .script import Script, Stop
 
 pytestmark = pytest.mark.ros
 
+SCHEMA = MessageTypes.schema
 SENSOR = QoSProfile(depth=5, reliability=QoSReliabilityPolicy.BEST_EFFORT)
 
 
@@ -106,3 +112,71 @@ def test_a_folder_that_is_there_is_refused(bench: Bench, tmp_path: Path) -> None
     bench.start({TOPIC_RECORDER: {"folder": str(tmp_path)}})
     with pytest.raises(ConfigurationError, match="exists already"):
         TopicRecorderNode()
+
+
+def test_one_bad_topic_never_takes_down_the_rest(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Two types on a topic, a type that is not installed, no definition to be read, a later weaker QoS."""
+
+    def installed(name: str) -> Any:
+        if name == "std_msgs/msg/Empty":
+            raise GraphError(f"message type {name} is not installed")
+        return message_class(name)
+
+    def schema(self: MessageTypes, name: str) -> Any:
+        if name == "std_msgs/msg/Int64":
+            raise BagError("wstring is not read")
+        return SCHEMA(self, name)
+
+    monkeypatch.setattr(topic_recorder, "message_class", installed)
+    monkeypatch.setattr(MessageTypes, "schema", schema)
+    bench.start({TOPIC_RECORDER: {"folder": str(tmp_path / "bag"), "exclude_regex": "rosout|events"}})
+    user, other = bench.stranger("user"), bench.stranger("other")
+    kinds = {"both": Int32, "empty": Empty, "bytes": Int64, "weak": Int32}
+    publishers = {name: user.create_publisher(kind, name, LOSSLESS) for name, kind in kinds.items()}
+
+    def script() -> Script:
+        while not all(publishers[name].get_subscription_count() for name in ("both", "bytes", "weak")):
+            yield
+        other.create_publisher(String, "both", LOSSLESS)
+        other.create_publisher(Int32, "weak", SENSOR)
+        while capfd.readouterr().err.count("not recorded: /weak") == 0:
+            yield
+        for name in ("both", "bytes", "weak"):
+            publishers[name].publish(kinds[name](data=1))
+
+    assert record(bench, script()) == EXIT_LOSS
+    assert {m.topic: m.type for m in read_messages(tmp_path / "bag")} == {
+        "/both": "std_msgs/msg/Int32",
+        "/bytes": "std_msgs/msg/Int64",
+        "/weak": "std_msgs/msg/Int32",
+    }
+
+
+def test_what_is_sent_after_the_end_is_not_recorded(bench: Bench, tmp_path: Path) -> None:
+    """A graph that goes on does not keep the recorder, and gets nothing more into the bag."""
+    bench.start({TOPIC_RECORDER: {"folder": str(tmp_path / "bag"), "topics": ("/live",), "duration": 1.0}})
+    user = bench.stranger("user")
+    live = user.create_publisher(Int32, "live", LOSSLESS)
+    ended = Event()
+    sent: list[int] = []
+
+    def publish() -> None:
+        while not ended.wait(0.001):
+            sent.append(time_ns())
+            live.publish(Int32(data=len(sent)))
+
+    thread = Thread(target=publish)
+    thread.start()
+    node = bench.add(TopicRecorderNode)
+    try:
+        stop: Any = Stop()
+        assert node.run(bench.executor, stop) == EXIT_OK
+    finally:
+        ended.set()
+        thread.join()
+    end_ns = node._end_ns
+    assert end_ns is not None and end_ns < sent[-1]
+    times = [m.publish_time_ns for m in read_messages(tmp_path / "bag")]
+    assert times and times[-1] <= end_ns

@@ -148,10 +148,9 @@ def _add_key(axes: Axes, arms: Sequence[str], title: str) -> None:
 
 def _colour(scene: Scene, link: str, described: Colour) -> Colour:
     """Return the colour of a link: that of its arm, or what the description says."""
-    for place, arm in enumerate(scene.arms):
-        if link.startswith(f"{arm}_"):
-            return _pale(COLOURS[place])
-    return _pale(described)
+    of_link = [arm for arm in scene.arms if link.startswith(f"{arm}_")]
+    arm = max(of_link, key=len, default=None)  # that of arm_b_link_1 is arm_b, not arm
+    return _pale(described if arm is None else COLOURS[scene.arms.index(arm)])
 
 
 def _pale(colour: str | Colour) -> Colour:

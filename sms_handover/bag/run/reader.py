@@ -10,6 +10,7 @@ from sms_handover.bag.ledger import has_ledger
 from sms_handover.bag.run.collector import BASE_POSE, BASE_TWIST, EFFORT, POSITION, VELOCITY, RunCollector
 from sms_handover.bag.run.series import Series
 from sms_handover.errors import BagError
+from sms_handover.frames import arm_of_joint
 from sms_handover.graph import topics
 from sms_handover.run_data import Array, RunData, Stamps
 from sms_handover.types import TaskPhase
@@ -115,10 +116,8 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _by_first_joint(arms: Sequence[str], joint_names: Sequence[str]) -> list[str]:
-    """Return the arms by their first joints; a joint belongs to the longest arm name it begins with."""
-    owners = [
-        max((arm for arm in arms if name.startswith(f"{arm}_")), key=len, default="") for name in joint_names
-    ]
+    """Return the arms in the order of their first joints."""
+    owners = list(map(arm_of_joint, joint_names))
     return sorted(arms, key=lambda arm: (owners.index(arm) if arm in owners else len(owners), arm))
 
 

@@ -1,21 +1,21 @@
-"""``sms-handover bag``: look into recordings, check them, recover them, take tables out of them."""
+"""``sms-handover bag``: inspect, check, recover and export recordings."""
 
 from argparse import ArgumentParser, Namespace
 from importlib import import_module
 
 _COMMANDS = {
-    "info": "what a bag holds: topics, times, controller, versions, loss ledger",
-    "check": "whether a bag is complete, and what is missing",
-    "recover": "make a whole bag of a truncated or damaged one",
-    "export": "tables as CSV or Parquet",
+    "info": "show the contents of a bag: topics, times, controller, versions, loss ledger",
+    "check": "check whether a bag is complete, and what is missing",
+    "recover": "recover a truncated or damaged bag",
+    "export": "export tables as CSV, Parquet or MATLAB files",
 }
 
 
 def add_parser(parser: ArgumentParser) -> None:
-    """Describe the commands."""
+    """Add the subcommands."""
     parser.description = (
-        "Look into recordings. Every command takes the output folder of a run, the folder of a bag, or one "
-        ".mcap file, of sms-handover or of any other ROS 2 recorder that writes MCAP. See docs/bags.md."
+        "Inspect recordings. Every command takes a run folder, a bag folder or an .mcap file, of any "
+        "ROS 2 recorder that writes MCAP. See docs/bags.md."
     )
     commands = parser.add_subparsers(dest="bag_command", metavar="COMMAND", required=True)
     for name, text in _COMMANDS.items():

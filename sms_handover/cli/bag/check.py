@@ -1,4 +1,4 @@
-"""``sms-handover bag check``: whether a bag is complete, and what is missing."""
+"""``sms-handover bag check``: check whether a bag is complete, and what is missing."""
 
 import json
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
@@ -15,14 +15,14 @@ _MARKS = {Severity.DAMAGED: "DAMAGED", Severity.MISSING: "MISSING", Severity.NOT
 
 
 def add_parser(parser: ArgumentParser) -> None:
-    """Describe the command."""
+    """Add the options."""
     parser.formatter_class = RawDescriptionHelpFormatter
     parser.description = (
-        "Go through every byte of a bag and tell whether it is complete: checksums, index and counts\n"
-        "against the file, metadata.yaml against both, schemas, stamps against the loss ledger, messages\n"
-        "published against messages recorded, and whether the run was finished."
+        "Read every byte of a bag and check whether it is complete: checksums, index and counts against\n"
+        "the file, metadata.yaml against both, schemas, stamps against the loss ledger, messages published\n"
+        "against messages recorded, and whether the run was finished."
     )
-    parser.epilog = "exit codes: 0 complete; 3 something is damaged or missing; 1 it is no bag"
+    parser.epilog = "exit codes: 0 complete; 3 damaged or incomplete; 1 not a bag"
     parser.add_argument("bag", type=Path, metavar="BAG", help="run folder, bag folder or .mcap file")
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
 
@@ -54,7 +54,7 @@ def _values(result: CheckResult) -> dict[str, object]:
 
 
 def _text(result: CheckResult) -> str:
-    """Return a result in words."""
+    """Return a result as text."""
     width = max(map(len, _MARKS.values()))
     lines = [f"{_MARKS[finding.severity]:<{width}}  {finding.text}" for finding in result.findings]
     count, number = sum(result.counts.values()), len(result.counts)

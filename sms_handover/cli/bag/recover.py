@@ -1,4 +1,4 @@
-"""``sms-handover bag recover``: make a whole bag of a truncated or damaged one."""
+"""``sms-handover bag recover``: recover a truncated or damaged bag."""
 
 import json
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
@@ -12,19 +12,19 @@ from sms_handover.launcher.run_folder import bag_of
 from sms_handover.terminal.progress import byte_progress
 from sms_handover.units import NS_PER_S
 
-_MOST = 20  # places of damage that are listed
+_MOST = 20  # damaged places that are listed
 _NS_PER_MS = 1e6
 
 
 def add_parser(parser: ArgumentParser) -> None:
-    """Describe the command."""
+    """Add the options."""
     parser.formatter_class = RawDescriptionHelpFormatter
     parser.description = (
-        "Write everything that can be read of a bag into a new one, with index and metadata.yaml, and tell\n"
-        "what is lost. A damaged chunk is left out and reading goes on behind it; no message is altered.\n"
-        "Attachments and records are kept, the loss ledger is made anew. The bag itself is not touched."
+        "Write everything readable of a bag to a new one, with index and metadata.yaml, and report what is\n"
+        "lost. Damaged chunks are skipped; no message is altered. Attachments and metadata records are\n"
+        "kept, the loss ledger is rebuilt. The bag itself is not changed."
     )
-    parser.epilog = "exit codes: 0 nothing in the file is lost; 3 something is; 1 nothing could be recovered"
+    parser.epilog = "exit codes: 0 nothing lost; 3 something lost; 1 nothing could be recovered"
     parser.add_argument("bag", type=Path, metavar="BAG", help="run folder, bag folder or .mcap file")
     parser.add_argument(
         "-o", "--output", type=Path, metavar="FOLDER", help="new folder (default: <bag>_recovered beside BAG)"
@@ -43,7 +43,7 @@ def command(options: Namespace) -> int:
 
 
 def _beside(path: Path) -> Path:
-    """Return the folder for the new bag if none is given."""
+    """Return the default folder of the new bag."""
     whole = path.resolve()
     return whole.with_name(f"{whole.stem if whole.is_file() else whole.name}_recovered")
 
@@ -60,7 +60,7 @@ def _values(result: Recovery) -> dict[str, object]:
 
 
 def _text(result: Recovery) -> str:
-    """Return a result in words."""
+    """Return a result as text."""
     lines = [f"lost: {damage}" for damage in result.losses[:_MOST]]
     if len(result.losses) > _MOST:
         lines.append(f"lost: {len(result.losses) - _MOST} more places")
@@ -73,15 +73,13 @@ def _text(result: Recovery) -> str:
     if result.private:
         lines.append(f"{result.private} private records are not kept")
     if result.from_cut_chunk:
-        lines.append(f"{result.from_cut_chunk} messages are out of a chunk that the end of the file cuts off")
+        lines.append(f"{result.from_cut_chunk} messages come from a chunk cut off by the end of the file")
     if result.largest_loss_ns:
         lines.append(f"largest loss: {result.largest_loss_ns / _NS_PER_MS:.3f} ms of log time")
     if not result.ends_known:
-        lines.append("the damage reaches an end of the bag; nothing tells how much was there")
+        lines.append("the damage reaches an end of the bag, so its extent is unknown")
     if not result.closed:
-        lines.append(
-            "the recording was not closed: what the recorder had not written when it ended is in no file"
-        )
+        lines.append("the recording was not closed: what the recorder had not written yet is lost")
     if result.ledger is not None:
         lines += ["", ledger_table(result.ledger), ""]
     lines.append(
@@ -92,7 +90,7 @@ def _text(result: Recovery) -> str:
 
 
 def _span(result: Recovery) -> str:
-    """Return from when to when."""
+    """Return the time span as text."""
     if result.start_ns is None or result.end_ns is None:
         return ""
     return f", log time {result.start_ns / NS_PER_S:.3f} to {result.end_ns / NS_PER_S:.3f} s,"

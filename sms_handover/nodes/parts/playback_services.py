@@ -1,4 +1,4 @@
-"""The services that control a playback, named as those of rosbag2's player."""
+"""Services that control a playback, named as those of rosbag2's player."""
 
 from collections.abc import Callable
 from time import monotonic_ns
@@ -31,13 +31,13 @@ def offer_services(node: Node, schedule: PlaybackSchedule, stop: Callable[[], No
 
 
 def _play_next(schedule: PlaybackSchedule) -> None:
-    """Have one message sent; raises ConfigurationError if that is not possible."""
+    """Send one message; raises ConfigurationError if that is not possible."""
     if not schedule.step():
-        raise ConfigurationError("only a playback that is paused, and not at its end, can step")
+        raise ConfigurationError("only a paused playback that is not at its end can play the next message")
 
 
 def _answering(act: Callable[[Any], None]) -> Callable[[Any, Any], Any]:
-    """Return the callback of a service that answers whether something could be done, and if not, why."""
+    """Return a service callback that reports success, or the reason of a failure."""
 
     def callback(request: Any, response: Any) -> Any:
         try:

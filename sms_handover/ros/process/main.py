@@ -25,6 +25,7 @@ from sms_handover.ros.process.launcher_process import (
 from sms_handover.ros.process.launcher_watch import LauncherWatch
 from sms_handover.ros.process.network_scope import apply_network_scope
 from sms_handover.ros.process.shared_memory_check import avoid_full_shared_memory
+from sms_handover.terminal.streams import make_streams_safe
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
 EXIT_LOSS = 3  # the recorder: the bag is whole, but messages are missing in it
@@ -101,6 +102,7 @@ def run_nodes(makes: Sequence[Callable[[], RunnableNode]], arguments: list[str],
     The loop is that of the first node. ``name`` precedes an error as long as there is no node. The executor
     is only used with a timeout: without one, EventsExecutor does not return in the wheels of rclpy 7.1.
     """
+    make_streams_safe()
     stop = Stop()
     atexit.register(_leave)
     nodes: list[RunnableNode] = []
