@@ -1,4 +1,4 @@
-"""The interface of a control law."""
+"""Base class of the control laws."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -21,16 +21,16 @@ class LinearFeedback:
 class ControlLaw(ABC, Generic[G]):
     """A joint-space law with gains of type ``G``: efforts from the state and the desired motion, e = q - q_d.
 
-    A law keeps no clock and does no I/O. It limits its efforts to what the joints can give.
+    A law keeps no clock, does no I/O, and limits its efforts to what the joints can give.
     """
 
     @abstractmethod
     def reset(self) -> None:
-        """Forget everything since the start of the run."""
+        """Return to the state at the start of a run."""
 
     @abstractmethod
     def use(self, gains: G) -> None:
-        """Go on with other gains, without a jump that the new gains do not ask for."""
+        """Switch to other gains without a jump that the new gains do not ask for."""
 
     @abstractmethod
     def effort(self, q: Array, v: Array, desired: Array, dt: float) -> Array:

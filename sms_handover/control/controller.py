@@ -15,7 +15,7 @@ from sms_handover.control.stability import LoopStability, loop_stability
 from sms_handover.errors import UnstableLoopError
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.types import Array, JointCommand, JointReference, PhaseState, RobotState, TaskPhase, frozen
+from sms_handover.types import Array, JointReference, PhaseState, TaskPhase, frozen
 from sms_handover.units import ns_to_seconds
 
 Gains = NmpcGains | PidGains
@@ -33,12 +33,11 @@ class JointController:
         longest_ns: int | None = None,
         efforts: TrackingEfforts | None = None,
     ) -> None:
-        """Set up the law of the gains' kind, and check every gain set at the start configuration.
+        """Make the law of the gains and check every gain set at the start configuration.
 
-        ``gains_by_phase`` has one entry per phase of the schedule, all of one kind;
-        ``base_configuration`` is q (7 + n,) at the start. A reference older than ``longest_ns`` is no
-        longer carried on: the desired joints stand still. A law of computed torque has its
-        equation worked out by ``efforts``, by default by Pinocchio. Raises UnstableLoopError.
+        ``gains_by_phase`` has one entry per phase of the schedule, all of one law; ``base_configuration`` is
+        q (7 + n,) at the start. The desired motion stops at an age of ``longest_ns`` of its reference.
+        ``efforts`` computes the torque of NMPC, by default with Pinocchio. Raises UnstableLoopError.
         """
         self._robot = robot
         self._efforts = efforts
@@ -50,25 +49,25 @@ class JointController:
         check_stability(robot, self._gains_by_phase, self._dt, base_configuration)
 
     def reset(self) -> None:
-        """Go back to the start of the run."""
+        """Return to the start of a run."""
         self._law = make_law(self._robot, self._gains_by_phase[0], self._efforts)
         self._track.reset()
         self._entry = (0, 1, PhaseState.ACTIVE)
 
     def guide(self, guidance: Guidance) -> None:
-        """Take over the gains of the phase and the joint reference; these laws follow joints, not tools."""
+        """Use the gains of the phase and track the joint reference; tool targets are not used."""
         self.enter(guidance.phase)
         self.track(guidance.reference)
 
     def enter(self, phase: TaskPhase) -> None:
-        """Take over the gains of a phase, if it begins, begins again or is given up."""
+        """Switch to the gains of a phase where it begins, is repeated or fails."""
         if phase.entry != self._entry:
             self._entry = phase.entry
             self._law.use(self._gains_by_phase[phase.index])
             self._track.restart()
 
     def track(self, reference: JointReference) -> None:
-        """Take the next joint reference."""
+        """Track the next joint reference."""
         self._track.update(reference)
 
     @property
@@ -76,12 +75,8 @@ class JointController:
         """Return the stamp of the last reference, 0 before the first."""
         return self._track.stamp_ns
 
-    def step(self, state: RobotState) -> JointCommand:
-        """Return the command that answers a state; zero efforts until a first reference has come."""
-        return JointCommand(state.stamp_ns, self.effort(state.stamp_ns, state.q, state.v))
-
     def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
-        """Return the efforts (n,) of that command, read-only, for a state as bare arrays."""
+        """Return the efforts (n,) N m for a state, read-only; zero until a first reference has come."""
         if not self._track.ready:
             return frozen(np.zeros(self._robot.n_joints))
         return frozen(self._law.effort(q, v, self._track.at(stamp_ns), self._dt))
@@ -103,7 +98,7 @@ def check_stability(
 ) -> tuple[LoopStability, ...]:
     """Return the stability of the sampled loop of each gain set at rest in q (7 + n,).
 
-    Raises UnstableLoopError if one diverges; ``where`` says in its text what q is.
+    Raises UnstableLoopError if one diverges; ``where`` names q in its text.
     """
     inertia = reduced_dynamics(robot, q, np.zeros(robot.pin.nv)).inertia
     found = []
@@ -113,7 +108,7 @@ def check_stability(
         if not stability.stable:
             raise UnstableLoopError(
                 f"the loop of {gains} at a tick of {dt:g} s is unstable {where}: "
-                f"spectral radius {stability.spectral_radius:.6f}, allowed is below 1, "
+                f"spectral radius {stability.spectral_radius:.6f}, must be < 1, "
                 f"first at {stability.joint}; use a shorter tick or smaller gains"
             )
         found.append(stability)

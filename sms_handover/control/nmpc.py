@@ -1,4 +1,4 @@
-"""Closed-form nonlinear model predictive control of the reduced dynamics."""
+"""NMPC: closed-form nonlinear model predictive control of the reduced dynamics."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ MAX_CONTROL_ORDER = 3
 
 @dataclass(frozen=True)
 class NmpcGains:
-    """What shapes the law: how far it looks ahead and how many derivatives of the input it plans."""
+    """Prediction horizon and order of the input."""
 
     rolling_period: float = parameter("prediction horizon T_r", unit="s", minimum=1e-3)
     control_order: int = parameter(
@@ -43,21 +43,20 @@ class NmpcLaw(ControlLaw[NmpcGains]):
     """
 
     def __init__(self, robot: RobotModel, gains: NmpcGains, efforts: TrackingEfforts | None = None) -> None:
-        """Set up the law for a robot; ``efforts`` works its equation out, by default Pinocchio does."""
         self._robot = robot
         self._efforts = efforts or ComputedTorque(robot)
         self.use(gains)
 
     def reset(self) -> None:
-        """Do nothing: the law has no memory."""
+        """Do nothing: the law has no state."""
 
     def use(self, gains: NmpcGains) -> None:
-        """Go on with other gains."""
+        """Switch to other gains."""
         self._gains = gains
         self._feedback = np.array([gains.position_gain, gains.velocity_gain])
 
     def effort(self, q: Array, v: Array, desired: Array, dt: float) -> Array:
-        """Return the joint efforts (n,) N m, limited to what the joints can give; ``dt`` plays no part."""
+        """Return the joint efforts (n,) N m, limited to what the joints can give; ``dt`` is unused."""
         return self._robot.limited(self._efforts(q, v, desired, self._feedback))
 
     def linearised(self, inertia: Array) -> LinearFeedback:

@@ -1,4 +1,4 @@
-"""Proportional-integral-derivative control of every joint, with anti-windup."""
+"""PID: proportional-integral-derivative control of every joint, with anti-windup."""
 
 from dataclasses import dataclass
 
@@ -27,17 +27,16 @@ class PidLaw(ControlLaw[PidGains]):
     """
 
     def __init__(self, robot: RobotModel, gains: PidGains) -> None:
-        """Set up the law for a robot, with an empty integral."""
         self._robot = robot
         self._gains = gains
         self.reset()
 
     def reset(self) -> None:
-        """Empty the integral."""
+        """Clear the integral."""
         self._integral = np.zeros(self._robot.n_joints)  # [rad s]
 
     def use(self, gains: PidGains) -> None:
-        """Go on with other gains; the integral effort K_I z carries over without a jump."""
+        """Switch to other gains; the integral effort K_I z does not jump."""
         if gains.integral > 0:
             self._integral *= self._gains.integral / gains.integral
         self._gains = gains

@@ -1,4 +1,4 @@
-"""The desired motion between two references, which come less often than ticks."""
+"""Reference track: the desired motion between two joint references."""
 
 import numpy as np
 
@@ -7,21 +7,20 @@ from sms_handover.units import ns_to_seconds
 
 
 class ReferenceTrack:
-    """Carries the last reference forward: q_d + q_d' s + q_d'' s^2 / 2 after s seconds.
+    """Extrapolates the last reference: q_d + q_d' s + q_d'' s^2 / 2 after s seconds.
 
     The acceleration is the difference quotient of the last two reference velocities, so it is zero
-    for targets that stand still and lags by one reference period for those that move. Beyond an age of
-    ``longest_ns`` the desired joints stand still where they have come to by then.
+    for targets at rest and lags by one reference period otherwise. Beyond an age of ``longest_ns`` the
+    desired joints stop where they are by then.
     """
 
     def __init__(self, longest_ns: int | None = None) -> None:
-        """Start without a reference; without ``longest_ns`` the last one is carried on for ever."""
         self._longest_ns = longest_ns
         self.reset()
 
     @property
     def ready(self) -> bool:
-        """Whether a reference has come."""
+        """Whether there is a reference."""
         return self._last is not None
 
     @property
@@ -30,18 +29,18 @@ class ReferenceTrack:
         return self._last.stamp_ns if self._last else 0
 
     def reset(self) -> None:
-        """Forget every reference."""
+        """Discard every reference."""
         self._last: JointReference | None = None
         self._motion: Array = np.zeros((3, 0))  # rows q_d, q_d', q_d'' at the last reference
         self._forward = np.eye(3)  # takes these rows to a later time
         self._broken = False
 
     def restart(self) -> None:
-        """Take no difference across this instant, as at a new phase where the desired velocity jumps."""
+        """Take no velocity difference across this instant: at a new phase the desired velocity jumps."""
         self._broken = True
 
     def update(self, reference: JointReference) -> None:
-        """Take the next reference."""
+        """Track the next reference."""
         previous = self._last
         motion = np.zeros((3, reference.position.size))
         motion[0], motion[1] = reference.position, reference.velocity

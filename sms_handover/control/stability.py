@@ -1,4 +1,4 @@
-"""Whether gains and tick can be stable together, computed before anything moves."""
+"""Stability of the sampled loop: whether gains and tick can work together."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 from sms_handover.control.base import LinearFeedback
 from sms_handover.types import Array
 
-ROUNDING = 1e-9  # [-] eigenvalues of the sampled loop are not known better than this
+ROUNDING = 1e-9  # [-] accuracy of the eigenvalues of the sampled loop
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ def sampled_loop(inertia: Array, feedback: LinearFeedback, dt: float) -> Array:
 
     The arms are linearised at rest, e'' = H*^-1 u, which a zero-order hold samples exactly:
     e+ = e + e' dt + H*^-1 u dt^2/2, e'+ = e' + H*^-1 u dt, z+ = z + e dt. Without integral action
-    z is left out, because it would only add eigenvalues of one.
+    z is omitted: it would only add eigenvalues of one.
     """
     n = inertia.shape[0]
     has_integral = bool(np.any(feedback.integral))

@@ -1,4 +1,4 @@
-"""The deputy: a CubeSat that floats or is held by one arm, and the rule by which a grasp holds."""
+"""The deputy: a CubeSat that floats or is held by one arm, and the tolerances of a grasp."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from sms_handover.types import Array, DeputyState, Pose, Twist
 
 @dataclass(frozen=True)
 class GraspTolerance:
-    """How far a tool may be from a grasp frame when it closes: m, rad, m/s."""
+    """The largest errors at which a grasp holds: m, rad, m/s."""
 
     position: float
     angle: float
@@ -21,14 +21,14 @@ class GraspTolerance:
 
 @dataclass(frozen=True)
 class GraspErrors:
-    """How far the tool was from the grasp frame: m, rad, m/s."""
+    """Errors of the tool with respect to the grasp frame: m, rad, m/s."""
 
     position: float
     angle: float
     speed: float
 
     def within(self, tolerance: GraspTolerance) -> bool:
-        """Whether every error is inside its tolerance."""
+        """Whether every error is within its tolerance."""
         return (
             self.position <= tolerance.position
             and self.angle <= tolerance.angle
@@ -39,13 +39,11 @@ class GraspErrors:
 class MasslessDeputy:
     """A rigid deputy whose mass is neglected: held, it moves with the tool; free, it drifts.
 
-    Free motion keeps the twist it had when let go: constant velocity of its origin and constant
-    angular velocity. A grasp keeps the relative pose of tool and deputy of that instant, so a
-    position error of the grasp is carried on and nothing jumps.
+    Free motion keeps the twist at release: constant velocity of the origin and constant angular velocity. A
+    grasp freezes the relative pose of tool and deputy, so its position error persists and nothing jumps.
     """
 
     def __init__(self, deputy_in_world: Pose, grasp_frames: Mapping[str, Pose]) -> None:
-        """Start at rest at a pose, with the grasp frames as poses in the deputy."""
         self._grasp_frames = {name: se3_of(pose) for name, pose in grasp_frames.items()}
         self._place(se3_of(deputy_in_world), Twist(np.zeros(3), np.zeros(3)))
         self._holder = ""
@@ -62,7 +60,7 @@ class MasslessDeputy:
         return self._holder
 
     def errors_of(self, grasp_frame: str, tool_in_world: Pose, tool_twist_in_world: Twist) -> GraspErrors:
-        """Return how far a tool is from a grasp frame; the speed is that of the two origins."""
+        """Return the errors of a tool with respect to a grasp frame; the speed is between the two origins."""
         deputy = self._pose()
         frame = deputy * self._grasp_frames[grasp_frame]
         position, angle = pose_distance(pose_of(frame), tool_in_world)
@@ -72,12 +70,12 @@ class MasslessDeputy:
         return GraspErrors(position, angle, speed)
 
     def attach(self, arm: str, tool_in_world: Pose) -> None:
-        """Fix the deputy to a tool at their present relative pose."""
+        """Attach the deputy to a tool at their present relative pose."""
         self._holder = arm
         self._deputy_in_tool = se3_of(tool_in_world).actInv(self._pose())
 
     def detach(self) -> None:
-        """Let the deputy float with the twist it has."""
+        """Release the deputy: it drifts with its present twist."""
         self._holder = ""
 
     def follow(self, tool_in_world: Pose, tool_twist_in_world: Twist) -> None:
@@ -106,6 +104,6 @@ class MasslessDeputy:
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """Return a x b; NumPy's own is for any axes of any arrays and takes twenty times as long."""
+    """Return a x b; ``np.cross`` takes twenty times as long."""
     (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])

@@ -15,11 +15,10 @@ Acceleration = Callable[[Array, Array], Array]
 
 @dataclass(frozen=True)
 class Tableau:
-    """Butcher tableau of an explicit scheme, with the motions that its configurations are composed of.
+    """Butcher tableau of an explicit scheme, and the motions that compose its configurations.
 
-    ``a`` has strictly lower rows. The configuration of stage i sets out from that of stage ``origins[i]``.
-    A step is a sequence of motions, whose weights are the rows of ``b``; they add up to the weights
-    of the scheme.
+    ``a`` has strictly lower rows. The configuration of stage i starts from that of stage ``origins[i]``. A
+    step is a sequence of motions; their weights, the rows of ``b``, add up to those of the scheme.
     """
 
     order: int
@@ -61,13 +60,12 @@ class LieGroupIntegrator:
         q_i = q_o (+) h sum_j (a_ij - a_oj) v_j,    v_i = v + h sum_j a_ij a_j,    o the origin of stage i
         q_next = q (+) h sum_j b_1j v_j (+) h sum_j b_2j v_j ...,    v_next = v + h sum_rj b_rj a_j
 
-    Every sum is a combination of v and the a_j, so its weights are worked out once and a stage costs one
-    product of a small matrix with the rows (v, a_1, a_2, ...). The joints, for which (+) is a sum, follow the
-    classical scheme. An instance owns work space, so it is not to be shared between threads.
+    Every sum combines v and the a_j with weights computed once, so a stage costs one product of a small
+    matrix with the rows (v, a_1, a_2, ...). Joints, where (+) is a sum, follow the classical scheme. Not
+    thread-safe.
     """
 
     def __init__(self, model: pin.Model, tableau: Tableau, h: float) -> None:
-        """Work out the weights of a step of ``h`` s."""
         self._model = model
         count = len(tableau.a)
         a = np.array([[*row, *[0.0] * (count - len(row))] for row in tableau.a])
@@ -86,8 +84,8 @@ class LieGroupIntegrator:
     def step(self, acceleration: Acceleration, q: Array, v: Array) -> tuple[Array, Array]:
         """Return configuration (7 + n,) and velocity (6 + n,) after one step, as read-only arrays.
 
-        ``acceleration`` is asked for with the base set out from the origin: in free space it does not
-        depend on where the base is, and there its rounding is least.
+        ``acceleration`` is evaluated with the base at the origin: in free space it does not depend on
+        the base position, and rounding is smallest there.
         """
         model, rows = self._model, self._rows
         start = q.copy()
@@ -106,7 +104,7 @@ class LieGroupIntegrator:
         return frozen(q), frozen(v + self._increment)
 
     def _stage(self, index: int, origin: int, motion_weights: Array, a: Array, h: float) -> _Stage:
-        """Return a stage with its weights and its places in the work space."""
+        """Return a stage with its weights and its views of the work space."""
         used = index + 1
         weights = np.array(
             [_of_velocities(motion_weights, a, h)[:used], np.concatenate([[1.0], h * a[index]])[:used]]

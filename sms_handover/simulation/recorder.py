@@ -1,4 +1,4 @@
-"""Collects the rows of a run while it happens and gives them back as arrays."""
+"""Run recorder: collects the rows of a run and returns them as arrays."""
 
 from collections.abc import Iterable, Mapping
 from typing import TypeVar
@@ -41,7 +41,7 @@ class RunRecorder:
         self._reference = np.full((2, periods, n), np.nan)  # position, velocity
         self._poses = np.full((2, len(arms), periods, 7), np.nan)  # target, tool
         self._deputy = np.full((periods, 7), np.nan)
-        self._receipts = np.full((periods, 8), np.nan)  # momenta, kinetic energy, work
+        self._conserved = np.full((periods, 8), np.nan)  # momenta, kinetic energy, work
         self._ik_status = np.full(periods, -1, dtype=np.int64)
         self._phases: list[TaskPhase] = []
         self._events: list[GraspEvent] = []
@@ -50,15 +50,15 @@ class RunRecorder:
         self._period = 0
 
     def make_room(self, ticks: int, periods: int) -> None:
-        """Make room for as many states and references in all, if there is less."""
+        """Grow to at least ``ticks`` states and ``periods`` references."""
         for name in ("_tick_ns", "_q", "_v", "_effort", "_command"):
             setattr(self, name, _longer(getattr(self, name), ticks, 0))
-        for name in ("_reference_ns", "_deputy", "_receipts", "_ik_status"):
+        for name in ("_reference_ns", "_deputy", "_conserved", "_ik_status"):
             setattr(self, name, _longer(getattr(self, name), periods, 0))
         self._reference, self._poses = _longer(self._reference, periods, 1), _longer(self._poses, periods, 2)
 
     def tick(self, stamp_ns: int, q: Array, v: Array, effort: Array, command: Array) -> None:
-        """Add the row of one tick: state, the efforts (n,) that led to it, and those that answer it."""
+        """Add one tick: state, the efforts (n,) that led to it, and the command (n,) that answers it."""
         k = self._tick
         self._tick_ns[k] = stamp_ns
         self._q[k] = q
@@ -74,7 +74,7 @@ class RunRecorder:
         targets_in_world: Mapping[str, Pose],
         ik: IkStatus | None,
     ) -> None:
-        """Add what the trajectory gave in one reference period; :meth:`plant` completes the row."""
+        """Add the output of the trajectory in one reference period; :meth:`plant` completes the row."""
         row = self._period
         self._reference_ns[row] = reference.stamp_ns
         self._reference[0, row] = reference.position
@@ -90,29 +90,29 @@ class RunRecorder:
         self,
         tools_in_world: Mapping[str, Pose],
         deputy_in_world: Pose,
-        receipt: ConservedQuantities,
+        conserved: ConservedQuantities,
         work: float,
     ) -> None:
-        """Add what the plant gave in one reference period, before :meth:`reference`."""
+        """Add the output of the plant in one reference period, before :meth:`reference`."""
         row = self._period
         for index, arm in enumerate(self._arms):
             _put(tools_in_world[arm], self._poses[1, index, row])
         _put(deputy_in_world, self._deputy[row])
-        receipts = self._receipts[row]
-        receipts[:3] = receipt.linear_momentum
-        receipts[3:6] = receipt.angular_momentum
-        receipts[6:] = receipt.kinetic_energy, work
+        row_of = self._conserved[row]
+        row_of[:3] = conserved.linear_momentum
+        row_of[3:6] = conserved.angular_momentum
+        row_of[6:] = conserved.kinetic_energy, work
 
     def events(self, events: Iterable[GraspEvent]) -> None:
         """Add grasp events."""
         self._events.extend(events)
 
     def decisions(self, events: Iterable[RunEvent]) -> None:
-        """Add what has been decided about the task."""
+        """Add decisions about the task."""
         self._decisions.extend(events)
 
     def data(self) -> RunData:
-        """Return what has been collected so far."""
+        """Return the run so far."""
         ticks, periods = slice(self._tick), slice(self._period)
 
         def per_arm(kind: int) -> dict[str, Array]:
@@ -134,10 +134,10 @@ class RunRecorder:
             target_pose=per_arm(0),
             tool_pose=per_arm(1),
             deputy_pose=self._deputy[periods].copy(),
-            linear_momentum=self._receipts[periods, :3].copy(),
-            angular_momentum=self._receipts[periods, 3:6].copy(),
-            kinetic_energy=self._receipts[periods, 6].copy(),
-            work=self._receipts[periods, 7].copy(),
+            linear_momentum=self._conserved[periods, :3].copy(),
+            angular_momentum=self._conserved[periods, 3:6].copy(),
+            kinetic_energy=self._conserved[periods, 6].copy(),
+            work=self._conserved[periods, 7].copy(),
             ik_status=self._ik_status[periods].copy(),
             phases=tuple(self._phases),
             grasp_events=tuple(self._events),

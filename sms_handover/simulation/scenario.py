@@ -1,4 +1,4 @@
-"""A scenario: everything a run is made of, read from files and checked before anything moves."""
+"""A scenario: parameters, robot and schedule of a run, read from files and checked."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -23,16 +23,16 @@ from sms_handover.trajectory.schedule import Schedule
 T = TypeVar("T")
 
 _SECTIONS = (EVERY_NODE, *NODES, PLAYER, TOPIC_RECORDER, VIEWER)  # of parameter files
-_SLIP = 0.8  # [-] likeness of names, from difflib, from which on one is a slip of the pen
+_SLIP = 0.8  # [-] similarity of names, by difflib, from which one is a misspelling
 
-COMMON = "common"  # prefix of an override that holds for every node
+COMMON = "common"  # prefix of an override for every node
 
 Overrides = Mapping[str, Mapping[str, object]]
 
 
 @dataclass(frozen=True)
 class ParameterSet:
-    """The parameters of every node that takes part in the loop."""
+    """Parameters of the nodes of the loop."""
 
     common: CommonParameters
     plant: PlantParameters
@@ -52,7 +52,7 @@ class Scenario:
 
 
 def load_parameters(overrides: Overrides | None = None, files: Sequence[Path] = ()) -> ParameterSet:
-    """Return the shipped parameters with those of ``files`` and then ``overrides`` on top.
+    """Return the default parameters, overridden by ``files`` and then by ``overrides``.
 
     ``overrides`` maps a node name, or ``common``, to parameters. Raises ConfigurationError.
     """
@@ -66,7 +66,7 @@ def load_parameters(overrides: Overrides | None = None, files: Sequence[Path] = 
         _reject_misspelt(path)
 
     def group(cls: type[T], node: str, section: str, external: Sequence[str] = ()) -> T:
-        if node in external:  # what is given is for a node that we know nothing of
+        if node in external:  # overrides are for a node that we do not know
             return build(cls, read_parameter_files([config_file(f"{node}.yaml")], section), node)
         values = read_parameter_files([config_file(f"{node}.yaml"), *files], section)
         given = overrides.get(node, {})
@@ -84,9 +84,9 @@ def load_parameters(overrides: Overrides | None = None, files: Sequence[Path] = 
 
 
 def _reject_misspelt(path: Path) -> None:
-    """Raise UnknownNameError on a section of a parameter file that nearly has the name of a node.
+    """Raise UnknownNameError on a section of a parameter file whose name resembles that of a node.
 
-    A file may have sections for nodes of others, so only what looks like a slip is refused.
+    A file may have sections for other nodes, so only what looks misspelt is rejected.
     """
     document = read_yaml(path)
     for section in map(str, document):
@@ -95,7 +95,7 @@ def _reject_misspelt(path: Path) -> None:
 
 
 def load_scenario(overrides: Overrides | None = None, files: Sequence[Path] = ()) -> Scenario:
-    """Return the scenario that parameters, robot description and schedule make, all checked."""
+    """Return the scenario of parameters, robot description and schedule, all checked."""
     parameters = load_parameters(overrides, files)
     robot = load_robot_model(parameters.common)
     schedule = load_task(parameters.common, robot)
@@ -103,11 +103,11 @@ def load_scenario(overrides: Overrides | None = None, files: Sequence[Path] = ()
 
 
 def load_robot_model(common: CommonParameters) -> RobotModel:
-    """Return the model of the robot that the parameters name."""
+    """Return the model of the robot named by the parameters."""
     return RobotModel.load(Path(common.robot) if common.robot else None)
 
 
 def load_task(common: CommonParameters, robot: RobotModel) -> Schedule:
-    """Return the schedule that the parameters name, checked against the robot."""
+    """Return the schedule named by the parameters, checked against the robot."""
     path = Path(common.schedule) if common.schedule else config_file("handover.yaml")
     return load_schedule(path, robot, common.reference_ns)

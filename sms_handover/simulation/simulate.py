@@ -1,4 +1,4 @@
-"""The loop in one process: the same objects as in the graph, joined by plain calls."""
+"""Simulate a scenario in one process: the same objects as in the graph, joined by plain calls."""
 
 from collections.abc import Callable
 
@@ -23,15 +23,14 @@ def simulate(
     controller: Controller | None = None,
     progress: Progress | None = None,
 ) -> RunData:
-    """Return the run of a scenario, by default the shipped one over its whole schedule.
+    """Return the run of a scenario, by default the shipped one.
 
-    Per tick: the plant gives its state; each reference period the trajectory generator gives phase,
-    targets and, through inverse kinematics, the joint reference; the controller answers; the plant
-    carries out grasp commands and integrates. The last state is answered too, but not integrated. What
-    came of a grasp or of inverse kinematics the generator takes into account in the next period.
-    ``controller`` takes the place of the one that the scenario names; it is reset first. ``progress`` is
-    called with the time in ns and the phase each reference period. Raises ControllerError if efforts of a
-    controller are no numbers, and ConfigurationError if the scenario's is external and none is given.
+    Per tick: the plant publishes its state; each reference period the trajectory generator gives phase,
+    targets and, by inverse kinematics, the joint reference; the controller answers; the plant executes grasp
+    commands and integrates. The last state is answered, but not integrated. Results of grasps and inverse
+    kinematics reach the generator in the next period. ``controller`` replaces that of the scenario and is
+    reset first. ``progress`` is called each reference period with the time in ns and the phase. Raises
+    ControllerError unless efforts are finite, and ConfigurationError for an external controller not given.
     """
     scenario = scenario or load_scenario()
     parameters, robot, schedule = scenario.parameters, scenario.robot, scenario.schedule
@@ -53,7 +52,7 @@ def simulate(
         if tick % per_reference == 0:
             state = plant.state
             deputy = plant.deputy
-            recorder.plant(plant.tools_in_world, deputy.deputy_in_world, plant.receipt, plant.work)
+            recorder.plant(plant.tools_in_world, deputy.deputy_in_world, plant.conserved, plant.work)
             phase, targets = generator.targets(state, deputy.deputy_in_world)
             request = generator.ik_request(state, targets)
             solution = find_joints(robot, request, parameters.ik) if request.tool_in_world else None
@@ -81,9 +80,9 @@ def simulate(
 
 
 def _require_ours(common: CommonParameters) -> None:
-    """Raise ConfigurationError if the controller of a scenario is none of this package."""
+    """Raise ConfigurationError if the controller of the scenario is external."""
     if CONTROLLER in common.external:
         raise ConfigurationError(
-            "the controller is external, and one process has no other: give simulate() a controller, "
+            "the controller is external: pass one to simulate(), "
             "or check a recording with 'sms-handover play --closed-loop'"
         )

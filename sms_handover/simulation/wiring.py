@@ -1,4 +1,4 @@
-"""Making the parts of the loop from a scenario; the nodes and the in-process loop share this."""
+"""Wiring: makes plant and controller of a scenario, for nodes and for one process alike."""
 
 import numpy as np
 
@@ -43,18 +43,18 @@ def make_plant(
 
 
 def make_stepper(robot: RobotModel, dynamics: str, tableau: Tableau, h: float) -> Stepper:
-    """Return what advances the robot by steps of ``h`` s; raises ConfigurationError."""
+    """Return the stepper for steps of ``h`` s; raises ConfigurationError."""
     kind = CompiledStepper if dynamics == COMPILED else PinocchioStepper
     return kind(robot, tableau, h)
 
 
 def make_efforts(robot: RobotModel, dynamics: str) -> TrackingEfforts:
-    """Return what works out computed torque; raises ConfigurationError."""
+    """Return the computed torque of a robot; raises ConfigurationError."""
     return CompiledComputedTorque(robot) if dynamics == COMPILED else ComputedTorque(robot)
 
 
 def gains_by_phase(schedule: Schedule, parameters: ControllerParameters) -> tuple[Gains, ...]:
-    """Return the gains of the chosen law for every phase; a phase changes only what it names."""
+    """Return the gains of the law for every phase; a phase overrides only the gains it names."""
     found = []
     for phase in schedule.phases:
         where = f"gains of phase {phase.name!r}"
@@ -68,10 +68,7 @@ def gains_by_phase(schedule: Schedule, parameters: ControllerParameters) -> tupl
 def make_controller(
     robot: RobotModel, schedule: Schedule, common: CommonParameters, parameters: ControllerParameters
 ) -> JointController:
-    """Return the controller, its gains checked for stability at the start of the schedule.
-
-    Raises ConfigurationError.
-    """
+    """Return the controller, with gains stable at the start; raises ConfigurationError."""
     start = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
     longest_ns = longest_reference_ns(common, parameters)
     gains = gains_by_phase(schedule, parameters)
@@ -80,5 +77,5 @@ def make_controller(
 
 
 def longest_reference_ns(common: CommonParameters, parameters: ControllerParameters) -> int:
-    """Return the age in ns up to which the controller carries a reference on."""
+    """Return the age in ns up to which the controller extrapolates a reference."""
     return common.reference_ns + seconds_to_ns(parameters.reference_hold)

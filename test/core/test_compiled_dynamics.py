@@ -202,7 +202,7 @@ def test_a_library_of_another_robot_is_not_used(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(dynamics, "library_of", remember)
     CompiledComputedTorque(wrong)
-    with pytest.raises(ConfigurationError, match=r"torque-\w+\.so are off Pinocchio's by .*: remove"):
+    with pytest.raises(ConfigurationError, match=r"torque-\w+\.so differ from Pinocchio by .*: remove"):
         CompiledComputedTorque(RobotModel.load())
 
 
@@ -261,7 +261,7 @@ def test_a_folder_that_others_can_write_to_is_not_used(
     folder = tmp_path / "sms_handover"
     folder.mkdir()
     folder.chmod(0o777)
-    with pytest.raises(ConfigurationError, match=r"has mode drwxrwxrwx: .* allowed is a folder of your own"):
+    with pytest.raises(ConfigurationError, match=r"has mode drwxrwxrwx: .* it must be yours"):
         CompiledComputedTorque(robot)
 
 

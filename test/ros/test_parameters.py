@@ -136,7 +136,7 @@ def test_bad_common_values_are_refused(bench: Bench, values: dict[str, object]) 
 def test_values_that_do_not_fit_each_other_are_refused(bench: Bench) -> None:
     bench.start({"common": {"tick": 0.003}})
     with pytest.raises(
-        ConfigurationError, match=r"reference_period is 0.02 s, allowed is a multiple of the tick"
+        ConfigurationError, match=r"reference_period is 0.02 s, must be a multiple of the tick"
     ):
         declare(node_of(bench), CommonParameters, "common.yaml", EVERY_NODE)
 
