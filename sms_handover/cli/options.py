@@ -11,7 +11,6 @@ from sms_handover.bag.parameters import RecorderParameters
 from sms_handover.configuration import yaml_reader as yaml_files
 from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.parameters import build, read_parameter_files
-from sms_handover.control.parameters import LAWS
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.topics import CONTROLLER, RECORDER, TRAJECTORY
 from sms_handover.simulation.parameters import DYNAMICS, MODES
@@ -24,7 +23,11 @@ Overrides = dict[str, dict[str, object]]
 def add_scenario_options(parser: ArgumentParser) -> None:
     """Add the options that choose robot, schedule, controller and parameters."""
     group = parser.add_argument_group("scenario")
-    group.add_argument("--controller", choices=LAWS, help="control law (default: nmpc)")
+    group.add_argument(
+        "--controller",
+        metavar="LAW",
+        help="control law: nmpc, pid, or one of another package (default: nmpc)",
+    )
     group.add_argument("--schedule", type=Path, metavar="FILE", help="task schedule (default: handover.yaml)")
     group.add_argument("--robot", type=Path, metavar="FILE", help="robot description (default: robot.yaml)")
     group.add_argument(

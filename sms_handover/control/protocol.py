@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -17,7 +17,7 @@ class Guidance:
     """Output of the trajectory in one reference period, all for the same instant.
 
     ``reference`` is the desired joint motion, by inverse kinematics with the base locked at its present
-    pose; ``tool_in_world`` has the target pose of every tool. A law may follow either.
+    pose; ``tool_in_world`` has the target pose of every tool, where the law declares that it needs them.
     """
 
     phase: TaskPhase
@@ -48,24 +48,39 @@ class Controller(Protocol):
         """
 
 
+@runtime_checkable
+class Resumable(Protocol):
+    """What a controller has besides, so that a run can be branched: its state as a frozen dataclass.
+
+    The fields of the state are numbers, strings, arrays, and tuples, mappings or dataclasses of such.
+    """
+
+    @property
+    def state(self) -> Any:
+        """Everything that later efforts depend on."""
+
+    def restore(self, state: Any) -> None:
+        """Go back to a former :attr:`state`."""
+
+
 class CheckedController:
     """Checks the efforts of a user's controller before they reach the plant."""
 
     def __init__(self, controller: Controller, joint_names: Sequence[str]) -> None:
-        self._controller = controller
+        self.inner = controller
         self._joint_names = tuple(joint_names)
 
     def reset(self) -> None:
         """Reset the controller."""
-        self._controller.reset()
+        self.inner.reset()
 
     def guide(self, guidance: Guidance) -> None:
         """Guide the controller."""
-        self._controller.guide(guidance)
+        self.inner.guide(guidance)
 
     def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
         """Return the efforts (n,) N m, read-only; raises ControllerError unless they are n finite numbers."""
-        effort = np.array(self._controller.effort(stamp_ns, q, v), dtype=np.float64)
+        effort = np.array(self.inner.effort(stamp_ns, q, v), dtype=np.float64)
         if effort.shape != (len(self._joint_names),):
             raise ControllerError(
                 f"the controller answered {ns_to_seconds(stamp_ns):g} s with an array of shape "

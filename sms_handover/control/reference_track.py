@@ -1,9 +1,20 @@
 """Reference track: the desired motion between two joint references."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from sms_handover.types import Array, JointReference
+from sms_handover.types import Array, JointReference, read_only
 from sms_handover.units import ns_to_seconds
+
+
+@dataclass(frozen=True, eq=False)
+class TrackState:
+    """The last reference, the desired acceleration (n,) rad/s^2, and whether the next one is zero."""
+
+    reference: JointReference | None
+    acceleration: Array
+    broken: bool
 
 
 class ReferenceTrack:
@@ -24,9 +35,17 @@ class ReferenceTrack:
         return self._last is not None
 
     @property
-    def stamp_ns(self) -> int:
-        """Return the stamp of the last reference, 0 before the first."""
-        return self._last.stamp_ns if self._last else 0
+    def state(self) -> TrackState:
+        """Everything that the desired motion depends on."""
+        return TrackState(self._last, read_only(self._motion[2]), self._broken)
+
+    def restore(self, state: TrackState) -> None:
+        """Go back to a former :attr:`state`."""
+        self.reset()
+        if state.reference:
+            self.update(state.reference)
+            self._motion[2] = state.acceleration
+        self._broken = state.broken
 
     def reset(self) -> None:
         """Discard every reference."""

@@ -9,7 +9,8 @@ from typing import TypeVar
 from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.parameters import EVERY_NODE, build, read_parameter_files, read_yaml
 from sms_handover.configuration.yaml_reader import line_in
-from sms_handover.control.parameters import ControllerParameters
+from sms_handover.control.parameters import ControllerParameters, parameters_with
+from sms_handover.control.registry import law_named
 from sms_handover.errors import UnknownNameError
 from sms_handover.graph.topics import CONTROLLER, IK, NODES, PLANT, PLAYER, TOPIC_RECORDER, TRAJECTORY, VIEWER
 from sms_handover.ik.parameters import IkParameters
@@ -65,21 +66,31 @@ def load_parameters(overrides: Overrides | None = None, files: Sequence[Path] = 
     for path in files:
         _reject_misspelt(path)
 
-    def group(cls: type[T], node: str, section: str, external: Sequence[str] = ()) -> T:
-        if node in external:  # overrides are for a node that we do not know
-            return build(cls, read_parameter_files([config_file(f"{node}.yaml")], section), node)
-        values = read_parameter_files([config_file(f"{node}.yaml"), *files], section)
-        given = overrides.get(node, {})
-        places = {name: place for name, place in values.places.items() if name not in given}
-        return build(cls, {**values, **given}, node, places)
+    def given(node: str, section: str) -> tuple[dict[str, object], dict[str, str]]:
+        values, over = (
+            read_parameter_files([config_file(f"{node}.yaml"), *files], section),
+            overrides.get(node, {}),
+        )
+        return {**values, **over}, {name: place for name, place in values.places.items() if name not in over}
+
+    def group(cls: type[T], node: str, section: str) -> T:
+        values, places = given(node, section)
+        return build(cls, values, node, places)
 
     common = group(CommonParameters, COMMON, EVERY_NODE)
+    if CONTROLLER in common.external:  # overrides are for a node that we do not know
+        shipped = read_parameter_files([config_file("controller.yaml")], CONTROLLER)
+        controller = build(ControllerParameters, shipped, CONTROLLER)
+    else:
+        values, places = given(CONTROLLER, CONTROLLER)
+        law = law_named(str(values["law"]), f"{places.get('law', CONTROLLER)}: parameter 'law'")
+        controller = build(parameters_with(law), values, CONTROLLER, places)
     return ParameterSet(
         common=common,
         plant=group(PlantParameters, PLANT, PLANT),
         trajectory=group(TrajectoryParameters, TRAJECTORY, TRAJECTORY),
         ik=group(IkParameters, IK, IK),
-        controller=group(ControllerParameters, CONTROLLER, CONTROLLER, common.external),
+        controller=controller,
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from sms_handover_interfaces.msg import RunState
 
-from sms_handover.control.controller import JointController
+from sms_handover.control.protocol import Controller, Guidance
 from sms_handover.errors import UnstableLoopError
 from sms_handover.frames import BASE, WORLD
 from sms_handover.graph.topics import (
@@ -98,7 +98,7 @@ class Rest:
         """Return the commands so far."""
         return [self._command_wire.read(data)["effort"] for data in self.commands]
 
-    def by_hand(self) -> JointController:
+    def by_hand(self) -> Controller:
         """Return the controller of the core."""
         s = self.scenario
         return make_controller(s.robot, s.schedule, s.parameters.common, s.parameters.controller)
@@ -117,18 +117,17 @@ def inputs(rest: Rest, stamp: int, seed: int) -> tuple[RobotState, JointReferenc
     return state, reference, TaskPhase(stamp, index, rest.scenario.schedule.phases[index].name)
 
 
-def effort_of(controller: JointController, state: RobotState) -> Array:
+def effort_of(controller: Controller, state: RobotState) -> Array:
     """Return what a controller answers a state."""
     return controller.effort(state.stamp_ns, state.q, state.v)
 
 
-def answered_as(rest: Rest, expected: JointController, number: int, *order: str) -> RobotState:
+def answered_as(rest: Rest, expected: Controller, number: int, *order: str) -> RobotState:
     """Send all inputs of a stamp; the command is what a controller called by hand gives, bit for bit."""
     state, reference, phase = inputs(rest, number * REFERENCE_NS, number)
     rest.send(rest.messages(state, reference, phase), *order)
     rest.wait_for(number + 1)
-    expected.enter(phase)
-    expected.track(reference)
+    expected.guide(Guidance(phase, reference, {}))
     assert rest.efforts()[-1].tobytes() == effort_of(expected, state).tobytes()
     return state
 
@@ -169,8 +168,7 @@ def test_between_references_the_state_is_enough(bench: Bench) -> None:
     expected = rest.by_hand()
     first = inputs(rest, 0, 0)
     rest.send(rest.messages(*first), *INPUTS)
-    expected.enter(first[2])
-    expected.track(first[1])
+    expected.guide(Guidance(first[2], first[1], {}))
     effort_of(expected, first[0])
     for tick, order in ((1, INPUTS[:2]), (2, INPUTS[1::-1]), (3, INPUTS[:2])):
         state, reference, phase = inputs(rest, tick * 1_000_000, tick)
@@ -191,8 +189,7 @@ def test_an_answered_stamp_is_not_answered_again(bench: Bench) -> None:
     assert rest.commands[1] == rest.commands[2]
     for stamp in sorted(set(stamps)):
         state, reference, phase = inputs(rest, stamp, stamp)
-        expected.enter(phase)
-        expected.track(reference)
+        expected.guide(Guidance(phase, reference, {}))
         wanted = effort_of(expected, state)
     assert rest.efforts()[-1].tobytes() == wanted.tobytes()
     assert rest.node.diagnostic_values()["late"] == 4
@@ -228,8 +225,7 @@ def test_in_real_time_the_last_reference_holds(bench: Bench) -> None:
     assert not np.any(rest.efforts()[0])
     effort_of(expected, state)
     rest.send(rest.messages(state, reference, phase), TASK_PHASE, JOINT_REFERENCE)
-    expected.enter(phase)
-    expected.track(reference)
+    expected.guide(Guidance(phase, reference, {}))
     for number in (1, 2, 3):
         state, reference, phase = inputs(rest, number * REFERENCE_NS, number)
         rest.send(rest.messages(state, reference, phase), *INPUTS[:2])

@@ -11,7 +11,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sms_handover.control.base import ControlLaw
 from sms_handover.control.nmpc import MAX_CONTROL_ORDER, NmpcGains, NmpcLaw
 from sms_handover.control.pid import PidGains, PidLaw
 from sms_handover.model.reduced import reduced_dynamics
@@ -32,7 +31,7 @@ _PERIODS = (0.5, 1.0, 2.0)  # [s] rolling periods
 _ORDERS = range(MAX_CONTROL_ORDER + 1)
 _PID = PidGains(2.0, 1.0, 1.5)  # the paper's
 
-Law = ControlLaw[NmpcGains] | ControlLaw[PidGains]
+Law = NmpcLaw | PidLaw
 
 
 @pytest.fixture(scope="module")
