@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from sms_handover.model.poses import pose_distance, pose_of, se3_of
-from sms_handover.types import Array, DeputyState, Pose, Twist
+from sms_handover.types import Array, DeputyState, Pose, Twist, read_only
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,25 @@ class GraspErrors:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class DeputyMotion:
+    """Free motion since the deputy was last placed, and how it is held.
+
+    Matrices are homogeneous (4, 4): ``start`` is the pose then in ``world``, ``in_tool`` that in the tool of
+    ``holder``.
+    """
+
+    start: Array
+    twist: Twist
+    drifted_s: float
+    holder: str
+    in_tool: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", read_only(self.start))
+        object.__setattr__(self, "in_tool", read_only(self.in_tool))
+
+
 class MasslessDeputy:
     """A rigid deputy whose mass is neglected: held, it moves with the tool; free, it drifts.
 
@@ -53,6 +72,18 @@ class MasslessDeputy:
     def state(self) -> DeputyState:
         """Return pose and twist in ``world`` axes, and who holds it."""
         return DeputyState(pose_of(self._pose()), self._twist, self._holder)
+
+    @property
+    def motion(self) -> DeputyMotion:
+        """Everything that its later motion depends on."""
+        start, in_tool = self._start.homogeneous, self._deputy_in_tool.homogeneous
+        return DeputyMotion(start, self._twist, self._drifted_s, self._holder, in_tool)
+
+    def restore(self, motion: DeputyMotion) -> None:
+        """Go back to a former :attr:`motion`."""
+        self._place(pin.SE3(motion.start), motion.twist)
+        self._drifted_s, self._holder = motion.drifted_s, motion.holder
+        self._deputy_in_tool = pin.SE3(motion.in_tool)
 
     @property
     def holder(self) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from sms_handover.errors import ConfigurationError
 from sms_handover.model.conserved import ConservedQuantities, conserved_quantities
 from sms_handover.model.robot_model import BASE_NQ, RobotModel
-from sms_handover.plant.deputy import MasslessDeputy
+from sms_handover.plant.deputy import DeputyMotion, MasslessDeputy
 from sms_handover.plant.grasping import execute_grasp
 from sms_handover.plant.integrators import TABLEAUS
 from sms_handover.plant.parameters import PlantParameters
@@ -34,6 +34,19 @@ class InitialState:
     joint_position: Array
     deputy_in_world: Pose
     deputy_grasp_frames: Mapping[str, Pose]
+
+
+@dataclass(frozen=True, eq=False)
+class PlantState:
+    """Everything that the later motion of a plant and its counts depend on."""
+
+    tick: int
+    q: Array
+    v: Array
+    joint_effort: Array
+    work: float
+    saturated_ticks: tuple[int, ...]
+    deputy: DeputyMotion
 
 
 class FreeFloatingPlant:
@@ -63,7 +76,7 @@ class FreeFloatingPlant:
 
     def reset(self) -> None:
         """Go back to the initial state at time zero."""
-        self._tick = 0
+        self.tick = 0  # integrated since the start
         robot, initial = self._robot, self._initial
         self.q = read_only(robot.configuration(initial.base_in_world, initial.joint_position))
         self.v = read_only(np.zeros(robot.pin.nv))
@@ -72,15 +85,27 @@ class FreeFloatingPlant:
         self._saturated_ticks = np.zeros(robot.n_joints, dtype=np.int64)
         self._deputy = MasslessDeputy(initial.deputy_in_world, initial.deputy_grasp_frames)
 
-    @property
-    def tick(self) -> int:
-        """Number of ticks integrated since the start."""
-        return self._tick
+    def snapshot(self) -> PlantState:
+        """Return the state to :meth:`restore`."""
+        counts, motion = tuple(self._saturated_ticks.tolist()), self._deputy.motion
+        return PlantState(self.tick, self.q, self.v, self.joint_effort, self._work, counts, motion)
+
+    def restore(self, state: PlantState) -> None:
+        """Go back to a former state; raises ConfigurationError if it is that of another robot."""
+        shapes = [array.shape for array in (state.q, state.v, state.joint_effort)]
+        if shapes != [self.q.shape, self.v.shape, self.joint_effort.shape]:
+            raise ConfigurationError(
+                f"the snapshot has {state.joint_effort.size} joints, must have {self.joint_effort.size}"
+            )
+        self.tick, self._work = state.tick, state.work
+        self.q, self.v, self.joint_effort = (read_only(a) for a in (state.q, state.v, state.joint_effort))
+        self._saturated_ticks = np.array(state.saturated_ticks, dtype=np.int64)
+        self._deputy.restore(state.deputy)
 
     @property
     def stamp_ns(self) -> int:
         """Simulation time in ns."""
-        return self._tick * self._tick_ns
+        return self.tick * self._tick_ns
 
     @property
     def state(self) -> RobotState:
@@ -136,7 +161,7 @@ class FreeFloatingPlant:
         q, v = self._stepper.step(before, self.v, effort)
         self._work += float(effort.dot(q[BASE_NQ:] - before[BASE_NQ:]))
         self.q, self.v, self.joint_effort = q, v, effort
-        self._tick += 1
+        self.tick += 1
         if not self._deputy.holder:
             self._deputy.drift(self._tick_s)
 

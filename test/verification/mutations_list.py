@@ -251,8 +251,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "stamp of a state off by one tick",
         "plant/free_floating",
-        "return self._tick * self._tick_ns",
-        "return (self._tick + 1) * self._tick_ns",
+        "return self.tick * self._tick_ns",
+        "return (self.tick + 1) * self._tick_ns",
         "plant",
     ),
     _core(
@@ -420,8 +420,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "gains of a phase never taken over",
         "control/controller",
-        "self._law.use(self._gains_by_phase[phase.index])",
-        "self._law.use(self._gains_by_phase[0])",
+        "self._law.use(self._gains[phase.index])",
+        "self._law.use(self._gains[0])",
         "controller",
     ),
     _core(
@@ -584,8 +584,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "command recorded as the effort that acted",
         "simulation/recorder",
-        "self._effort[k] = effort",
-        "self._effort[k] = command",
+        "effort[k] = tick.joint_effort",
+        "effort[k] = tick.effort",
         "analysis_runs",
     ),
 )
