@@ -1,6 +1,6 @@
 """Options that several commands share, and the scenario that they describe."""
 
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +11,8 @@ from sms_handover.bag.parameters import RecorderParameters
 from sms_handover.configuration import yaml_reader as yaml_files
 from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.parameters import build, read_parameter_files
-from sms_handover.errors import ConfigurationError
+from sms_handover.control.registry import require_law
+from sms_handover.errors import ConfigurationError, UnknownNameError
 from sms_handover.graph.topics import CONTROLLER, RECORDER, TRAJECTORY
 from sms_handover.simulation.parameters import DYNAMICS, MODES
 from sms_handover.simulation.scenario import COMMON, Scenario, load_scenario
@@ -25,6 +26,7 @@ def add_scenario_options(parser: ArgumentParser) -> None:
     group = parser.add_argument_group("scenario")
     group.add_argument(
         "--controller",
+        type=_law,
         metavar="LAW",
         help="control law: nmpc, pid, or one of another package (default: nmpc)",
     )
@@ -59,6 +61,15 @@ def add_scenario_options(parser: ArgumentParser) -> None:
         metavar="NODE.NAME:=VALUE",
         help="one parameter, e.g. plant.integrator:=midpoint; the node 'common' is for all of them",
     )
+
+
+def _law(name: str) -> str:
+    """Return the name of a control law; raises ArgumentTypeError."""
+    try:
+        require_law(name)
+    except UnknownNameError as error:
+        raise ArgumentTypeError(str(error)) from error
+    return name
 
 
 def overrides_of(options: Namespace) -> Overrides:

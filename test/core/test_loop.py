@@ -45,7 +45,7 @@ def test_a_run_goes_on_from_any_snapshot_in_a_fresh_process(
     Among the ticks are those at which a grasp has been commanded, but its event is not yet known.
     """
     given = {**overrides, "controller": LAWS[law]}
-    loop, ticks = Loop(load_scenario(given)), []
+    loop, ticks = Loop(load_scenario(given)), list[bytes]()
     chosen = {401, 421, *np.random.default_rng(14).choice(1_400, size=count - 2, replace=False).tolist()}
     files: dict[int, Path] = {}
     while not loop.finished:
