@@ -65,7 +65,7 @@ class CompiledComputedTorque:
         self._function = CFunction(library, _COMPUTED_TORQUE, arguments, (self._efforts,))
         q, v, wanted = _example(robot)
         desired = np.array([0.9 * q[BASE_NQ:], 0.9 * v[BASE_NV:], wanted])
-        example = (q, v, desired, np.array([2.0, 3.0]))
+        example = (q, v, desired, np.array([[2.0], [3.0]]))
         _require_equal(library, [(self(*example), ComputedTorque(robot)(*example))])
 
     def __call__(self, q: Array, v: Array, desired: Array, feedback: Array) -> Array:
@@ -73,7 +73,7 @@ class CompiledComputedTorque:
         self._q[:] = q
         self._v[:] = v
         self._desired[:] = desired
-        self._feedback[:] = feedback
+        self._feedback[:] = feedback[:, 0]
         self._function()
         efforts: Array = self._efforts.copy()
         return efforts

@@ -8,7 +8,8 @@ from sms_handover.model.reduced import reduced_inverse_dynamics
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import BASE_NQ, BASE_NV, Array
 
-# u (n,) N m of q (7 + n,), v (6 + n,), desired (3, n) with rows q_d, q_d', q_d'', and feedback (a_1, a_2)
+# u (n,) N m of q (7 + n,), v (6 + n,), desired (3, n) with rows q_d, q_d', q_d'', and feedback (2, n)
+# with rows a_1, a_2, the same for every joint
 TrackingEfforts = Callable[[Array, Array, Array, Array], Array]
 
 
@@ -27,5 +28,6 @@ class ComputedTorque:
         """Return the joint efforts (n,) N m, not limited."""
         np.subtract(q[BASE_NQ:], desired[0], out=self._error)
         np.subtract(v[BASE_NV:], desired[1], out=self._error_rate)
-        wanted = desired[2] - feedback.dot(self._errors)
+        self._errors *= feedback
+        wanted = desired[2] - self._error - self._error_rate  # in a fixed order, as every sum of the loop
         return reduced_inverse_dynamics(self._robot, q, v, wanted)

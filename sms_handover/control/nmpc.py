@@ -51,7 +51,8 @@ class NmpcLaw(JointLaw[NmpcGains]):
 
     def use(self, gains: NmpcGains) -> None:
         """Switch to other gains."""
-        self._feedback = np.array([gains.position_gain, gains.velocity_gain])
+        pair = np.array([[gains.position_gain], [gains.velocity_gain]])
+        self._feedback = np.repeat(pair, self._robot.n_joints, axis=1)
 
     def effort(self, q: Array, v: Array, desired: Array, dt: float) -> Array:
         """Return the joint efforts (n,) N m, limited to what the joints can give; ``dt`` is unused."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sms_handover.types import Array, JointReference, read_only
+from sms_handover.types import Array, JointReference, frozen, read_only
 from sms_handover.units import ns_to_seconds
 
 
@@ -29,6 +29,12 @@ class ReferenceTrack:
         self._longest_ns = longest_ns
         self.reset()
 
+    def reset(self) -> None:
+        """Discard every reference."""
+        self._last: JointReference | None = None
+        self._set(np.zeros((3, 0)))
+        self._broken = False
+
     @property
     def ready(self) -> bool:
         """Whether there is a reference."""
@@ -43,16 +49,9 @@ class ReferenceTrack:
         """Go back to a former :attr:`state`."""
         self.reset()
         if state.reference:
-            self.update(state.reference)
-            self._motion[2] = state.acceleration
-        self._broken = state.broken
-
-    def reset(self) -> None:
-        """Discard every reference."""
-        self._last: JointReference | None = None
-        self._motion: Array = np.zeros((3, 0))  # rows q_d, q_d', q_d'' at the last reference
-        self._forward = np.eye(3)  # takes these rows to a later time
-        self._broken = False
+            reference = state.reference
+            self._set(np.array([reference.position, reference.velocity, state.acceleration]))
+        self._last, self._broken = state.reference, state.broken
 
     def restart(self) -> None:
         """Take no velocity difference across this instant: at a new phase the desired velocity jumps."""
@@ -66,7 +65,7 @@ class ReferenceTrack:
         if previous is not None and not self._broken:
             period = ns_to_seconds(reference.stamp_ns - previous.stamp_ns)
             motion[2] = (reference.velocity - previous.velocity) / period
-        self._motion = motion
+        self._set(motion)
         self._last = reference
         self._broken = False
 
@@ -81,11 +80,17 @@ class ReferenceTrack:
             return stand
         return self._carried(age_ns)
 
+    def _set(self, motion: Array) -> None:
+        """Take over the rows q_d, q_d', q_d'' (3, n) at the last reference, and keep their derivatives."""
+        self._motion = frozen(motion)
+        self._first, self._second = np.zeros_like(motion), np.zeros_like(motion)
+        self._first[:2], self._second[:1] = motion[1:], motion[2:]
+        self._still = not np.any(motion[1:])
+
     def _carried(self, age_ns: int) -> Array:
-        """Return the rows of the desired motion at an age of the last reference."""
+        """Return the rows of the desired motion at an age of the last reference, summed in this order."""
+        if self._still:
+            return self._motion
         s = ns_to_seconds(age_ns)
-        forward = self._forward
-        forward[0, 1] = forward[1, 2] = s
-        forward[0, 2] = 0.5 * s * s
-        motion: Array = forward.dot(self._motion)
+        motion: Array = self._motion + s * self._first + 0.5 * s * s * self._second
         return motion

@@ -159,7 +159,8 @@ class FreeFloatingPlant:
         effort = self._limited(asked)
         before = self.q
         q, v = self._stepper.step(before, self.v, effort)
-        self._work += float(effort.dot(q[BASE_NQ:] - before[BASE_NQ:]))
+        for part in (effort * (q[BASE_NQ:] - before[BASE_NQ:])).tolist():
+            self._work += part
         self.q, self.v, self.joint_effort = q, v, effort
         self.tick += 1
         if not self._deputy.holder:
