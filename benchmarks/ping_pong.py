@@ -30,7 +30,7 @@ from sms_handover.ros.codecs.loop_messages import JointStateCodec, OdometryCodec
 from sms_handover.ros.node.endpoints import Endpoints
 from sms_handover.ros.process.network_scope import apply_network_scope
 from sms_handover.ros.transport.direct import DirectInputs
-from sms_handover.ros.transport.inputs import Deliver
+from sms_handover.ros.transport.inputs import OnSerialized
 
 _ARMS = ("arm_a", "arm_b")
 NAMES = [f"{arm}_joint_{number}" for arm in _ARMS for number in range(1, 8)]
@@ -50,7 +50,7 @@ class Side:
         self._came = dict.fromkeys(takes, -_TICK_NS)
         self._publish = [endpoints.publisher(topic).publish for topic in sends]
         for topic in takes:
-            endpoints.receive(topic, self._inputs, self._taker(topic))
+            endpoints.subscribe_serialized(topic, self._inputs, self._taker(topic))
         self._executor = EventsExecutor()
         self._executor.add_node(node)
         zeros = np.zeros(len(NAMES))
@@ -80,7 +80,7 @@ class Side:
         while min(self._came.values()) < stamp:
             self._inputs.spin_once(self._executor, _WAIT_S)
 
-    def _taker(self, topic: str) -> Deliver:
+    def _taker(self, topic: str) -> OnSerialized:
         """Return what notes the stamp of a message."""
 
         def take(data: bytes, sent_ns: int, publisher: bytes) -> None:

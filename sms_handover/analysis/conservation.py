@@ -8,6 +8,7 @@ import numpy as np
 from sms_handover.analysis.numbers import largest, lengths
 from sms_handover.analysis.phases import PhaseSpan
 from sms_handover.analysis.signals import energy_residual
+from sms_handover.graph.message_constants import CONSTANTS
 from sms_handover.run_data import RunData
 from sms_handover.types import IkStatus
 
@@ -62,7 +63,7 @@ def physics_residuals(run: RunData, phase: PhaseSpan | None = None) -> PhysicsRe
 def ik_outcomes(run: RunData, phase: PhaseSpan | None = None) -> IkOutcomes:
     """Return how the inverse-kinematics solves of a phase, or of the whole run, ended."""
     status = run.ik_status[phase.rows if phase else slice(None)]
-    of_kind = {kind: int(np.count_nonzero(status == number)) for number, kind in enumerate(IkStatus)}
+    of_kind = {kind: int(np.count_nonzero(status == CONSTANTS[kind])) for kind in IkStatus}
     solves = int(np.count_nonzero(status != _NOT_ASKED))
     return IkOutcomes(
         solves=solves,

@@ -1,1 +1,1 @@
-"""What a node of somebody else's imports to take the place of one of ours."""
+"""External nodes: what a user's node imports to take the place of one of ours."""

@@ -51,7 +51,7 @@ class OwnControllerNode(AnsweringNode[P]):
 
     @property
     def follows_tools(self) -> bool:
-        """A controller from outside may follow the tools."""
+        """True: any controller may follow the tools."""
         return True
 
     def make_controller(self, schedule: Schedule) -> Controller:

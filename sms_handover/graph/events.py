@@ -1,7 +1,7 @@
-"""What a node decides by itself and tells everybody: watchdogs, refused inputs, phases done again.
+"""Events of a run: what nodes have decided, such as watchdogs, rejected messages and retried phases.
 
-``docs/watchdogs.md`` has the kinds of events with what leads to each. A kind is a plain word, so that
-a bag with kinds of another version can be read.
+``docs/watchdogs.md`` has the kinds of events and their causes. A kind is a plain word, so that a bag with
+kinds of another version can be read.
 """
 
 from collections.abc import Iterable
@@ -14,13 +14,14 @@ from sms_handover.units import ns_to_seconds
 COMMAND_LOST, TORQUE_ZERO, COMMAND_BACK = "command_lost", "torque_zero", "command_back"
 REFERENCE_LOST, REFERENCE_BACK = "reference_lost", "reference_back"
 NO_ANSWER = "no_answer"
+RESYNCHRONISED = "resynchronised"
 GRASP_MISSED, PHASE_RETRIED, GRASP_FAILED = "grasp_missed", "phase_retried", "grasp_failed"
 IK_FAILED = "ik_failed"
 MESSAGE_REFUSED = "refused"
 
 
 class Severity(Enum):
-    """How grave an event is; the value is what a user reads."""
+    """Severity of an event; the value is what a user reads."""
 
     INFO = "info"
     WARNING = "warning"
@@ -53,7 +54,6 @@ class RunEvent:
 
     @property
     def _figures(self) -> list[tuple[str, float]]:
-        """Return the names and values of the figures that there are."""
         figures = [("value", self.value), ("limit", self.limit)]
         return [(name, value) for name, value in figures if not isnan(value)]
 

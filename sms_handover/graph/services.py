@@ -1,4 +1,4 @@
-"""The services of the nodes as data: who offers what, who calls it, and what it does.
+"""Services of the nodes as data: who offers what, who calls it, and what it does.
 
 A name with ``~/`` is private: ``~/pause`` of the node ``plant`` is ``plant/pause``.
 """
@@ -37,7 +37,7 @@ SERVICES = (
     ),
     Service("~/pause", "std_srvs/srv/SetBool", PLANT, (), "true: hold the run at this tick; false: go on"),
     Service("~/step", f"{_OURS}/StepTicks", PLANT, (), "let a plant paused in lock step do some ticks"),
-    Service("~/reset", _TRIGGER, PLANT, (), "begin the run anew at time zero"),
+    Service("~/reset", _TRIGGER, PLANT, (), "start the run again at time zero"),
     Service("~/finish", _TRIGGER, PLANT, (), "end the run at this tick, so that the recorder closes its bag"),
     Service("~/pause", _TRIGGER, PLAYER, (), "hold the playback"),
     Service("~/resume", _TRIGGER, PLAYER, (), "go on"),

@@ -1,4 +1,4 @@
-"""The topics of the graph as data: who publishes what, who needs it, and how often.
+"""Topics of the graph as data: who publishes what, who needs it, and how often.
 
 The nodes make their endpoints from this table, wait on it until everything has matched, and the
 recorder checks its counts against it. Names are relative, so a namespace moves the whole graph;
@@ -14,14 +14,10 @@ TRAJECTORY = "trajectory"
 IK = "ik"
 CONTROLLER = "controller"
 RECORDER = "recorder"
-PLAYER = "player"  # stands outside the graph: it plays what was recorded
-VIEWER = "viewer"  # stands outside the graph: it shows what goes on
-TOPIC_RECORDER = "topic_recorder"  # stands outside the graph: it records any topics
+PLAYER, VIEWER, TOPIC_RECORDER = "player", "viewer", "topic_recorder"  # outside the graph
 LOOP_NODES = (PLANT, TRAJECTORY, IK, CONTROLLER)
 NODES = (*LOOP_NODES, RECORDER)
-CONTAINER = (
-    "container"  # the process that runs all of the loop's nodes, where they have no processes of their own
-)
+CONTAINER = "container"  # the process of the nodes of the loop that have none of their own
 
 CLOCK_PERIOD_NS = 10_000_000  # [ns] of simulation time between two /clock messages
 
@@ -80,14 +76,14 @@ DEPUTY_MARKER = "deputy/marker"
 RUN_STATE = "run/state"
 RUN_READY = "run/ready"
 RUN_PUBLISHED = "run/published"
-RUN_EVENTS = "run/events"  # what nodes have decided by themselves
+RUN_EVENTS = "run/events"  # decisions of nodes
 RUN_RECORDED = "run/recorded"  # up to which stamp everything is in the bag
 LOOP_TIMING = "loop_timing"
 CLOCK = "/clock"
 DIAGNOSTICS = "/diagnostics"
 TF = "/tf"  # written into the bag by the recorder; tf2_msgs cannot be imported everywhere
 
-REFUSED_TOPIC = "/refused"  # ends the topic of a bag with what others published where one alone is to
+REFUSED_TOPIC = "/refused"  # ends the topic of a bag with what others published on a topic of one node
 
 
 def is_refused(topic: str) -> bool:

@@ -28,8 +28,8 @@ from sms_handover.model.robot_model import RobotModel
 from sms_handover.ros.codecs.convert import header
 from sms_handover.ros.codecs.loop_messages import JointStateCodec, Stamped, StateCodec, decoded
 from sms_handover.ros.node.endpoints import CountedPublisher, Endpoints
-from sms_handover.ros.node.message_filter import MessageFilter, Read
-from sms_handover.ros.transport.inputs import Deliver
+from sms_handover.ros.node.message_filter import Decode, MessageFilter
+from sms_handover.ros.transport.inputs import OnSerialized
 from sms_handover.ros.transport.stamp_sync import StampSync
 from sms_handover.units import NS_PER_S
 
@@ -72,8 +72,8 @@ class CommandReplay:
         self.refusals = MessageFilter(node.get_logger().warning, lambda topic, error: None)
         reads = dict(zip(_STATE, (self._wire.joints.checked, self._wire.odometry.checked), strict=True))
         for name, read in reads.items():
-            self._listen(name, self.refusals.guarding(name, partial(self._take, name), _as_it_came(read)))
-        self._listen(RUN_STATE, self.refusals.guarding(RUN_STATE, self._on_run_state, _run_state))
+            self._listen(name, self.refusals.wrap(name, partial(self._take, name), _as_it_came(read)))
+        self._listen(RUN_STATE, self.refusals.wrap(RUN_STATE, self._on_run_state, _run_state))
         self._matching = node.create_timer(_MATCHING_PERIOD_S, self._look_for_plant)
 
     @property
@@ -87,7 +87,7 @@ class CommandReplay:
             self._matching.cancel()
             self._ready.publish(String(data=CONTROLLER))
 
-    def _listen(self, name: str, deliver: Deliver) -> None:
+    def _listen(self, name: str, deliver: OnSerialized) -> None:
         """Hand every message of a topic to ``deliver``."""
         self._endpoints.subscribe(name, lambda data: deliver(data, 0, b""), raw=True)
 
@@ -145,7 +145,7 @@ class CommandReplay:
         self._answers.append((publisher, message))
 
 
-def _as_it_came(read: Read[Stamped[Any]]) -> Read[Stamped[bytes]]:
+def _as_it_came(read: Decode[Stamped[Any]]) -> Decode[Stamped[bytes]]:
     """Return what reads messages, and returns the stamp and the bytes of good ones."""
     return lambda data: (read(data)[0], data)
 

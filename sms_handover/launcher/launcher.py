@@ -24,7 +24,7 @@ from sms_handover.launcher.processes import Death, NodeProcesses
 from sms_handover.launcher.shared_memory import SharedMemory
 from sms_handover.launcher.timeouts import ActiveTime, SuspensionMonitor, WaitNotice
 from sms_handover.ros.launching.composition import ProcessArguments, nodes_together, process_arguments
-from sms_handover.ros.node.graph_node import INPUTS
+from sms_handover.ros.node.node_inputs import INPUTS
 from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK
 from sms_handover.ros.process.network_scope import THIS_MACHINE, NetworkScope
 from sms_handover.simulation.scenario import COMMON, Scenario

@@ -32,7 +32,7 @@ from sms_handover.messages.values import header_ns, task_phase
 from sms_handover.ros.codecs.events import read_grasp_event, read_run_event
 from sms_handover.ros.codecs.loop_messages import decoded
 from sms_handover.ros.message_types import message_class
-from sms_handover.ros.node.message_filter import Read
+from sms_handover.ros.node.message_filter import Decode
 from sms_handover.ros.qos import LATCHED
 from sms_handover.ros.transport.inputs import Inputs
 from sms_handover.ros.transport.publisher_identity import PublisherIdentity
@@ -97,7 +97,7 @@ class RunMonitor:
         """Take what has come."""
         self._inputs.poll()
 
-    def _hear(self, name: str, read: Read[T], take: Callable[[T], None]) -> None:
+    def _hear(self, name: str, read: Decode[T], take: Callable[[T], None]) -> None:
         """Hand every good message of the own publishers of a topic to ``take``."""
         topic, full_name = self._topics[name], self._node.resolve_topic_name(name)
         several = len(topic.publishers) > 1
@@ -118,7 +118,7 @@ class RunMonitor:
         )  # a display must never hold the loop back
 
         def receive(data: bytes, sent_ns: int, publisher: bytes) -> None:
-            with suppress(MessageError, IndexError):
+            with suppress(MessageError, KeyError):
                 show(decoded(data, kind))
 
         self._inputs.subscribe(kind, topic, profile, receive)
@@ -207,6 +207,6 @@ class RunMonitor:
                 self.progress.waiting[status.name] = status.message
 
 
-def _reader(kind: Any) -> Read[Any]:
+def _reader(kind: Any) -> Decode[Any]:
     """Return what reads messages of a class."""
     return lambda data: decoded(data, kind)

@@ -4,13 +4,9 @@ from dataclasses import replace
 from typing import Any
 
 from sms_handover.graph.events import RunEvent, Severity
+from sms_handover.graph.message_constants import member_of
 from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, PhaseState, TaskPhase
 from sms_handover.units import NS_PER_S
-
-_ACTIONS = (GraspAction.GRASP, GraspAction.RELEASE, GraspAction.TRANSFER)  # by number in the message
-_STATUSES = (GraspStatus.SUCCEEDED, GraspStatus.MISSED, GraspStatus.REJECTED)
-_PHASE_STATES = (PhaseState.ACTIVE, PhaseState.FAILED)
-_SEVERITIES = (Severity.INFO, Severity.WARNING, Severity.ERROR)
 
 
 def pose_values(message: Any) -> tuple[float, ...]:
@@ -50,13 +46,14 @@ def task_phase(message: Any) -> TaskPhase:
     phase = TaskPhase(header_ns(message), int(message.index), message.name, commands)
     if not hasattr(message, "state"):
         return phase  # recorded before phases could fail
-    state, attempt = _PHASE_STATES[message.state], int(message.attempt)
+    state, attempt = member_of(PhaseState, message.state), int(message.attempt)
     return replace(phase, state=state, attempt=attempt, end_ns=time_ns(message.end))
 
 
 def grasp_command(message: Any) -> GraspCommand:
     """Return a GraspCommand message as its value."""
-    return GraspCommand(_ACTIONS[message.action], message.arm, message.grasp_frame, message.from_arm)
+    action = member_of(GraspAction, message.action)
+    return GraspCommand(action, message.arm, message.grasp_frame, message.from_arm)
 
 
 def grasp_event(message: Any) -> GraspEvent:
@@ -64,7 +61,7 @@ def grasp_event(message: Any) -> GraspEvent:
     return GraspEvent(
         stamp_ns=header_ns(message),
         command=grasp_command(message.command),
-        status=_STATUSES[message.status],
+        status=member_of(GraspStatus, message.status),
         position_error=message.position_error,
         angle_error=message.angle_error,
         relative_speed=message.relative_speed,
@@ -78,7 +75,7 @@ def run_event(message: Any) -> RunEvent:
         stamp_ns=header_ns(message),
         node=message.node,
         kind=message.kind,
-        severity=_SEVERITIES[message.severity],
+        severity=member_of(Severity, message.severity),
         detail=message.detail,
         phase=message.phase,
         value=message.value,

@@ -1,4 +1,4 @@
-"""The loop of the graph in one process."""
+"""Container: the loop of the graph in one process."""
 
 import sys
 from collections.abc import Callable, Sequence

@@ -1,13 +1,14 @@
-"""The controller node."""
+"""Controller node: answers every state with a joint command."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from sms_handover.control.law import Need
-from sms_handover.control.parameters import ControllerParameters
+from sms_handover.control.parameters import ControllerParameters, parameters_with
 from sms_handover.control.protocol import Controller
 from sms_handover.control.registry import law_named
 from sms_handover.frames import BASE, WORLD
@@ -20,11 +21,12 @@ from sms_handover.graph.topics import (
     TASK_PHASE,
 )
 from sms_handover.nodes.parts.guidance_parts import GuidanceParts
-from sms_handover.nodes.parts.reference_watch import ReferenceWatch
+from sms_handover.nodes.parts.watchdogs import ReferenceWatchdog
 from sms_handover.ros.codecs.loop_messages import JointStateCodec, PoseCodec, Stamped, StateCodec, coordinates
 from sms_handover.ros.codecs.task_phase import PhaseCodec
+from sms_handover.ros.node.diagnostics import NodeReport
 from sms_handover.ros.node.graph_node import GraphNode, P
-from sms_handover.ros.node.message_filter import Read, Receive
+from sms_handover.ros.node.message_filter import Decode
 from sms_handover.ros.process.main import run_node
 from sms_handover.ros.transport.stamp_sync import StampOrder, StampSync
 from sms_handover.simulation.parameters import LOCKSTEP
@@ -54,33 +56,34 @@ class AnsweringNode(GraphNode[P]):
         self._parts = GuidanceParts(self.robot.arms if self.follows_tools else ())
         self._lockstep = self.common.mode == LOCKSTEP
         self._tick_ns, self._reference_ns = self.common.tick_ns, self.common.reference_ns
-        self._state_wire = StateCodec(self.robot.joint_names, WORLD, BASE)
-        self._reference_wire = JointStateCodec(self.robot.joint_names, ("position", "velocity"))
-        self._command_wire = JointStateCodec(self.robot.joint_names, ("effort",))
-        self._phase_wire = PhaseCodec(self.robot.arms, schedule.deputy.grasp_frames)
-        self._pose_wire = PoseCodec(WORLD)
-        guidance: dict[str, Read[Stamped[Any]]] = dict.fromkeys(self._parts.topics, self._pose_wire.checked)
-        guidance[TASK_PHASE] = self._phase_wire.checked
-        guidance[JOINT_REFERENCE] = self._reference_wire.checked
-        state: dict[str, Read[Stamped[Any]]] = {
-            JOINT_STATES: self._state_wire.joints.checked,
-            BASE_ODOMETRY: self._state_wire.odometry.checked,
+        self._state_codec = StateCodec(self.robot.joint_names, WORLD, BASE)
+        self._reference_codec = JointStateCodec(self.robot.joint_names, ("position", "velocity"))
+        self._command_codec = JointStateCodec(self.robot.joint_names, ("effort",))
+        self._phase_codec = PhaseCodec(self.robot.arms, schedule.deputy.grasp_frames)
+        guidance: dict[str, Decode[Stamped[Any]]] = dict.fromkeys(
+            self._parts.topics, PoseCodec(WORLD).checked
+        )
+        guidance[TASK_PHASE] = self._phase_codec.checked
+        guidance[JOINT_REFERENCE] = self._reference_codec.checked
+        state: dict[str, Decode[Stamped[Any]]] = {
+            JOINT_STATES: self._state_codec.joints.checked,
+            BASE_ODOMETRY: self._state_codec.odometry.checked,
         }
         self._everything = (*_STATE, *guidance)
         ahead_ns = self._reference_ns if self._lockstep else NS_PER_S
         self._inputs: StampSync[Any] = StampSync(ahead_ns=ahead_ns, paced=not self._lockstep)
         self._orders = {topic: StampOrder(ahead_ns) for topic in guidance}
-        self._early: dict[str, Any] = {}  # what may belong to a run that begins
+        self._early: dict[str, Any] = {}  # what may belong to the next run
         self._answered_ns = 0
         self._answer_bytes = b""
         for topic, read in {**guidance, **state}.items():
-            self.receive(topic, self._taker(topic), read)
+            self.inputs.subscribe(topic, partial(self._on_input, topic), read)
         self._command = self.endpoints.publisher(JOINT_COMMAND)  # last: then all of an external node is there
 
     @property
     @abstractmethod
     def law(self) -> str:
-        """Return what reports call the law."""
+        """The name of the law in reports."""
 
     @property
     @abstractmethod
@@ -109,17 +112,14 @@ class AnsweringNode(GraphNode[P]):
         self._answered_ns = 0
         self._answer_bytes = b""
 
-    def diagnostic_values(self) -> dict[str, object]:
+    def report(self) -> NodeReport:
         """Return what has been answered and what came too late."""
-        return {"law": self.law, "answered": self._command.count, "late": self._inputs.dropped}
-
-    def diagnostic_stamp_ns(self) -> int:
-        """Return the stamp of the last state answered."""
-        return self._answered_ns
+        values = {"law": self.law, "answered": self._command.count, "late": self._inputs.dropped}
+        return NodeReport(self._answered_ns, values)
 
     @property
     def awaited(self) -> str:
-        """Return what comes last of the inputs of the next state."""
+        """The last of the inputs of the next state."""
         stamp = self._inputs.oldest_ns
         if stamp is None:
             stamp = self._answered_ns + self._tick_ns if self._command.count else 0
@@ -129,17 +129,13 @@ class AnsweringNode(GraphNode[P]):
         """Return the inputs that belong to a stamp, the last one to come last."""
         return self._everything if self._lockstep and stamp % self._reference_ns == 0 else _STATE
 
-    def _taker(self, topic: str) -> Receive[Stamped[Any]]:
-        """Return the callback of a topic."""
-        return lambda content, sent_ns: self._take(topic, *content)
+    def _on_input(self, topic: str, message: Stamped[Any], sent_ns: int) -> None:
+        """Take one input; a state of time zero after an answered one restarts the run.
 
-    def _take(self, topic: str, stamp: int, content: Any) -> None:
-        """Take one input; a state of time zero behind an answered one begins the run anew.
-
-        A reference of time zero waits for such a state: it may as well be the answer, once more, to one
-        that the plant has sent again.
+        A reference of time zero waits for such a state: it may belong to one that the plant has resent.
         """
-        if self._inputs.begins_anew(stamp):
+        stamp, content = message
+        if self._inputs.restarts_run(stamp):
             if topic not in _STATE:
                 self._early[topic] = content
                 return
@@ -147,14 +143,14 @@ class AnsweringNode(GraphNode[P]):
             self.begin()
             early, self._early = self._early, {}
             for name, first in early.items():
-                self._take(name, stamp, first)
+                self._on_input(name, (stamp, first), sent_ns)
         if not self._lockstep and topic in self._orders:
             if self._inputs.admits(stamp, topic):
-                self._orders[topic].take(stamp, self._answered_ns)
-                self.use(topic, stamp, content)
+                self._orders[topic].accept(stamp, self._answered_ns)
+                self._guide(topic, stamp, content)
             return
         if topic == BASE_ODOMETRY and stamp == self._answered_ns and self._lockstep and self._answer_bytes:
-            self._command.publish(self._answer_bytes)  # the plant asks again: it has missed the answer
+            self._command.publish(self._answer_bytes)  # the plant has resent it: it has missed the answer
         self._inputs.add(stamp, topic, content)
         self._answer(stamp)
 
@@ -166,17 +162,17 @@ class AnsweringNode(GraphNode[P]):
             return
         if needed is self._everything:
             for topic in self._orders:
-                self.use(topic, stamp, inputs[topic])
+                self._guide(topic, stamp, inputs[topic])
         q, v = coordinates(inputs[JOINT_STATES], inputs[BASE_ODOMETRY])
         effort = self._controller.effort(stamp, q, v) if self._parts.complete else self._no_effort
-        self._answer_bytes = self._command_wire.pack(stamp, effort=effort)
+        self._answer_bytes = self._command_codec.pack(stamp, effort=effort)
         self._command.publish(self._answer_bytes)
         self._answered_ns = stamp
         self.on_answered(stamp)
 
-    def use(self, topic: str, stamp: int, content: Any) -> None:
+    def _guide(self, topic: str, stamp: int, content: Any) -> None:
         """Guide the controller once all parts of an instant are there."""
-        guidance = self._parts.take(topic, stamp, content)
+        guidance = self._parts.add(topic, stamp, content)
         if guidance is not None:
             self._controller.guide(guidance)
 
@@ -191,14 +187,21 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
     def __init__(self) -> None:
         super().__init__(ControllerParameters)
 
+    def parameter_group(self, group: type[ControllerParameters]) -> type[ControllerParameters]:
+        """Return the parameters of the controller with those of the law that was given."""
+        if not self.has_parameter("law"):
+            return group
+        name = str(self.get_parameter("law").value)
+        return parameters_with(law_named(name, f"{CONTROLLER}: parameter 'law'"))
+
     def prepare(self) -> None:
         """Set up the law; raises UnstableLoopError if its gains cannot work at this tick."""
         super().prepare()
-        self._watch = ReferenceWatch(longest_reference_ns(self.common, self.parameters))
+        self._watchdog = ReferenceWatchdog(longest_reference_ns(self.common, self.parameters))
 
     @property
     def law(self) -> str:
-        """Return the name of the law."""
+        """The name of the law."""
         return self.parameters.law
 
     @property
@@ -213,12 +216,12 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
     def begin(self) -> None:
         """Go back to the start of a run."""
         super().begin()
-        self._watch.reset()
+        self._watchdog.reset()
 
     def on_answered(self, stamp: int) -> None:
-        """In real time, tell when references stop coming and when they come again."""
+        """In real time, report when references stop coming and when they come again."""
         if not self._lockstep:
-            event = self._watch.look(self._parts.reference_ns, stamp)
+            event = self._watchdog.poll(self._parts.reference_ns, stamp)
             if event is not None:
                 self.events.publish(event)
 

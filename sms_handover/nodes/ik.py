@@ -1,4 +1,4 @@
-"""The inverse-kinematics service node."""
+"""IK node: the inverse kinematics as a service."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,14 +11,15 @@ from sms_handover.frames import WORLD
 from sms_handover.graph.topics import IK, SOLVE_IK
 from sms_handover.ik.levenberg_marquardt import solve_ik
 from sms_handover.ik.parameters import IkParameters
+from sms_handover.messages.values import time_ns
 from sms_handover.ros.codecs.convert import (
     joints_in_order,
     pose_of_message,
     set_ik_status,
     set_joint_positions,
-    stamp_ns_of,
 )
 from sms_handover.ros.codecs.validation import check_finite
+from sms_handover.ros.node.diagnostics import NodeReport
 from sms_handover.ros.node.graph_node import GraphNode
 from sms_handover.ros.process.main import run_node
 from sms_handover.types import IkRequest, IkStatus, Pose
@@ -34,41 +35,37 @@ class IkNode(GraphNode[IkParameters]):
         """Offer the service."""
         self.reset_run()
         self._names = list(self.robot.joint_names)
-        self._response = SolveIK.Response(valid=True)  # filled anew each time: most of it never changes
+        self._response = SolveIK.Response(valid=True)  # refilled each time: most of it never changes
         self._response.solution.name = self._names
         self._response.status.header.frame_id = WORLD
-        self.inputs.serve(SolveIK, SOLVE_IK, self._on_request)
+        self.inputs.loop.create_service(SolveIK, SOLVE_IK, self._on_request)
 
     def reset_run(self) -> None:
-        """Forget the run: only counts are kept of it, as a solution rests on its request alone."""
+        """Reset the counts; a solution depends on its request alone."""
         self._solved = dict.fromkeys(IkStatus, 0)
-        self._refused = 0
+        self._rejected = 0
         self._stamp_ns = 0
 
     @property
     def awaited(self) -> str:
-        """Return the service: nothing else is waited for."""
+        """The service: the node waits for nothing else."""
         return SOLVE_IK
 
-    def diagnostic_values(self) -> dict[str, object]:
+    def report(self) -> NodeReport:
         """Return how many requests ended in which way."""
-        solved: dict[str, object] = {status.name.lower(): count for status, count in self._solved.items()}
-        return {**solved, "refused": self._refused}
-
-    def diagnostic_stamp_ns(self) -> int:
-        """Return the stamp of the last request."""
-        return self._stamp_ns
+        solved = {status.name.lower(): count for status, count in self._solved.items()}
+        return NodeReport(self._stamp_ns, {**solved, "refused": self._rejected})
 
     def _on_request(self, request: Any) -> Any:
         """Solve one request; a malformed one is answered with ``valid`` false and the reason."""
         try:
             question = self._question(request)
         except (SmsHandoverError, ValueError) as error:
-            self._refused += 1
+            self._rejected += 1
             return SolveIK.Response(message=str(error))
         result = solve_ik(self.robot, question, self.parameters)
         self._solved[result.status] += 1
-        self._stamp_ns = stamp_ns = stamp_ns_of(request.seed.header.stamp)
+        self._stamp_ns = stamp_ns = time_ns(request.seed.header.stamp)
         response = self._response
         set_joint_positions(response.solution, result.joint_position, stamp_ns)
         set_ik_status(response.status, result, stamp_ns)
@@ -76,7 +73,7 @@ class IkNode(GraphNode[IkParameters]):
         return response
 
     def _question(self, request: Any) -> IkRequest:
-        """Return what a request asks; raises SmsHandoverError or ValueError where it is malformed."""
+        """Return a request as its value; raises SmsHandoverError or ValueError if it is malformed."""
         seed = joints_in_order(self._names, request.seed.name, request.seed.position)
         check_finite(seed, "the seed")
         targets: dict[str, Pose] = {}

@@ -1,7 +1,8 @@
-"""The plant node."""
+"""Plant node: the simulated robot and deputy, and the clock of the loop."""
 
 import gc
 from collections.abc import Sequence
+from functools import partial
 from time import monotonic
 from typing import Any
 
@@ -24,15 +25,15 @@ from sms_handover.graph.topics import (
     RUN_STATE,
     TASK_PHASE,
 )
-from sms_handover.nodes.parts.answer_watch import AnswerWatch
-from sms_handover.nodes.parts.command_watch import CommandWatch
 from sms_handover.nodes.parts.marker import deputy_marker
 from sms_handover.nodes.parts.plant_outputs import PlantOutputs
 from sms_handover.nodes.parts.run_control import RunControl
+from sms_handover.nodes.parts.watchdogs import AnswerWatchdog, CommandWatchdog, lag_skipped
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.ros.codecs.convert import event_message, header
 from sms_handover.ros.codecs.loop_messages import JointStateCodec, Stamped, stamped
 from sms_handover.ros.codecs.task_phase import PhaseCodec
+from sms_handover.ros.node.diagnostics import NodeReport
 from sms_handover.ros.node.graph_node import GraphNode
 from sms_handover.ros.process.main import run_node
 from sms_handover.ros.transport.loop_clock import LoopClock
@@ -40,15 +41,15 @@ from sms_handover.ros.transport.stamp_sync import StampOrder, StampSync
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import load_task
 from sms_handover.simulation.wiring import make_plant
-from sms_handover.types import Array, JointCommand, TaskPhase
+from sms_handover.types import JointCommand, TaskPhase
 
 _COMMAND = (JOINT_COMMAND,)
 _PHASE_AND_COMMAND = (TASK_PHASE, JOINT_COMMAND)
 _MOST_UNRECORDED_NS = 45_000_000  # [ns] of simulation time that may be lost with the recorder
 _RUNNING = int(RunState.RUNNING)  # asking the message class for it takes a call each time
 _TIMING_PERIOD_S = 1.0  # [s] of wall time
-_LAST_TURNS = 3  # looks for inputs: the state is taken, the command is taken, and one for what came between
-_LOOK_PERIOD_S = 0.5  # [s] of wall time between two looks whether the loop goes on
+_LAST_POLLS = 3  # of the inputs: the state is taken, the command is taken, and one for what came between
+_WATCHDOG_PERIOD_S = 0.5  # [s] of wall time between two polls of the watchdog
 
 
 class PlantNode(GraphNode[PlantParameters]):
@@ -71,43 +72,40 @@ class PlantNode(GraphNode[PlantParameters]):
         self.lockstep = self.common.mode == LOCKSTEP
         self._tick_ns, self._per_reference = self.common.tick_ns, self.common.ticks_per_reference
         self._is_recorded = RECORDER in self.common.peers
-        self._command_wire = JointStateCodec(self.robot.joint_names, ("effort",))
-        self._phase_wire = PhaseCodec(self.robot.arms, tuple(schedule.deputy.grasp_frames))
+        self._command_codec = JointStateCodec(self.robot.joint_names, ("effort",))
+        self._phase_codec = PhaseCodec(self.robot.arms, tuple(schedule.deputy.grasp_frames))
         self._inputs: StampSync[Any] = StampSync(ahead_ns=self._tick_ns)
         self._orders = {topic: StampOrder(0) for topic in _PHASE_AND_COMMAND}
-        self._loop_clock = LoopClock(self.common.tick_ns, paced=not self.lockstep)
-        self._command_watch = CommandWatch(self.parameters)
-        self._answer_watch = AnswerWatch(self.parameters)
+        self._loop_clock = LoopClock(
+            self.common.tick_ns, paced=not self.lockstep, catch_up_s=self.parameters.catch_up
+        )
+        self._command_watchdog = CommandWatchdog(self.parameters)
+        self._answer_watchdog = AnswerWatchdog(self.parameters)
         self.run_state = int(RunState.WAITING)
-        self._configured_anew = self.runs > 0
+        self._reconfigured = self.runs > 0
         self._wait_for_others()
         self._make_endpoints()
         self.create_timer(_TIMING_PERIOD_S, self._publish_timing)
         if self.lockstep:
-            self.create_timer(self.parameters.resend_after, self._send_again)
-            self.create_timer(_LOOK_PERIOD_S, self._look_for_answer)
+            self.create_timer(self.parameters.resend_after, self._resend)
+            self.create_timer(_WATCHDOG_PERIOD_S, self._poll_answer_watchdog)
 
     def on_matched(self) -> None:
-        """Say what robot and deputy these are; the run begins when the other nodes are ready too."""
-        if self._configured_anew:
-            self._configured_anew, self.finished = False, True
+        """Publish what robot and deputy these are; the run begins when the other nodes are ready too."""
+        if self._reconfigured:
+            self._reconfigured, self.membership.finished = False, True
             self.restart()  # the others may still know of a run before
         elif not self.runs:
             self._describe()
         self._begin_if_ready()
 
-    def diagnostic_values(self) -> dict[str, object]:
-        """Return how far the run is and which joints were saturated."""
-        saturated = {f"saturated_{k}": v for k, v in self._plant.saturated_ticks.items() if v}
-        return {"tick": self._plant.tick, "holder": self._plant.deputy.holder or "none", **saturated}
-
-    def diagnosis(self) -> tuple[int, str]:
-        """Return how well real time is kept."""
-        return self._loop_clock.diagnosis
-
-    def diagnostic_stamp_ns(self) -> int:
-        """Return simulation time."""
-        return self._plant.stamp_ns
+    def report(self) -> NodeReport:
+        """Return how far the run is, which joints were saturated, and how well real time is kept."""
+        values: dict[str, object] = {"tick": self._plant.tick, "holder": self._plant.deputy.holder or "none"}
+        if self._loop_clock.skipped_s:
+            values["skipped_s"] = self._loop_clock.skipped_s
+        values.update({f"saturated_{k}": v for k, v in self._plant.saturated_ticks.items() if v})
+        return NodeReport(self._plant.stamp_ns, values, *self._loop_clock.diagnosis)
 
     def activate(self) -> None:
         """Begin, or go on at the tick where the plant was deactivated."""
@@ -120,7 +118,7 @@ class PlantNode(GraphNode[PlantParameters]):
 
     def deactivate(self) -> None:
         """Hold the run at this tick."""
-        self.inputs.close(drop=False)
+        self.inputs.loop.close(drop=False)
         if self.run_state == RunState.RUNNING:
             self.enter(RunState.PAUSED, "deactivated")
         gc.enable()
@@ -139,17 +137,17 @@ class PlantNode(GraphNode[PlantParameters]):
         clock = self._loop_clock
         left_s = clock.wait_s() - self.parameters.busy_wait
         if left_s > 0.0:
-            self.inputs.spin_once(executor, left_s)
+            self.inputs.loop.spin_once(executor, left_s)
             return
-        self.inputs.look(executor)
+        self.inputs.loop.spin_some(executor)
         if clock.due():
             self._give_last_turns()
             self._tick_now()
-            self.inputs.give_turn(executor)
+            self.inputs.loop.give_turn(executor)
 
     @property
     def awaited(self) -> str:
-        """Return what comes last of what completes the tick."""
+        """The last of the inputs that complete the tick."""
         if self._ahead_of_recorder:
             return RUN_RECORDED
         return self._inputs.missing(self._plant.stamp_ns, self._needed) or JOINT_COMMAND
@@ -161,28 +159,26 @@ class PlantNode(GraphNode[PlantParameters]):
         return self._is_recorded and next_ns - self._recorded_ns > _MOST_UNRECORDED_NS
 
     def _make_endpoints(self) -> None:
-        """Make publishers, subscriptions and services."""
         names = [GRASP_EVENT, ROBOT_DESCRIPTION, DEPUTY_MARKER, RUN_STATE, LOOP_TIMING]
         self._publish = {name: self.endpoints.publisher(name) for name in names}
         self._outputs = PlantOutputs(self.robot, self.endpoints.publisher, lockstep=self.lockstep)
-        self.receive(TASK_PHASE, self._on_phase, self._phase_wire.checked)
-        self.receive(JOINT_COMMAND, self._on_command, self._command_wire.checked)
-        self.receive(RUN_RECORDED, self._on_recorded, stamped)
-        self.hear(RUN_READY, String, self._on_ready)
+        for topic, codec in ((TASK_PHASE, self._phase_codec), (JOINT_COMMAND, self._command_codec)):
+            self.inputs.subscribe(topic, partial(self._on_input, topic), codec.checked)
+        self.inputs.subscribe(RUN_RECORDED, self._on_recorded, stamped)
+        self.inputs.subscribe_news(RUN_READY, String, self._on_ready)
         self._control = RunControl(self, self)
 
     # The start of a run
 
     def _on_ready(self, message: String) -> None:
-        """Note that another node is ready."""
         self._waiting_for.discard(message.data)
         self._begin_if_ready()
 
     def _begin_if_ready(self) -> None:
         """Begin the run once the plant is active and has matched, and every node is ready."""
-        if self.run_state != RunState.WAITING or not self.active or not self.has_matched:
+        if self.run_state != RunState.WAITING or not self.active or not self.membership.has_matched:
             return
-        if self.endpoints.unmatched or not self._waiting_for <= self.endpoints.silent(RUN_READY):
+        if self.endpoints.unmatched or not self._waiting_for <= self.endpoints.not_publishing(RUN_READY):
             return
         if self.runs:
             self._describe()
@@ -193,17 +189,17 @@ class PlantNode(GraphNode[PlantParameters]):
             self.finish("stopped on request")
 
     def _describe(self) -> None:
-        """Say what robot and deputy these are."""
+        """Publish what robot and deputy these are."""
         self._publish[ROBOT_DESCRIPTION].publish(String(data=self.robot.urdf))
         self._publish[DEPUTY_MARKER].publish(deputy_marker(self._deputy_size))
 
     def _wait_for_others(self) -> None:
-        """Be at the start of a run, and wait until every other node is ready for it."""
+        """Wait at the start of a run until every other node is ready."""
         self._waiting_for = set(self.common.peers) - {PLANT}
         self._last_tick, self._failed_phase = self.common.last_tick(self._end_ns), ""
         self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
-        self._command_watch.reset()
-        self._needed: tuple[str, ...] = _PHASE_AND_COMMAND  # what completes this tick; the last comes last
+        self._command_watchdog.reset()
+        self._needed: tuple[str, ...] = _PHASE_AND_COMMAND  # what completes this tick, by arrival
         self._recorded_ns = 0
         self._silent_tick = -1
 
@@ -220,10 +216,10 @@ class PlantNode(GraphNode[PlantParameters]):
         self._loop_clock.published()
         self._outputs.publish_rest(self._plant, with_reference=with_reference)
 
-    def _send_again(self) -> None:
-        """Publish the state of this tick once more if nothing has answered it for a while (lock step).
+    def _resend(self) -> None:
+        """Publish the state of this tick again if nothing has answered it for a while (lock step).
 
-        Whoever has answered it sends the same bytes again; whoever has missed it answers now.
+        A node that has answered it sends the same bytes again; one that has missed it answers now.
         """
         tick = self._plant.tick
         waiting = self.active and tick == self._silent_tick and not self._ahead_of_recorder
@@ -231,48 +227,42 @@ class PlantNode(GraphNode[PlantParameters]):
             self._outputs.publish_loop(self._plant, with_reference=self._needed is _PHASE_AND_COMMAND)
         self._silent_tick = tick
 
-    def _look_for_answer(self) -> None:
+    def _poll_answer_watchdog(self) -> None:
         """End the run as failed if nothing has answered this tick for too long (lock step)."""
         waits = self.active and not self._control.holds
         stamp = self._plant.stamp_ns if waits else None
-        event = self._answer_watch.look(stamp, self.awaited, monotonic())
+        event = self._answer_watchdog.poll(stamp, self.awaited, monotonic())
         if event is not None:
             self.events.publish(event)
             self.finish(event.detail, RunState.FAILED)
 
-    def _on_command(self, command: Stamped[tuple[Array, ...]], sent_ns: int) -> None:
-        """Take a command; in lock step it may complete the tick."""
-        stamp, (effort,) = command
+    def _on_input(self, topic: str, message: Stamped[Any], sent_ns: int) -> None:
+        """Take a command or a phase; in lock step it may complete the tick."""
+        stamp, content = message
         if self.lockstep:
-            self._inputs.add(stamp, JOINT_COMMAND, effort)
-            if stamp == self._plant.stamp_ns:
-                self._loop_clock.answered()
-            self.advance()
-        elif self._inputs.admits(stamp, JOINT_COMMAND):
-            self._orders[JOINT_COMMAND].take(stamp, self._plant.stamp_ns)
-            self._command = JointCommand(stamp, effort)
-            if stamp == self._plant.stamp_ns:
-                self._loop_clock.answered()
-
-    def _on_phase(self, phase: Stamped[TaskPhase], sent_ns: int) -> None:
-        """Take the phase of the task; in lock step it may complete the tick."""
-        stamp, task = phase
+            self._inputs.add(stamp, topic, content)
+        elif self._inputs.admits(stamp, topic):
+            self._orders[topic].accept(stamp, self._plant.stamp_ns)
+            if topic == TASK_PHASE:
+                self._execute(content)
+            else:
+                self._command = JointCommand(stamp, *content)
+        else:
+            return
+        if topic == JOINT_COMMAND and stamp == self._plant.stamp_ns:
+            self._loop_clock.answered()
         if self.lockstep:
-            self._inputs.add(stamp, TASK_PHASE, task)
             self.advance()
-        elif self._inputs.admits(stamp, TASK_PHASE):
-            self._orders[TASK_PHASE].take(stamp, self._plant.stamp_ns)
-            self._execute(task)
 
     def _on_recorded(self, recorded: Stamped[bytes], sent_ns: int) -> None:
-        """Note up to where the recorder has come; in lock step the plant may have waited for it."""
+        """Note how far the recorder has come; in lock step the plant may have waited for it."""
         if self.run_state == RunState.WAITING:
             return  # it is of the run before
         stamp, _ = recorded
         if not self._recorded_ns <= stamp <= self._plant.stamp_ns:
             reason = Reason.OLD if stamp < self._recorded_ns else Reason.FUTURE
-            allowed = f"allowed is {self._recorded_ns} to {self._plant.stamp_ns} ns"
-            raise MessageError(reason, f"recorded is said to be up to {stamp} ns, {allowed}")
+            allowed = f"must be {self._recorded_ns} to {self._plant.stamp_ns} ns"
+            raise MessageError(reason, f"recorded up to {stamp} ns, {allowed}")
         self._recorded_ns = stamp
         self.advance()
 
@@ -289,7 +279,7 @@ class PlantNode(GraphNode[PlantParameters]):
         if self._plant.tick >= self._last_tick:
             self._end_task()
             return
-        self._plant.apply(inputs[JOINT_COMMAND])
+        self._plant.apply(*inputs[JOINT_COMMAND])
         self._loop_clock.ticked()
         if self._control.steps_left:
             self._control.stepped()
@@ -301,23 +291,25 @@ class PlantNode(GraphNode[PlantParameters]):
         It had no processor in time, as the plant had none, and takes a small part of a tick. One in
         another process gets no more time by this.
         """
-        for _ in range(_LAST_TURNS):
-            if self._command.stamp_ns == self._plant.stamp_ns or not self.inputs.poll():
+        for _ in range(_LAST_POLLS):
+            if self._command.stamp_ns == self._plant.stamp_ns or not self.inputs.loop.poll():
                 return
 
     def _tick_now(self) -> None:
         """Integrate one tick with the last command that came (real time)."""
         self._loop_clock.ticked(held=self._command.stamp_ns != self._plant.stamp_ns)
-        command, event = self._command_watch.look(self._command, self._plant.stamp_ns)
+        command, event = self._command_watchdog.poll(self._command, self._plant.stamp_ns)
         self._plant.apply(command.effort)
         self._publish_state()
         if event is not None:
             self.events.publish(event)
+        if skipped_s := self._loop_clock.take_skipped():
+            self.events.publish(lag_skipped(self._plant.stamp_ns, skipped_s, self.parameters.catch_up))
         if self._plant.tick >= self._last_tick:
             self._end_task()
 
     def _execute(self, task: TaskPhase) -> None:
-        """Carry out the grasp commands of a phase, tell what came of them, and note when the task ends."""
+        """Carry out the grasp commands of a phase, publish the results, and note when the task ends."""
         self._failed_phase = task.name if task.failed else ""
         if task.end_ns:
             self._last_tick = self.common.last_tick(task.end_ns, failed=task.failed)
@@ -329,7 +321,7 @@ class PlantNode(GraphNode[PlantParameters]):
 
     @property
     def recorder_has_ended(self) -> bool:
-        """Whether there should be a recorder, but is none any more."""
+        """Whether the run has a recorder, but its process has ended."""
         return self._is_recorded and not self.count_publishers(RUN_RECORDED)
 
     def ticks_to(self, most: int) -> tuple[int, int]:
@@ -338,12 +330,11 @@ class PlantNode(GraphNode[PlantParameters]):
         return ticks, self._plant.stamp_ns + ticks * self._tick_ns
 
     def restart(self) -> None:
-        """Say that this run is over and the next is to begin, and go back to time zero."""
+        """End this run and wait for the next one at time zero."""
         self.enter(RunState.WAITING, "reset")
         if not self.finished:
-            self.publish_diagnostics()
-            self.publish_counts()
-        self.finished = False
+            self.membership.end()
+        self.membership.finished = False
         self._control.reset_run()
         self._plant.reset()
         self._inputs.reset_run()
@@ -351,26 +342,24 @@ class PlantNode(GraphNode[PlantParameters]):
             order.reset()
         self._loop_clock.reset()
         self._wait_for_others()
-        self.look_again()
+        self.membership.rejoin()
 
     def _end_task(self) -> None:
-        """End the run where the task has ended."""
         if self._failed_phase:
             self.finish(f"phase {self._failed_phase!r} has failed", RunState.FAILED)
         else:
-            self.finish("the whole run is done")
+            self.finish("run complete")
 
     def finish(self, detail: str, state: int = RunState.FINISHED) -> None:
-        """Say that the run is over, and what real time has cost; every node then tells its counts."""
+        """End the run and publish what real time has cost; every node then publishes its counts."""
         if not self.lockstep and self._loop_clock.misses:
             detail = f"{detail}; {self._loop_clock.misses}"
-        self.finished = True
+        self.membership.finished = True
         self.enter(state, detail)
-        self.publish_diagnostics()
-        self.publish_counts()
+        self.membership.end()
 
     def enter(self, state: int, detail: str) -> None:
-        """Change the state of the run, with the clock of the loop, and tell everybody."""
+        """Change the state of the run, with the clock of the loop, and publish it."""
         self.run_state = state
         if state == RunState.RUNNING:
             self._loop_clock.start()

@@ -1,4 +1,4 @@
-"""The recorder node."""
+"""Recorder node: writes every message of the graph to a bag."""
 
 from collections.abc import Sequence
 from datetime import datetime
@@ -40,11 +40,12 @@ from sms_handover.nodes.parts.peer_parameters import PeerParameters
 from sms_handover.ros.codecs.convert import time_message
 from sms_handover.ros.codecs.loop_messages import PoseCodec, Stamped, StateCodec, decoded, stamped, state_of
 from sms_handover.ros.message_types import message_class
+from sms_handover.ros.node.diagnostics import NodeReport
 from sms_handover.ros.node.graph_node import GraphNode
-from sms_handover.ros.node.message_filter import Read, Receive
+from sms_handover.ros.node.message_filter import Decode, OnMessage
 from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, Stop, run_node
 from sms_handover.ros.qos import LOSSLESS, profile_of, stored, weakest
-from sms_handover.ros.transport.inputs import Deliver
+from sms_handover.ros.transport.inputs import OnSerialized
 from sms_handover.ros.transport.publisher_identity import PublisherIdentity
 from sms_handover.ros.transport.stamp_sync import StampSync
 from sms_handover.simulation.parameters import LOCKSTEP
@@ -53,22 +54,22 @@ from sms_handover.simulation.scenario import load_task
 _POLL_S = 0.005  # [s] of wall time between two batches: long enough to be cheap, short enough to lose little
 _LOCKSTEP_POLL_S = 0.002  # [s] where the plant would run out of what it may be ahead, and wait
 _QUIET_S = 0.05  # [s] of wall time without a message after which nothing is on the way any more
-_REST_S = 1.0  # [s] of wall time at most to wait for that
+_DRAIN_S = 1.0  # [s] of wall time at most to wait for that
 _BEHIND = 4096  # [reference periods] by which a recorder without a processor may be behind and make up for it
 _FLUSH_NS = 15_000_000  # [ns] of simulation time after which what has come is written to the file
-_DISCOVERY_PERIOD_S = 1.0  # [s] of wall time between two looks for topics beyond the graph
+_DISCOVERY_PERIOD_S = 1.0  # [s] of wall time between two polls for topics beyond the graph
 _TF_INPUTS = (SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
 
 
 class RecorderNode(GraphNode[RecorderParameters]):
     """Writes every message of the graph, as it came, to a rosbag2 MCAP bag.
 
-    It ends by itself when the run has ended and everything that the other nodes have published has come.
+    It ends by itself when the run has ended and all that the other nodes have published has come.
     """
 
     def __init__(self) -> None:
         super().__init__(RECORDER, RecorderParameters)
-        self._told = True
+        self._closed = True
         self._poll_s = _POLL_S
         self._described = self._run_is_over = False
 
@@ -80,17 +81,17 @@ class RecorderNode(GraphNode[RecorderParameters]):
             self._recordings = RunRecordings(Path(folder), self._describe, self.parameters.split)
         except BagError as error:
             raise ConfigurationError(str(error)) from error
-        self._told = False
+        self._closed = False
         if self.common.mode == LOCKSTEP:
             self._poll_s = _LOCKSTEP_POLL_S
         self._others = [peer for peer in self.common.peers if peer != RECORDER]
         self._peer_parameters = PeerParameters(self, self.common.peers)
-        self._state_wire = StateCodec(self.robot.joint_names, WORLD, BASE)
-        self._pose_wire = PoseCodec(WORLD)
+        self._state_codec = StateCodec(self.robot.joint_names, WORLD, BASE)
+        self._pose_codec = PoseCodec(WORLD)
         self._tf: StampSync[Any] = StampSync(_BEHIND)
         self._links = LinkTree(self.robot)
         frames = [*self._links.frames, (WORLD, DEPUTY)]
-        self._tf_wire = TransformsCodec(self._recordings.types, frames)
+        self._tf_codec = TransformsCodec(self._recordings.types, frames)
         self._topics: set[str] = set()
         self._recorded = self.endpoints.publisher(RUN_RECORDED)
         self._take_over(self._recordings.current)
@@ -100,7 +101,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
         self._topics.add(TF)
         self._recording.begin()
         if self.parameters.record_all:
-            self.create_timer(_DISCOVERY_PERIOD_S, self._look_for_topics)
+            self.create_timer(_DISCOVERY_PERIOD_S, self._discover_topics)
 
     def clean_up(self) -> None:
         """Close the bag."""
@@ -112,10 +113,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
         """Return how far the process stands back behind others, as its parameter says."""
         return self.parameters.niceness
 
-    def settle(self) -> None:
-        """Do nothing: processor and priority are for the nodes of the loop, before this one."""
-
-    def prepared(self) -> bool:
+    def is_ready(self) -> bool:
         """Whether a bag is open, and the parameters of every node have been written into it."""
         if not self._run_is_over and not self._described and self._peer_parameters.poll():
             self._recording.describe(parameters=self._peer_parameters.values)
@@ -126,33 +124,26 @@ class RecorderNode(GraphNode[RecorderParameters]):
         """Keep in mind that the bag is to be closed when all of the run has come."""
         self._run_is_over, self._described = True, False
 
-    def on_end(self) -> None:
-        """Do nothing: the recorder ends when everything has come."""
-
     @property
     def counts(self) -> dict[str, int]:
         """Return the number of messages recorded so far, by topic."""
         return self._recording.writer.message_counts
 
-    def diagnostic_values(self) -> dict[str, object]:
+    def report(self) -> NodeReport:
         """Return how much has been recorded."""
-        counts = self.counts
-        return {"messages": sum(counts.values()), "topics": len(counts)}
-
-    def diagnostic_stamp_ns(self) -> int:
-        """Return the newest simulation time recorded."""
-        return self._recording.simulation_ns
+        values = {"messages": sum(self.counts.values()), "topics": len(self.counts)}
+        return NodeReport(self._recording.simulation_ns, values)
 
     def run(self, executor: Executor, stop: Stop) -> int:
         """Record until the run is over and everything has come, or until asked to stop; close the bag."""
         try:
-            while self.goes_on(stop) and not (self.finished and self._drained()):
+            while self.should_run(stop) and not (self.finished and self._drained()):
                 self.turn(executor)
-                self.look_for_news()
+                self.inputs.poll_news()
             if stop.asked and self.active:
-                self._take_the_rest(executor)
+                self._drain(executor)
         finally:
-            if not self._told:
+            if not self._closed:
                 self._recording.close()
             self.inputs.destroy()
         self._close()
@@ -163,7 +154,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
     def turn(self, executor: Executor) -> None:
         """Record what has come; between two runs, go on with the next bag."""
         executor.spin_once(timeout_sec=self._poll_s)
-        nothing = not self.inputs.poll()
+        nothing = not self.inputs.loop.poll()
         if not self.active:
             return
         self._flush(idle=nothing and monotonic() - self._last_message > _POLL_S)
@@ -172,7 +163,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
             self._take_over(self._recordings.current)
 
     def _describe(self, recording: Recording) -> None:
-        """Tell in a bag what it is made with."""
+        """Describe in a bag what it is made with."""
         urdf, schedule = self.robot.urdf, self._schedule_text
         recording.describe(urdf=urdf, schedule=schedule, provenance=provenance())
 
@@ -181,19 +172,19 @@ class RecorderNode(GraphNode[RecorderParameters]):
         self._recording = recording
         self._peer_parameters.ask_again()
         self._run_is_over = self._described = False
-        self._reported: set[str] = set()
+        self._counted: set[str] = set()
         self._last_message = monotonic()
         self._tf.reset()
         self._state_ns = self._flushed_ns = 0
 
     def _close(self) -> None:
-        """Complete the bag and tell what is in it, once."""
-        if not self._told:
-            self._told = True
+        """Complete the bag and print what is in it, once."""
+        if not self._closed:
+            self._closed = True
             print(ledger_table(self._recordings.close()))
 
     def _flush(self, *, idle: bool) -> None:
-        """Write to the file what has come, and tell the plant: it does not go on far without.
+        """Write to the file what has come, and report it to the plant, which does not go far ahead of it.
 
         Between two polls all that was published with a state has come. In an idle moment the last
         messages go out too, as they may not wait for others that do not come.
@@ -206,22 +197,21 @@ class RecorderNode(GraphNode[RecorderParameters]):
             self._recorded.publish(Header(stamp=time_message(self._flushed_ns)))
 
     def _drained(self) -> bool:
-        """Whether nothing is to be expected any more of a run that is over."""
-        silent = self.endpoints.silent(RUN_PUBLISHED)
-        if (self._reported | silent).issuperset(self._others) and self._recording.ledger.complete:
+        """Whether all of a run that is over has come."""
+        silent = self.endpoints.not_publishing(RUN_PUBLISHED)
+        if (self._counted | silent).issuperset(self._others) and self._recording.ledger.complete:
             return True
         return monotonic() - self._last_message > self.parameters.drain_timeout
 
-    def _take_the_rest(self, executor: Executor) -> None:
-        """Take what is on the way when the recorder is asked to stop; a graph that goes on is left alone."""
+    def _drain(self, executor: Executor) -> None:
+        """Take what is on the way when the recorder is asked to stop, even if the graph goes on."""
         begin = self._last_message = monotonic()
-        while self.inputs.poll() or monotonic() - self._last_message < _QUIET_S:
-            if monotonic() - begin > _REST_S:
+        while self.inputs.loop.poll() or monotonic() - self._last_message < _QUIET_S:
+            if monotonic() - begin > _DRAIN_S:
                 break
             executor.spin_once(timeout_sec=_POLL_S)
 
     def _record(self, topic: Topic) -> None:
-        """Record a topic of the graph."""
         profile = profile_of(topic)
         name = self.resolve_topic_name(topic.name)
         periods = {
@@ -231,89 +221,74 @@ class RecorderNode(GraphNode[RecorderParameters]):
         }
         evenly = self.common.mode == LOCKSTEP or topic.publishers == (PLANT,)
         self._open(name, topic.type, profile, periods.get(topic.rate, 0) if evenly else 0)
-        receive = self._receive_anyway if topic.rate is Rate.WALL else self._receive
-        self.endpoints.receive(topic.name, self.inputs, self._then(topic, partial(receive, name)))
+        self.endpoints.subscribe_serialized(topic.name, self.inputs.loop, self._on_serialized(topic, name))
 
-    def _then(self, topic: Topic, record: Receive[bytes]) -> Deliver:
-        """Return what records every message, good or bad, and then uses the good ones for what needs them."""
+    def _on_serialized(self, topic: Topic, name: str) -> OnSerialized:
+        """Return what records every message of a topic, good or bad, and uses the good ones where needed.
+
+        What others than the topic's own publishers send is recorded apart.
+        """
         add_to_tf = partial(self._add_to_tf, topic.name)
-        uses: dict[str, tuple[Receive[Any], Read[Any]]] = {
-            JOINT_STATES: (self._follow, stamped),
-            RUN_PUBLISHED: (self._note_counts, lambda data: decoded(data, PublishedCounts)),
-            SAMPLED_JOINT_STATES: (add_to_tf, self._state_wire.joints.checked),
-            SAMPLED_BASE_ODOMETRY: (add_to_tf, self._state_wire.odometry.checked),
-            DEPUTY_POSE: (add_to_tf, self._pose_wire.checked),
+        uses: dict[str, tuple[OnMessage[Any], Decode[Any]]] = {
+            JOINT_STATES: (self._on_state, stamped),
+            RUN_PUBLISHED: (self._on_counts, lambda data: decoded(data, PublishedCounts)),
+            SAMPLED_JOINT_STATES: (add_to_tf, self._state_codec.joints.checked),
+            SAMPLED_BASE_ODOMETRY: (add_to_tf, self._state_codec.odometry.checked),
+            DEPUTY_POSE: (add_to_tf, self._pose_codec.checked),
         }
-        use = self.refusals.guarding(topic.name, *uses[topic.name]) if topic.name in uses else None
+        use = self.message_filter.wrap(topic.name, *uses[topic.name]) if topic.name in uses else None
+        identity = None if topic.name.startswith("/") else self.endpoints.identity(topic.name)
+        of_run = topic.rate is not Rate.WALL  # others go on after the run: no sign that more is to come
 
-        def receive(data: bytes, sent_ns: int) -> None:
-            record(data, sent_ns)
+        def on_data(data: bytes, sent_ns: int, publisher: bytes) -> None:
+            if identity is not None and not self._is_own(topic, identity, publisher, data):
+                self._record_rejected(topic, data, sent_ns)
+                return
+            if of_run:
+                self._last_message = monotonic()
+            self._recording.receive(name, data, sent_ns)
             if use is not None:
                 use(data, sent_ns, b"")
 
-        sender = None if topic.name.startswith("/") else self.endpoints.sender(topic.name)
-        if sender is None:
-            return lambda data, sent_ns, publisher: receive(data, sent_ns)
+        return on_data
 
-        def deliver(data: bytes, sent_ns: int, publisher: bytes) -> None:
-            if publisher in sender.own or self._is_own(topic, sender, publisher, data):
-                receive(data, sent_ns)
-            else:
-                self._record_refused(topic, data, sent_ns)
-
-        return deliver
-
-    def _is_own(self, topic: Topic, sender: PublisherIdentity, publisher: bytes, data: bytes) -> bool:
+    def _is_own(self, topic: Topic, identity: PublisherIdentity, publisher: bytes, data: bytes) -> bool:
         """Whether a message is from the topic's own publishers.
 
-        One that comes before discovery tells whose it is passes for that only if it is of the topic's type.
+        One that comes before discovery knows its publisher counts as that only if it is of the topic's type.
         """
+        if publisher in identity.own:
+            return True
         try:
-            sender.require(publisher)
-            if publisher and publisher not in sender.own:
+            identity.require(publisher)
+            if publisher and publisher not in identity.own:
                 decoded(data, message_class(topic.type))
         except MessageError as error:
-            self.refusals.add(topic.name, error)
+            self.message_filter.reject(topic.name, error)
             return False
         return True
 
-    def _record_refused(self, topic: Topic, data: bytes, sent_ns: int) -> None:
-        """Record a message of another publisher on a topic of its own, so that it passes for nothing else."""
+    def _record_rejected(self, topic: Topic, data: bytes, sent_ns: int) -> None:
+        """Record a message of another publisher on a topic of its own, where nothing counts for the run."""
         name = self.resolve_topic_name(topic.name) + REFUSED_TOPIC
         if name not in self._topics:
             self._open(name, topic.type, profile_of(topic), 0)
-        self._receive_anyway(name, data, sent_ns)
+        self._recording.receive(name, data, sent_ns)
 
     def _open(self, name: str, type_name: str, profile: QoSProfile, period_ns: int) -> None:
-        """Open a topic in the bag."""
         self._recordings.add_topic(name, type_name, (stored(profile),), period_ns)
         self._topics.add(name)
 
-    def _receive(self, name: str, data: bytes, sent_ns: int) -> None:
-        """Record one message that was sent at a wall-clock time."""
-        self._last_message = monotonic()
-        self._recording.receive(name, data, sent_ns)
-
-    def _follow(self, state: Stamped[bytes], sent_ns: int) -> None:
-        """Note from a state how far the run has come."""
+    def _on_state(self, state: Stamped[bytes], sent_ns: int) -> None:
         self._state_ns, _ = state
 
-    def _receive_anyway(self, name: str, data: bytes, sent_ns: int) -> None:
-        """Record one message of a topic that goes on after the run, which is no sign that more is to come."""
-        self._recording.receive(name, data, sent_ns)
-
-    def _receive_now(self, name: str, data: bytes) -> None:
-        """Record one message of a topic beyond the graph, which comes by the executor."""
-        self._receive_anyway(name, data, time_ns())
-
-    def _note_counts(self, message: PublishedCounts, sent_ns: int) -> None:
-        """Note that a node has told what it has published in all."""
-        self._reported.add(message.node)
+    def _on_counts(self, message: PublishedCounts, sent_ns: int) -> None:
+        self._counted.add(message.node)
 
     def _add_to_tf(self, topic: str, message: Stamped[Any], sent_ns: int) -> None:
         """Keep a message, and when its companions are there too record the transforms that follow."""
         stamp, content = message
-        if self._tf.begins_anew(stamp):
+        if self._tf.restarts_run(stamp):
             self._tf.reset()
         self._tf.add(stamp, topic, content)
         inputs = self._tf.take(stamp, _TF_INPUTS)
@@ -322,9 +297,9 @@ class RecorderNode(GraphNode[RecorderParameters]):
         state = state_of(stamp, inputs[SAMPLED_JOINT_STATES], inputs[SAMPLED_BASE_ODOMETRY])
         poses = self._links.poses(state.base_in_world, state.joint_position)
         poses.append(inputs[DEPUTY_POSE])
-        self._recording.receive_at(TF, self._tf_wire.pack(stamp, poses), stamp, sent_ns)
+        self._recording.receive_at(TF, self._tf_codec.pack(stamp, poses), stamp, sent_ns)
 
-    def _look_for_topics(self) -> None:
+    def _discover_topics(self) -> None:
         """Record topics beyond the graph, with the quality of service that their publishers offer."""
         for name, type_names in self.get_topic_names_and_types():
             publishers = self.get_publishers_info_by_topic(name)
@@ -338,8 +313,12 @@ class RecorderNode(GraphNode[RecorderParameters]):
             except SmsHandoverError as error:
                 self.get_logger().warning(f"{name} is not recorded: {error}")
                 continue
-            receive = partial(self._receive_now, name)
-            self.create_subscription(kind, name, receive, weakest(offers), raw=True)
+            on_data = partial(self._on_other, name)
+            self.create_subscription(kind, name, on_data, weakest(offers), raw=True)
+
+    def _on_other(self, name: str, data: bytes) -> None:
+        """Record one message of a topic beyond the graph, which comes by the executor."""
+        self._recording.receive(name, data, time_ns())
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -1,7 +1,8 @@
-"""The trajectory node."""
+"""Trajectory node: phases, joint references and tool targets from the schedule."""
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -22,13 +23,9 @@ from sms_handover.graph.topics import (
     TRAJECTORY,
     target_pose,
 )
+from sms_handover.messages.values import time_ns
 from sms_handover.model.poses import pose_row
-from sms_handover.ros.codecs.convert import (
-    joints_in_order,
-    set_joint_positions,
-    set_pose,
-    stamp_ns_of,
-)
+from sms_handover.ros.codecs.convert import joints_in_order, set_joint_positions, set_pose
 from sms_handover.ros.codecs.events import read_grasp_event
 from sms_handover.ros.codecs.loop_messages import (
     JointStateCodec,
@@ -39,9 +36,9 @@ from sms_handover.ros.codecs.loop_messages import (
     state_of,
 )
 from sms_handover.ros.codecs.task_phase import PhaseCodec
+from sms_handover.ros.node.diagnostics import NodeReport
 from sms_handover.ros.node.endpoints import CountedPublisher
 from sms_handover.ros.node.graph_node import GraphNode
-from sms_handover.ros.node.message_filter import Receive
 from sms_handover.ros.process.main import run_node
 from sms_handover.ros.transport.stamp_sync import StampSync
 from sms_handover.simulation.feasibility import check_feasibility
@@ -69,87 +66,81 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         schedule = load_task(self.common, self.robot)
         check_feasibility(Scenario(_for_any_plant(load_parameters()), self.robot, schedule))
         self._generator = TrajectoryGenerator(self.robot, schedule, self.parameters)
-        self._reference_wire = JointStateCodec(self.robot.joint_names, ("position", "velocity"))
-        self._pose_wire, self._phase_wire = PoseCodec(WORLD), PhaseCodec()
+        self._reference_codec = JointStateCodec(self.robot.joint_names, ("position", "velocity"))
+        self._pose_codec, self._phase_codec = PoseCodec(WORLD), PhaseCodec()
         self._lockstep = self.common.mode == LOCKSTEP
         ahead_ns = self.common.reference_ns if self._lockstep else NS_PER_S
         self._inputs: StampSync[Any] = StampSync(ahead_ns=ahead_ns, paced=not self._lockstep)
-        self._stamp_ns = self._newest_ns = self._asked_ns = 0
-        self._answer: list[tuple[CountedPublisher, bytes]] = []
+        self._stamp_ns = self._newest_ns = self._requested_ns = 0
+        self._outputs: list[tuple[CountedPublisher, bytes]] = []
         self._failures = self._overdue = 0
-        self._solver = self.inputs.asker(SolveIK, SOLVE_IK, self._on_solution)
+        self._solver = self.inputs.loop.create_client(SolveIK, SOLVE_IK, self._on_response)
         self._names = list(self.robot.joint_names)
-        self._request = SolveIK.Request()  # filled anew each time: most of it never changes
+        self._request = SolveIK.Request()  # refilled each time: most of it never changes
         self._request.seed.name = self._names
-        self._asked: tuple[RobotState, TaskPhase, Targets] | None = None
+        self._requested: tuple[RobotState, TaskPhase, Targets] | None = None
         self._phase = self.endpoints.publisher(TASK_PHASE)
         self._ik_status = self.endpoints.publisher(IK_STATUS)
         self._reference = self.endpoints.publisher(JOINT_REFERENCE)
         self._targets = {arm: self.endpoints.publisher(target_pose(arm)) for arm in self.robot.arms}
-        self.receive(GRASP_EVENT, self._on_grasp, stamped)
+        self.inputs.subscribe(GRASP_EVENT, self._on_grasp, stamped)
         state = StateCodec(self.robot.joint_names, WORLD, BASE)
-        self.receive(SAMPLED_JOINT_STATES, self._taker(SAMPLED_JOINT_STATES), state.joints.checked)
-        self.receive(SAMPLED_BASE_ODOMETRY, self._taker(SAMPLED_BASE_ODOMETRY), state.odometry.checked)
-        self.receive(DEPUTY_POSE, self._taker(DEPUTY_POSE), self._pose_wire.checked)
+        checks = (state.joints.checked, state.odometry.checked, self._pose_codec.checked)
+        for topic, checked in zip(_INPUTS, checks, strict=True):
+            self.inputs.subscribe(topic, partial(self._on_input, topic), checked)
 
-    def prepared(self) -> bool:
+    def is_ready(self) -> bool:
         """Whether the IK service is there."""
-        return self._solver.ready()
+        return self._solver.service_is_ready()
 
     def reset_run(self) -> None:
-        """Forget the run: phases, what waits of it, and the question that is under way."""
+        """Forget the run: phases, what waits of it, and the request that is under way."""
         self._generator.reset()
         self._inputs.reset_run()
         self._stamp_ns = self._newest_ns = self._failures = 0
-        self._overdue += self._asked is not None
-        self._answer = []
-        self._asked = None
+        self._overdue += self._requested is not None
+        self._outputs = []
+        self._requested = None
 
-    def diagnostic_values(self) -> dict[str, object]:
+    def report(self) -> NodeReport:
         """Return how many references were given and how many IK requests did not converge."""
-        return {"references": self._reference.count, "ik_not_converged": self._failures}
-
-    def diagnostic_stamp_ns(self) -> int:
-        """Return the stamp of the last reference."""
-        return self._stamp_ns
+        values = {"references": self._reference.count, "ik_not_converged": self._failures}
+        return NodeReport(self._stamp_ns, values)
 
     @property
     def awaited(self) -> str:
-        """Return the answer of the service while there is a request, else what comes last of a state."""
-        if self._asked is not None:
+        """The response of the service while there is a request, else what comes last of a state."""
+        if self._requested is not None:
             return SOLVE_IK
         if self._waits_for_grasps:
             return GRASP_EVENT
         stamp = self._inputs.oldest_ns
         return (self._inputs.missing(stamp, _INPUTS) if stamp is not None else "") or DEPUTY_POSE
 
-    def _taker(self, topic: str) -> Receive[Stamped[Any]]:
-        """Return the callback of a topic."""
-        return lambda content, sent_ns: self._take(topic, *content)
-
-    def _take(self, topic: str, stamp: int, content: Any) -> None:
-        """Take one input; time zero behind a later time begins the run anew."""
-        if self._inputs.begins_anew(stamp):
+    def _on_input(self, topic: str, message: Stamped[Any], sent_ns: int) -> None:
+        """Take one input; time zero after a later time restarts the run."""
+        stamp, content = message
+        if self._inputs.restarts_run(stamp):
             self._inputs.reset()
             self._generator.reset()
-        if topic == DEPUTY_POSE and self._asked is not None:
-            self._ask_again(stamp)
+        if topic == DEPUTY_POSE and self._requested is not None:
+            self._repeat_request(stamp)
         elif topic == DEPUTY_POSE and stamp == self._stamp_ns:
             self._publish_again()
         self._inputs.add(stamp, topic, content)
         self._newest_ns = stamp
-        if self._asked is None:
+        if self._requested is None:
             self._proceed(stamp)
 
     @property
     def _waits_for_grasps(self) -> bool:
-        """Whether it has to be known what came of a grasp before the task goes on (lock step)."""
+        """Whether the task waits for the result of a grasp (lock step)."""
         return self._lockstep and self._generator.awaits_grasps
 
     def _on_grasp(self, message: Stamped[bytes], sent_ns: int) -> None:
-        """Take what came of a grasp; the next state may have come before it."""
+        """Take the result of a grasp; the next state may have come before it."""
         self._generator.grasped((read_grasp_event(message[1]),))
-        if self._asked is None:
+        if self._requested is None:
             self._proceed(self._newest_ns)
 
     def _proceed(self, stamp: int) -> None:
@@ -165,77 +156,73 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         for event in self._generator.take_decisions():
             self.events.publish(event)
         if targets.tool_in_world:
-            self._ask(state, phase, targets)
+            self._call_solver(state, phase, targets)
         else:
             self._publish(state, phase, targets, targets.joint_position)
 
-    def _ask(self, state: RobotState, phase: TaskPhase, targets: Targets) -> None:
-        """Ask the IK service, and publish when it has answered."""
-        question = self._generator.ik_request(state, targets)
-        request, poses = self._request, question.tool_in_world.values()
-        set_pose(request.base_in_world, question.base_in_world)
-        set_joint_positions(request.seed, question.seed, state.stamp_ns)
+    def _call_solver(self, state: RobotState, phase: TaskPhase, targets: Targets) -> None:
+        """Call the IK service; its response is published."""
+        wanted = self._generator.ik_request(state, targets)
+        request, poses = self._request, wanted.tool_in_world.values()
+        set_pose(request.base_in_world, wanted.base_in_world)
+        set_joint_positions(request.seed, wanted.seed, state.stamp_ns)
         if len(request.tool_in_world) != len(poses):
             request.tool_in_world = [PoseMessage() for _ in poses]
-        request.arms = list(question.tool_in_world)
+        request.arms = list(wanted.tool_in_world)
         for message, pose in zip(request.tool_in_world, poses, strict=True):
             set_pose(message, pose)
-        self._asked, self._asked_ns = (state, phase, targets), state.stamp_ns
-        self._solver.ask(request)
+        self._requested, self._requested_ns = (state, phase, targets), state.stamp_ns
+        self._solver.call(request)
 
-    def _ask_again(self, stamp: int) -> None:
-        """Repeat a request that has no answer when the plant asks again or, in real time, after a second.
+    def _repeat_request(self, stamp: int) -> None:
+        """Repeat a request without a response when the plant resends its state or, in real time, after 1 s.
 
-        The first answer of a service is lost if its node has not found who asks within 100 ms (rmw_fastrtps).
+        rmw_fastrtps loses a response to a client that the server has not found within 100 ms.
         """
-        if stamp == self._stamp_ns or stamp - self._asked_ns > NS_PER_S:
-            self._asked_ns = stamp
+        if stamp == self._stamp_ns or stamp - self._requested_ns > NS_PER_S:
+            self._requested_ns = stamp
             self._overdue += 1
-            self._solver.ask(self._request)
+            self._solver.call(self._request)
 
-    def _on_solution(self, answer: Any) -> None:
+    def _on_response(self, response: Any) -> None:
         """Publish the reference that follows from a solution, converged or not."""
-        if self._overdue and (self._asked is None or not _answers(answer, self._asked[0].stamp_ns)):
-            self._overdue -= 1  # it is due to the run before, or to a request that was repeated
+        awaited_ns = None if self._requested is None else self._requested[0].stamp_ns
+        if self._overdue and time_ns(response.solution.header.stamp) != awaited_ns:
+            self._overdue -= 1  # it is of the run before, or to a request that was repeated
             return
-        if self._asked is None:
+        if self._requested is None:
             return
-        asked, self._asked = self._asked, None
-        if not answer.valid:
-            raise GraphError(f"the IK service refused a request: {answer.message}")
-        converged = answer.status.status == answer.status.CONVERGED
+        requested, self._requested = self._requested, None
+        if not response.valid:
+            raise GraphError(f"the IK service rejected a request: {response.message}")
+        converged = response.status.status == response.status.CONVERGED
         self._generator.solved(converged=converged)
         self._failures += not converged
-        solution = answer.solution
+        solution = response.solution
         joints = joints_in_order(self._names, solution.name, solution.position)
-        self._publish(*asked, joints)
-        self._ik_status.publish(answer.status)
+        self._publish(*requested, joints)
+        self._ik_status.publish(response.status)
         self._proceed(self._newest_ns)
 
     def _publish(self, state: RobotState, phase: TaskPhase, targets: Targets, joints: Array) -> None:
         """Publish phase, reference and targets of one period; what the loop waits for goes first."""
         reference, targets_in_world = self._generator.reference(state, targets, joints)
         position, velocity = reference.position, reference.velocity
-        packed = self._reference_wire.pack(state.stamp_ns, position=position, velocity=velocity)
-        self._answer = [(self._phase, self._phase_wire.pack(phase)), (self._reference, packed)]
+        packed = self._reference_codec.pack(state.stamp_ns, position=position, velocity=velocity)
+        self._outputs = [(self._phase, self._phase_codec.pack(phase)), (self._reference, packed)]
         for arm, pose in targets_in_world.items():
-            data = self._pose_wire.pack(state.stamp_ns, pose_row(pose))
-            self._answer.append((self._targets[arm], data))
+            data = self._pose_codec.pack(state.stamp_ns, pose_row(pose))
+            self._outputs.append((self._targets[arm], data))
         self._publish_again()
 
     def _publish_again(self) -> None:
-        """Publish what belongs to a period, for the first time or because the plant asks again."""
-        for publisher, data in self._answer:
+        """Publish what belongs to a period, for the first time or because the plant has resent its state."""
+        for publisher, data in self._outputs:
             publisher.publish(data)
 
 
-def _answers(answer: Any, stamp_ns: int) -> bool:
-    """Whether an answer of the IK service is that to a request of this stamp."""
-    return stamp_ns_of(answer.solution.header.stamp) == stamp_ns
-
-
 def _for_any_plant(parameters: ParameterSet) -> ParameterSet:
-    """Return the parameters with a plant that grasps from anywhere: what it tolerates is for it to say."""
+    """Return the parameters with a plant that grasps from anywhere: it alone knows its tolerances."""
     plant = replace(
         parameters.plant, grasp_position_tolerance=inf, grasp_angle_tolerance=inf, grasp_speed_tolerance=inf
     )

@@ -51,6 +51,13 @@ class PlantParameters:
         minimum=0.0,
         maximum=0.01,
     )
+    catch_up: float = parameter(
+        "real time: lag up to which ticks are made up for; a larger one, as after a suspension, is skipped, "
+        "and simulated time stays behind by it",
+        unit="s",
+        minimum=0.0,
+        maximum=3600.0,
+    )
 
     @property
     def grasp_tolerance(self) -> GraspTolerance:

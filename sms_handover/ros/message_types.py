@@ -1,4 +1,4 @@
-"""Message classes by the name of their type."""
+"""Message types: their classes by name."""
 
 from importlib import import_module
 from typing import Any

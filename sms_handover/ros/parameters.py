@@ -1,4 +1,4 @@
-"""Declares a dataclass of parameters on a node and reads it back."""
+"""Parameters of a node: a dataclass is declared as such and read back."""
 
 from collections.abc import Mapping
 from dataclasses import fields
@@ -37,7 +37,7 @@ def declare(node: Node, cls: type[T], file: str | None, section: str) -> T:
     values = defaults_of(cls) if file is None else read_parameter_files([config_file(file)], section)
     given = [item.name for item in fields(cls) if node.has_parameter(item.name)]  # type: ignore[arg-type]
     values.update({name: node.get_parameter(name).value for name in given})
-    checked = build(cls, values, node.get_name())  # before ROS checks the range in words of its own
+    checked = build(cls, values, node.get_name())  # before ROS checks the range with errors of its own
     hints = get_type_hints(cls)
     for item in fields(cls):  # type: ignore[arg-type]
         descriptor = _descriptor(spec_of(item), hints[item.name])
@@ -49,20 +49,20 @@ def declare(node: Node, cls: type[T], file: str | None, section: str) -> T:
 
 
 def reject_unknown(node: Node, *groups: type[object]) -> None:
-    """Raise UnknownNameError on a parameter that no group has; refuse changes from now on."""
+    """Raise UnknownNameError on a parameter that no group has; reject changes from now on."""
     known = [item.name for cls in groups for item in fields(cls)]  # type: ignore[arg-type]
     for name in node.get_parameters_by_prefix(""):
         if name not in known and not name.startswith((*_ROS_OWN, "qos_overrides.")):
             raise UnknownNameError("parameter", name, known, node.get_name())
     if node.has_parameter(_SIMULATED_TIME) and node.get_parameter(_SIMULATED_TIME).value:
         raise ConfigurationError(
-            f"{node.get_name()}: parameter {_SIMULATED_TIME!r} is true, allowed is false: it has no clock"
+            f"{node.get_name()}: parameter {_SIMULATED_TIME!r} is true, must be false: the node has no clock"
         )
-    node.add_on_set_parameters_callback(partial(_refuse_change, node))
+    node.add_on_set_parameters_callback(partial(_reject_change, node))
 
 
-def _refuse_change(node: Node, parameters: list[Parameter]) -> SetParametersResult:
-    """Refuse to change a parameter that a node has: a run is made with what its bag says."""
+def _reject_change(node: Node, parameters: list[Parameter]) -> SetParametersResult:
+    """Reject changes of parameters that a node has: a run is made with those in its bag."""
     names = ", ".join(parameter.name for parameter in parameters if node.has_parameter(parameter.name))
     return SetParametersResult(successful=not names, reason=f"{names}: set it when the node is started")
 

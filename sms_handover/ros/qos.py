@@ -1,4 +1,4 @@
-"""Quality of service of the graph: nothing may be lost, and what is latched reaches late comers."""
+"""QoS of the graph: nothing may be lost, and what is latched reaches late subscribers."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -17,7 +17,7 @@ from rclpy.qos import (
 from sms_handover.bag.qos import Durability, History, Qos, Reliability
 from sms_handover.graph.topics import Topic
 
-# said in full, so that a profile can be held against one that discovery tells of
+# in full, so that a profile can be compared with one from discovery
 _UNTIMED: dict[str, Any] = {
     "deadline": Infinite,
     "liveliness": QoSLivelinessPolicy.AUTOMATIC,

@@ -1,16 +1,14 @@
 """Run recorder: collects the ticks of a run and returns them as arrays."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from sms_handover.graph.events import RunEvent
+from sms_handover.graph.message_constants import CONSTANTS
 from sms_handover.model.poses import pose_row
 from sms_handover.run_data import RunData
 from sms_handover.simulation.loop import Observation, Period
-from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, IkStatus, Pose
+from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, Pose
 
-IK_STATUS_NUMBER: Mapping[IkStatus, int] = {status: number for number, status in enumerate(IkStatus)}
 _NOT_ASKED = -1  # in place of a status where inverse kinematics was not asked
 
 
@@ -48,7 +46,7 @@ class RunRecorder:
         periods = self._periods
         events: list[GraspEvent] = [event for period in periods for event in period.events]
         decisions: list[RunEvent] = [event for period in periods for event in period.decisions]
-        status = [IK_STATUS_NUMBER[p.ik_status] if p.ik_status else _NOT_ASKED for p in periods]
+        status = [CONSTANTS[p.ik_status] if p.ik_status else _NOT_ASKED for p in periods]
         return RunData(
             joint_names=self._joint_names,
             arms=self._arms,

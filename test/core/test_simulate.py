@@ -8,10 +8,10 @@ import pytest
 
 from sms_handover.errors import ConfigurationError, UnstableLoopError
 from sms_handover.graph.events import GRASP_FAILED, GRASP_MISSED, IK_FAILED, PHASE_RETRIED
+from sms_handover.graph.message_constants import CONSTANTS
 from sms_handover.model.poses import pose_of, pose_row, se3_of
 from sms_handover.model.reduced import base_twist_per_joint_rate, reduced_dynamics
 from sms_handover.run_data import RunData
-from sms_handover.simulation.recorder import IK_STATUS_NUMBER
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.simulation.wiring import initial_joints
@@ -279,7 +279,7 @@ def test_the_deputy_stays_until_it_is_grasped_and_then_goes_along(
 
 def test_inverse_kinematics_converged_throughout(handover: RunData) -> None:
     """Every target of the shipped schedule is in reach, from where the arms are, all of the time."""
-    assert set(handover.ik_status.tolist()) == {IK_STATUS_NUMBER[IkStatus.CONVERGED]}
+    assert set(handover.ik_status.tolist()) == {CONSTANTS[IkStatus.CONVERGED]}
 
 
 # --- what goes wrong -----------------------------------------------------------------------------
@@ -372,7 +372,7 @@ def test_an_unreachable_target_does_not_stop_the_run(make_scenario: MakeScenario
     assert far != SCHEDULE
     data = simulate(make_scenario(far, common={"duration": 0.6}))
     carry = data.ik_status[data.reference_ns >= 400_000_000]
-    assert IK_STATUS_NUMBER[IkStatus.CONVERGED] not in set(carry.tolist())
+    assert CONSTANTS[IkStatus.CONVERGED] not in set(carry.tolist())
     assert np.all(np.isfinite(data.joint_command))
 
 

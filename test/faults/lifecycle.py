@@ -103,7 +103,7 @@ def pause_early(trial: Trial) -> tuple[Ended, list[bool]]:
             with held(run, CONTROLLER):
                 caller.find(PAUSE)
                 answers = caller.call(PAUSE)
-            require(answers[0].message == "it begins paused", f"the plant says {answers[0].message!r}")
+            require(answers[0].message == "it will start paused", f"the plant says {answers[0].message!r}")
             answers += caller.call(RESUME)
         finally:
             caller.close()

@@ -127,7 +127,7 @@ def ended_or_done(number: signal.Signals, trial: Trial, ended: Ended) -> Kept:
 
     Behind its last words, while the interpreter exits, a signal does what it does to any program.
     """
-    over = "the whole run is done" in ended.out
+    over = "run complete" in ended.out
     exit_code(ended, 0, 130, -signal.SIGKILL, *([-number] if over else []))
     for pid in list(trial.remaining()):
         trial.wait_for(pid)

@@ -35,7 +35,7 @@ class LoopsExecutor:
         """Spin a node from now on."""
         self._executor.add_node(node)
         if isinstance(node, GraphNode):
-            self._inputs += [node.inputs, node.news]
+            self._inputs += [node.inputs.loop, node.inputs.news]
 
     def spin_once(self, timeout_sec: float) -> None:
         """Handle what has come; where nothing has, wait a little."""

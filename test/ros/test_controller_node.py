@@ -65,15 +65,15 @@ class Rest:
         endpoints.subscribe(RUN_READY, ready.append)
         bench.until(lambda: ready and not endpoints.unmatched, "the controller")
         names = self.scenario.robot.joint_names
-        self._state_wire = StateCodec(names, WORLD, BASE)
-        self._reference_wire = JointStateCodec(names, ("position", "velocity"))
-        self._command_wire = JointStateCodec(names, ("effort",))
+        self._state_codec = StateCodec(names, WORLD, BASE)
+        self._reference_codec = JointStateCodec(names, ("position", "velocity"))
+        self._command_codec = JointStateCodec(names, ("effort",))
 
     def messages(self, state: RobotState, reference: JointReference, phase: TaskPhase) -> dict[str, Any]:
         """Return the messages of one stamp by topic."""
-        joints, odometry = self._state_wire.pack(state)
+        joints, odometry = self._state_codec.pack(state)
         position, velocity = reference.position, reference.velocity
-        packed = self._reference_wire.pack(reference.stamp_ns, position=position, velocity=velocity)
+        packed = self._reference_codec.pack(reference.stamp_ns, position=position, velocity=velocity)
         return {
             JOINT_STATES: joints,
             BASE_ODOMETRY: odometry,
@@ -96,7 +96,7 @@ class Rest:
 
     def efforts(self) -> list[Array]:
         """Return the commands so far."""
-        return [self._command_wire.read(data)["effort"] for data in self.commands]
+        return [self._command_codec.read(data)["effort"] for data in self.commands]
 
     def by_hand(self) -> Controller:
         """Return the controller of the core."""
@@ -141,7 +141,7 @@ def test_any_order_of_arrival_gives_the_same_command(bench: Bench, law: str) -> 
         state = answered_as(rest, expected, number, *order)
         assert stamp_ns(rest.commands[-1]) == state.stamp_ns
     assert len(rest.commands) == 24
-    assert rest.node.diagnostic_values() == {"law": law, "answered": 24, "late": 0}
+    assert rest.node.report().values == {"law": law, "answered": 24, "late": 0}
 
 
 @pytest.mark.parametrize("missing", INPUTS)
@@ -192,18 +192,18 @@ def test_an_answered_stamp_is_not_answered_again(bench: Bench) -> None:
         expected.guide(Guidance(phase, reference, {}))
         wanted = effort_of(expected, state)
     assert rest.efforts()[-1].tobytes() == wanted.tobytes()
-    assert rest.node.diagnostic_values()["late"] == 4
+    assert rest.node.report().values["late"] == 4
 
 
 @pytest.mark.parametrize("law", ["nmpc", "pid"])
-def test_time_zero_begins_anew(bench: Bench, law: str) -> None:
+def test_time_zero_restarts_run(bench: Bench, law: str) -> None:
     """After a whole run the same inputs give the same bits: nothing of the first one is left."""
     rest = Rest(bench, law=law)
     for count, number in enumerate((*range(20), *range(20))):
         rest.send(rest.messages(*inputs(rest, number * REFERENCE_NS, number)), *INPUTS)
         rest.wait_for(count + 1)
     assert rest.commands[20:] == rest.commands[:20]
-    assert rest.node.diagnostic_values()["late"] == 0
+    assert rest.node.report().values["late"] == 0
 
 
 def test_a_first_reference_that_comes_again_late_changes_nothing(bench: Bench) -> None:

@@ -98,7 +98,7 @@ def test_a_reader_that_takes_nothing_is_given_up(time: Time) -> None:
     assert 10.0 < time.now - 5.0 < 60.0
 
 
-def test_patience_begins_anew_with_every_message(time: Time) -> None:
+def test_patience_restarts_run_with_every_message(time: Time) -> None:
     fake = FakePublisher(refusals=20_000)
     publisher = counted(fake)
     publisher.publish("one")
@@ -280,9 +280,9 @@ def test_what_else_an_external_node_has_is_waited_for_too(bench: Bench) -> None:
     """That it offers ``to_plant`` makes it one whose word there counts."""
     bench.start()
     plant = Endpoints(bench.plain(PLANT), *_WITH_EXTERNAL)
-    assert plant.silent(TO_PLANT.name) == {CONTROLLER}
+    assert plant.not_publishing(TO_PLANT.name) == {CONTROLLER}
     bench.plain(CONTROLLER).create_publisher(String, TO_PLANT.name, 10)
-    bench.until(lambda: plant.silent(TO_PLANT.name) == frozenset(), "its publisher")
+    bench.until(lambda: plant.not_publishing(TO_PLANT.name) == frozenset(), "its publisher")
 
 
 @pytest.mark.ros

@@ -18,13 +18,14 @@ def test_events_of_every_severity_reach_even_who_comes_late(bench: Bench) -> Non
     bench.start()
     plant = bench.plain("plant")
     events = EventPublisher(plant, Endpoints(plant, TOPICS, ()).publisher(RUN_EVENTS))
-    for number, severity in enumerate((*Severity, *Severity)):
-        events.tell("made_up", severity, "a test", number, phase="carry", value=2.0, limit=1.0, unit="s")
+    expected = [
+        RunEvent(number, "plant", "made_up", severity, "a test", "carry", 2.0, 1.0, "s")
+        for number, severity in enumerate((*Severity, *Severity))
+    ]
+    for event in expected:
+        events.publish(event)
     heard: list[RunEvent] = []
     ear = Endpoints(bench.plain("ear"), TOPICS, ())
     ear.subscribe(RUN_EVENTS, lambda message: heard.append(run_event(message)))
     bench.until(lambda: len(heard) == 6, "all events")
-    assert heard == [
-        RunEvent(number, "plant", "made_up", severity, "a test", "carry", 2.0, 1.0, "s")
-        for number, severity in enumerate((*Severity, *Severity))
-    ]
+    assert heard == expected

@@ -28,7 +28,7 @@ def test_guidance_is_given_once_when_all_of_one_instant_is_there(arms: tuple[str
         contents: dict[str, object] = dict.fromkeys(order, _HERE)
         contents[TASK_PHASE] = TaskPhase(stamp, 0, "approach")
         contents[JOINT_REFERENCE] = (np.full(14, float(stamp)), np.zeros(14))
-        *missing, last = (parts.take(topic, stamp, contents[topic]) for topic in order)
+        *missing, last = (parts.add(topic, stamp, contents[topic]) for topic in order)
         assert missing == [None] * (len(order) - 1)
         assert last is not None and list(last.tool_in_world) == list(arms)
         assert (last.phase.stamp_ns, last.reference.stamp_ns, parts.reference_ns) == (stamp, stamp, stamp)

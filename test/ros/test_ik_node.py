@@ -1,11 +1,12 @@
 """The IK service answers whatever it is asked: a solution with its status, or why there is none."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import pytest
 from geometry_msgs.msg import Pose as PoseMessage
+from sensor_msgs.msg import JointState
 from sms_handover_interfaces.msg import IkStatus as IkStatusMessage
 from sms_handover_interfaces.srv import SolveIK
 
@@ -13,7 +14,7 @@ from sms_handover.graph.topics import SOLVE_IK
 from sms_handover.ik.levenberg_marquardt import solve_ik
 from sms_handover.messages.values import header_ns
 from sms_handover.nodes.ik import IkNode
-from sms_handover.ros.codecs.convert import joint_positions_message, joints_in_order, pose_message
+from sms_handover.ros.codecs.convert import joints_in_order, set_joint_positions, set_pose
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.wiring import initial_joints
 from sms_handover.types import Array, IkRequest, IkStatus, Pose
@@ -24,6 +25,10 @@ pytestmark = pytest.mark.ros
 
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
 AT_ORIGIN = Pose(np.zeros(3), LEVEL)
+
+
+def joint_positions(names: Sequence[str], position: Array, stamp_ns: int) -> Any:
+    return set_joint_positions(JointState(name=list(names)), position, stamp_ns)
 
 
 class Asker:
@@ -52,10 +57,10 @@ class Asker:
     def request(self, stamp_ns: int = 0, **targets: Pose) -> Any:
         """Return a good request."""
         return SolveIK.Request(
-            base_in_world=pose_message(AT_ORIGIN),
-            seed=joint_positions_message(self.robot.joint_names, self.seed, stamp_ns),
+            base_in_world=set_pose(PoseMessage(), AT_ORIGIN),
+            seed=joint_positions(self.robot.joint_names, self.seed, stamp_ns),
             arms=list(targets),
-            tool_in_world=[pose_message(pose) for pose in targets.values()],
+            tool_in_world=[set_pose(PoseMessage(), pose) for pose in targets.values()],
         )
 
 
@@ -83,14 +88,14 @@ def test_answer_is_that_of_the_solver_bit_for_bit(asker: Asker) -> None:
         expected.position_error,
         expected.limit_margin,
     )
-    assert asker.node.diagnostic_values()["converged"] == 1
+    assert asker.node.report().values["converged"] == 1
 
 
 def test_seed_is_matched_by_name(asker: Asker) -> None:
     target = asker.near("arm_a", np.array([0.01, 0.0, 0.02]))
     straight = asker.request(arm_a=target)
     turned = asker.request(arm_a=target)
-    turned.seed = joint_positions_message(asker.robot.joint_names[::-1], asker.seed[::-1], 0)
+    turned.seed = joint_positions(asker.robot.joint_names[::-1], asker.seed[::-1], 0)
     assert asker.ask(turned).solution == asker.ask(straight).solution
 
 
@@ -119,7 +124,7 @@ def test_a_stall_is_told(bench: Bench) -> None:
     assert answer.valid
     assert answer.status.status == IkStatusMessage.STALLED
     assert answer.message == IkStatus.STALLED.value
-    assert asker.node.diagnostic_values()["stalled"] == 1
+    assert asker.node.report().values["stalled"] == 1
 
 
 Spoil = Callable[[Any], None]
@@ -210,7 +215,7 @@ def test_a_malformed_request_is_refused_with_the_reason(asker: Asker, spoil: Spo
     assert MALFORMED[spoil] in answer.message
     assert "\n" not in answer.message
     assert len(answer.solution.position) == 0
-    assert asker.node.diagnostic_values()["refused"] == 1
+    assert asker.node.report().values["refused"] == 1
     good = asker.ask(asker.request(arm_a=asker.near("arm_a", np.array([0.01, 0.0, 0.0]))))
     assert good.valid and good.status.status == IkStatusMessage.CONVERGED
 

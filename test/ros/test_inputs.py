@@ -103,7 +103,7 @@ def test_requests_are_answered_in_order(bench: Bench) -> None:
         def answer(request: Any, service: str = service) -> Any:
             return SetBool.Response(success=request.data, message=service)
 
-        inputs.serve(SetBool, service, answer)
+        inputs.create_service(SetBool, service, answer)
         loops.append(inputs)
         executor.add_node(server)
         for kind in (DirectInputs, ExecutorInputs):
@@ -115,7 +115,7 @@ def test_requests_are_answered_in_order(bench: Bench) -> None:
             def keep(response: Any, name: str = name) -> None:
                 answers[name].append(f"{response.message} {response.success}")
 
-            askers[name] = loops[-1].asker(SetBool, service, keep)
+            askers[name] = loops[-1].create_client(SetBool, service, keep)
             executor.add_node(client)
 
     def until(condition: Callable[[], object]) -> None:
@@ -126,10 +126,10 @@ def test_requests_are_answered_in_order(bench: Bench) -> None:
             for inputs in loops:
                 inputs.poll()
 
-    until(lambda: all(asker.ready() for asker in askers.values()))
+    until(lambda: all(asker.service_is_ready() for asker in askers.values()))
     for asker in askers.values():
         for number in range(5):
-            asker.ask(SetBool.Request(data=number % 2 == 0))
+            asker.call(SetBool.Request(data=number % 2 == 0))
     until(lambda: all(len(found) == 5 for found in answers.values()))
     for name, found in answers.items():
         service = f"twice_{name.split('_')[1]}"
@@ -173,7 +173,7 @@ def test_a_loop_that_keeps_the_processor_misses_nothing(bench: Bench, make: Call
     deadline = monotonic() + DEADLINE_S
     while len(taken) < COUNT or len(fired) < 3:
         assert monotonic() < deadline
-        loop.inputs.look(loop.executor)
+        loop.inputs.spin_some(loop.executor)
         loop.inputs.give_turn(loop.executor)
 
 

@@ -176,7 +176,7 @@ def test_an_error_in_a_transition_ends_the_node_with_its_reason(
     assert node.finalized
     stop: Any = lambda: None  # noqa: E731
     with pytest.raises(ConfigurationError, match=text):
-        node.goes_on(stop)
+        node.should_run(stop)
 
 
 def test_a_node_that_is_destroyed_has_left_the_graph(bench: Bench, name: str) -> None:
@@ -249,7 +249,7 @@ def test_a_node_that_is_silent_is_asked_again(
 
 
 def wait_for_tick(graph: Graph, tick: int) -> None:
-    graph.bench.until(lambda: graph.plant.diagnostic_stamp_ns() >= tick * TICK_NS, f"tick {tick}")
+    graph.bench.until(lambda: graph.plant.report().stamp_ns >= tick * TICK_NS, f"tick {tick}")
 
 
 def test_nobody_says_anything_of_a_run_before_it_is_active(bench: Bench) -> None:
@@ -309,11 +309,11 @@ def test_a_deactivated_plant_says_that_the_run_is_paused(bench: Bench) -> None:
     assert tool.change(ACTIVATE)
     assert tool.change(DEACTIVATE)
     assert graph.call("pause", SetBool, data=False).success
-    at = graph.plant.diagnostic_stamp_ns()
+    at = graph.plant.report().stamp_ns
     assert tool.change(ACTIVATE)
     graph.wait_for_end()
     details = [state.detail for state in Messages().of(graph, RUN_STATE)]
-    assert details == ["", "deactivated", "activated", "the whole run is done"]
+    assert details == ["", "deactivated", "activated", "run complete"]
     assert graph.stamps(JOINT_STATES) == sorted(set(graph.stamps(JOINT_STATES))) and at > 0
 
 

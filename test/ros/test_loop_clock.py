@@ -9,6 +9,7 @@ from sms_handover.ros.transport.loop_clock import LATENCY_BIN_S, LATENCY_BINS, L
 
 TICK_S = 0.25  # s; with all times multiples of 1/16 s every sum here is exact
 TICK_NS = 250_000_000
+CATCH_UP_S = 2.5  # s
 
 
 class WallClock:
@@ -32,13 +33,13 @@ def wall(monkeypatch: pytest.MonkeyPatch) -> WallClock:
 
 @pytest.fixture
 def paced(wall: WallClock) -> LoopClock:
-    clock = LoopClock(TICK_NS, paced=True)
+    clock = LoopClock(TICK_NS, paced=True, catch_up_s=CATCH_UP_S)
     clock.start()
     return clock
 
 
 def test_nothing_is_due_before_the_start(wall: WallClock) -> None:
-    clock = LoopClock(TICK_NS, paced=True)
+    clock = LoopClock(TICK_NS, paced=True, catch_up_s=CATCH_UP_S)
     wall.now += 100.0
     assert not clock.due()
     assert clock.wait_s() > 0.0
@@ -55,7 +56,7 @@ def test_first_tick_is_due_one_period_after_the_start(wall: WallClock, paced: Lo
 
 
 def test_the_wait_is_short_enough_to_notice_other_things(wall: WallClock) -> None:
-    clock = LoopClock(100 * TICK_NS, paced=True)
+    clock = LoopClock(100 * TICK_NS, paced=True, catch_up_s=CATCH_UP_S)
     clock.start()
     assert 0.0 < clock.wait_s() <= 0.5
 
@@ -72,13 +73,41 @@ def test_deadlines_do_not_drift(wall: WallClock, paced: LoopClock) -> None:
         assert paced.wait_s() == min(next_in, 0.1)
 
 
-def test_after_a_long_halt_every_missed_tick_is_made_up_for(wall: WallClock, paced: LoopClock) -> None:
-    wall.now += 10 * TICK_S
-    made_up = 0
+@pytest.mark.parametrize(
+    ("lag", "made_up", "skipped"),
+    [(CATCH_UP_S, 11, 0.0), (CATCH_UP_S + 0.0625, 1, CATCH_UP_S + 0.0625), (5000 * TICK_S, 1, 5000 * TICK_S)],
+)
+def test_after_a_halt_lag_is_made_up_for_or_skipped_if_there_is_too_much(
+    wall: WallClock, paced: LoopClock, lag: float, made_up: int, skipped: float
+) -> None:
+    """The tick that is due comes at once; behind a skip the next one is due a period later."""
+    wall.now += TICK_S + lag
+    ticks = 0
     while paced.due():
         paced.ticked()
-        made_up += 1
-    assert made_up == 10
+        ticks += 1
+    assert (ticks, paced.skipped_s) == (made_up, skipped)
+    assert paced.wait_s() > 0.0
+    wall.now += TICK_S
+    assert paced.due()
+    paced.ticked()
+    assert not paced.due()
+    assert (f"{skipped:.3g} s of lag were skipped" in paced.misses) is (skipped > 0.0)
+
+
+def test_skipped_lag_is_reported_once_a_second_and_none_of_it_is_lost(wall: WallClock) -> None:
+    clock = LoopClock(TICK_NS, paced=True, catch_up_s=TICK_S)
+    clock.start()
+    assert clock.take_skipped() == 0.0
+    reported = []
+    for _ in range(5):
+        wall.now += TICK_S + 0.3125
+        clock.ticked()
+        reported.append(clock.take_skipped())
+    assert reported == [0.3125, 0.0, 0.625, 0.0, 0.625]
+    assert sum(reported) == clock.skipped_s
+    clock.reset()
+    assert (clock.skipped_s, clock.misses) == (0.0, "")
 
 
 @pytest.mark.parametrize(("behind", "late"), [(0.0, 0), (TICK_S, 0), (TICK_S + 0.0625, 1), (3 * TICK_S, 1)])
@@ -91,7 +120,7 @@ def test_a_tick_is_late_more_than_one_period_behind(
 
 
 def test_in_lock_step_nothing_is_due_or_late(wall: WallClock) -> None:
-    clock = LoopClock(TICK_NS, paced=False)
+    clock = LoopClock(TICK_NS, paced=False, catch_up_s=CATCH_UP_S)
     clock.start()
     wall.now += 100.0
     assert not clock.due()
@@ -205,7 +234,7 @@ def test_diagnosis_has_the_thresholds_of_ros2_control(
     wall: WallClock, period: float, work: float, level: int, words: str
 ) -> None:
     """Off the rate by 5 and 10 Hz, 1 and 2 ms of work: warning and error."""
-    clock = LoopClock(KHZ_NS, paced=True)
+    clock = LoopClock(KHZ_NS, paced=True, catch_up_s=CATCH_UP_S)
     clock.start()
     for _ in range(50):
         begin = wall.now
@@ -219,7 +248,7 @@ def test_diagnosis_has_the_thresholds_of_ros2_control(
 
 
 def test_in_lock_step_no_rate_is_wrong(wall: WallClock) -> None:
-    clock = LoopClock(KHZ_NS, paced=False)
+    clock = LoopClock(KHZ_NS, paced=False, catch_up_s=CATCH_UP_S)
     clock.start()
     wall.now += 1.0
     clock.ticked()
@@ -247,7 +276,7 @@ def test_a_report_of_no_ticks_is_zero(wall: WallClock, paced: LoopClock) -> None
 
 
 def test_the_time_a_run_has_taken_leaves_pauses_out(wall: WallClock) -> None:
-    clock = LoopClock(TICK_NS, paced=False)
+    clock = LoopClock(TICK_NS, paced=False, catch_up_s=CATCH_UP_S)
     wall.now += 7.0
     assert clock.ran == 0.0
     clock.start()
@@ -262,7 +291,7 @@ def test_the_time_a_run_has_taken_leaves_pauses_out(wall: WallClock) -> None:
 
 
 def test_a_reset_counts_the_time_of_a_run_anew(wall: WallClock) -> None:
-    clock = LoopClock(TICK_NS, paced=False)
+    clock = LoopClock(TICK_NS, paced=False, catch_up_s=CATCH_UP_S)
     clock.start()
     wall.now += 2.0
     clock.reset()

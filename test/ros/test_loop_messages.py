@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped, Vector3Stamped
+from geometry_msgs.msg import Pose as PoseMessage
+from geometry_msgs.msg import PoseStamped, Vector3, Vector3Stamped
 from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_typestore
@@ -15,13 +16,7 @@ from sms_handover_interfaces.msg import EnergyStamped
 
 from sms_handover.errors import GraphError
 from sms_handover.messages.stamps import stamp_ns
-from sms_handover.ros.codecs.convert import (
-    energy_message,
-    pose_message,
-    pose_stamped,
-    time_message,
-    vector_stamped,
-)
+from sms_handover.ros.codecs.convert import header, set_pose, time_message
 from sms_handover.ros.codecs.loop_messages import (
     JointStateCodec,
     OdometryCodec,
@@ -149,10 +144,10 @@ def test_joint_state_has_the_bytes_of_rosbags(blocks: tuple[str, ...], stamp: in
 def test_names_of_any_length_keep_the_alignment(length: int) -> None:
     names = tuple(f"{number}".rjust(length, "j") for number in range(3))
     values = {block: numbers(3, seed) for seed, block in enumerate(BLOCKS)}
-    wire = JointStateCodec(names, BLOCKS)
-    packed = wire.pack(5, **values)
+    codec = JointStateCodec(names, BLOCKS)
+    packed = codec.pack(5, **values)
     assert packed == joint_state(names, values, 5)
-    read = wire.read(packed)
+    read = codec.read(packed)
     assert all(same_bits(read[block], values[block]) for block in BLOCKS)
 
 
@@ -173,19 +168,19 @@ def test_own_messages_are_read_by_the_template(
 ) -> None:
     no_general_path(monkeypatch)
     values = {block: numbers(len(JOINTS), seed) for seed, block in enumerate(blocks)}
-    wire = JointStateCodec(JOINTS, blocks)
-    read = wire.read(wire.pack(3, **values))
+    codec = JointStateCodec(JOINTS, blocks)
+    read = codec.read(codec.pack(3, **values))
     assert list(read) == list(blocks)
     assert all(same_bits(read[block], values[block]) for block in blocks)
     assert not any(array.flags.writeable for array in read.values())
 
 
 def test_packing_leaves_nothing_behind() -> None:
-    wire = JointStateCodec(JOINTS, BLOCKS)
+    codec = JointStateCodec(JOINTS, BLOCKS)
     first = {block: numbers(14, seed) for seed, block in enumerate(BLOCKS)}
-    before = wire.pack(7, **first)
-    wire.pack(8, **{block: np.zeros(14) for block in BLOCKS})
-    assert wire.pack(7, **first) == before
+    before = codec.pack(7, **first)
+    codec.pack(8, **{block: np.zeros(14) for block in BLOCKS})
+    assert codec.pack(7, **first) == before
 
 
 @pytest.mark.parametrize("order", list(permutations(range(3))))
@@ -261,13 +256,13 @@ def test_one_block_is_never_taken_for_another(
     """A message of other blocks may happen to be as long as the template, with bytes behind its end."""
     values = {block: np.arange(14.0) + 100.0 * BLOCKS.index(block) for block in sent}
     data = joint_state(JOINTS, values) + bytes(trailing)
-    wire = JointStateCodec(JOINTS, wanted)
+    codec = JointStateCodec(JOINTS, wanted)
     if set(wanted) <= set(sent):
-        read = wire.read(data)
+        read = codec.read(data)
         assert all(same_bits(read[block], values[block]) for block in wanted)
     else:
         with pytest.raises(GraphError, match="14 names and 0 values"):
-            wire.read(data)
+            codec.read(data)
 
 
 # Odometry
@@ -288,7 +283,7 @@ def test_rclpy_reads_the_odometry() -> None:
     message: Any = deserialize_message(packed, Odometry)
     assert (message.header.frame_id, message.child_frame_id) == ("world", "base_link")
     assert (message.header.stamp.sec, message.header.stamp.nanosec) == (3, 4)
-    assert message.pose.pose == pose_message(Pose(pose[:3], pose[3:]))
+    assert message.pose.pose == set_pose(PoseMessage(), Pose(pose[:3], pose[3:]))
     assert (message.twist.twist.linear.z, message.twist.twist.angular.x) == (2.0, 3.0)
     assert not np.any(message.pose.covariance) and not np.any(message.twist.covariance)
 
@@ -296,8 +291,8 @@ def test_rclpy_reads_the_odometry() -> None:
 def test_own_odometry_is_read_by_the_template(monkeypatch: pytest.MonkeyPatch) -> None:
     no_general_path(monkeypatch)
     pose, twist = numbers(7, 1), numbers(6, 2)
-    wire = OdometryCodec("world", "base_link")
-    read_pose, read_twist = wire.read(wire.pack(8, pose, twist))
+    codec = OdometryCodec("world", "base_link")
+    read_pose, read_twist = codec.read(codec.pack(8, pose, twist))
     assert same_bits(read_pose, pose)
     assert same_bits(read_twist, twist)
 
@@ -350,11 +345,14 @@ def test_stamped_messages_have_the_bytes_of_rosbags(frame: str, stamp: int) -> N
 def test_rclpy_reads_the_stamped_messages() -> None:
     values = np.arange(1.0, 8.0)
     pose: Any = deserialize_message(PoseCodec("world").pack(3_000_000_004, values), PoseStamped)
-    assert pose == pose_stamped(Pose(values[:3], values[3:]), 3_000_000_004)
+    assert (pose.header, pose.pose) == (
+        header(3_000_000_004),
+        set_pose(PoseMessage(), Pose(values[:3], values[3:])),
+    )
     vector: Any = deserialize_message(vector_codec("world").pack(5, values[:3]), Vector3Stamped)
-    assert vector == vector_stamped(values[:3], 5)
+    assert vector == Vector3Stamped(header=header(5), vector=Vector3(x=1.0, y=2.0, z=3.0))
     energy: Any = deserialize_message(energy_codec("world").pack(6, values[:2]), EnergyStamped)
-    assert energy == energy_message(1.0, 2.0, 6)
+    assert energy == EnergyStamped(header=header(6), kinetic=1.0, work=2.0)
 
 
 @pytest.mark.parametrize("size", [0, 2, 4, 7])
@@ -369,8 +367,8 @@ def test_numbers_that_do_not_fill_a_message_are_refused(size: int) -> None:
 def test_a_state_comes_back_bit_for_bit() -> None:
     pose, twist, joints = numbers(7, 1), numbers(6, 2), [numbers(14, seed) for seed in range(3)]
     state = RobotState.of(61_234_567_890, Pose(pose[:3], pose[3:]), Twist(twist[:3], twist[3:]), *joints)
-    wire = StateCodec(JOINTS, "world", "base_link")
-    read = wire.read(*wire.pack(state))
+    codec = StateCodec(JOINTS, "world", "base_link")
+    read = codec.read(*codec.pack(state))
     assert read.stamp_ns == state.stamp_ns
     for name in ("joint_position", "joint_velocity", "joint_effort"):
         assert same_bits(getattr(read, name), getattr(state, name))

@@ -53,7 +53,7 @@ class Log:
         self.lines: list[str] = []
         self.firsts: list[str] = []
         monkeypatch.setattr("sms_handover.ros.node.message_filter.monotonic", lambda: self.now)
-        self.refusals = MessageFilter(self.lines.append, lambda topic, error: self.firsts.append(topic))
+        self.message_filter = MessageFilter(self.lines.append, lambda topic, error: self.firsts.append(topic))
 
 
 @pytest.fixture
@@ -64,28 +64,28 @@ def log(monkeypatch: pytest.MonkeyPatch) -> Log:
 def test_a_flood_is_one_line_a_second(log: Log) -> None:
     for _ in range(3):
         for _ in range(1000):
-            log.refusals.add("joint_command", BAD)
+            log.message_filter.reject("joint_command", BAD)
         log.now += 1.0
-    log.refusals.tell()
+    log.message_filter.report()
     assert log.firsts == ["joint_command"]
-    assert log.refusals.counts == {"joint_command: not finite": 3000}
+    assert log.message_filter.counts == {"joint_command: not finite": 3000}
     assert len(log.lines) == 4
-    assert log.lines[0] == "joint_command: refused, not finite: the effort is not finite"
+    assert log.lines[0] == "joint_command: rejected, not finite: the effort is not finite"
     assert log.lines[1].endswith("(998 more since the last line)")
     assert sum("more" in line for line in log.lines) == 3
 
 
 def test_each_topic_and_reason_is_counted_by_itself(log: Log) -> None:
-    log.refusals.add("a", BAD)
-    log.refusals.add("b", BAD)
-    log.refusals.add("b", MessageError(Reason.OLD, "late"))
+    log.message_filter.reject("a", BAD)
+    log.message_filter.reject("b", BAD)
+    log.message_filter.reject("b", MessageError(Reason.OLD, "late"))
     assert log.firsts == ["a", "b", "b"]
-    assert list(log.refusals.counts.values()) == [1, 1, 1]
+    assert list(log.message_filter.counts.values()) == [1, 1, 1]
 
 
 def test_nothing_refused_is_not_told(log: Log) -> None:
-    log.refusals.tell()
-    assert log.lines == [] and log.refusals.counts == {}
+    log.message_filter.report()
+    assert log.lines == [] and log.message_filter.counts == {}
 
 
 def test_a_message_that_fails_a_check_is_not_handed_on(log: Log) -> None:
@@ -96,11 +96,11 @@ def test_a_message_that_fails_a_check_is_not_handed_on(log: Log) -> None:
             raise BAD
         return data
 
-    deliver = log.refusals.guarding("a", lambda data, sent_ns: taken.append(data), checked)
+    deliver = log.message_filter.wrap("a", lambda data, sent_ns: taken.append(data), checked)
     for data in (b"one", b"bad", b"two"):
         deliver(data, 0, b"")
     assert taken == [b"one", b"two"]
-    assert log.refusals.counts == {"a: not finite": 1}
+    assert log.message_filter.counts == {"a: not finite": 1}
 
 
 def test_other_errors_are_not_swallowed(log: Log) -> None:
@@ -108,7 +108,7 @@ def test_other_errors_are_not_swallowed(log: Log) -> None:
         raise RuntimeError("broken")
 
     with pytest.raises(RuntimeError):
-        log.refusals.guarding("a", fail, bytes)(b"", 0, b"")
+        log.message_filter.wrap("a", fail, bytes)(b"", 0, b"")
 
 
 # Who a message is from
@@ -138,8 +138,8 @@ class Topic:
         node: Any = self.graph
         self.sender = PublisherIdentity(node, "/joint_command", ("plant", "controller"), several=several)
         self.taken: list[int] = []
-        self.refusals = MessageFilter(lambda line: None, lambda topic, error: None)
-        self._deliver = self.refusals.guarding(
+        self.message_filter = MessageFilter(lambda line: None, lambda topic, error: None)
+        self._deliver = self.message_filter.wrap(
             "t", lambda data, sent_ns: self.taken.append(sent_ns), lambda data: None, self.sender
         )
 
@@ -156,7 +156,7 @@ def test_only_messages_of_the_own_publisher_are_taken() -> None:
     assert topic.come(1, 1) == [1, 1]
     topic.graph.publishers["intruder"] = 2
     assert topic.come(2, 1, 2, 2, 1) == [1, 1]
-    assert topic.refusals.counts == {"t: second publisher": 3}
+    assert topic.message_filter.counts == {"t: second publisher": 3}
     assert topic.sender.others == ["/intruder"]
 
 
@@ -200,7 +200,7 @@ def test_who_has_no_name_yet_does_not_count_beside_the_own_publisher() -> None:
     assert topic.come(1, 2) == [1]
     topic.graph.publishers = {"controller": 1, "intruder": 2}
     assert topic.come(2) == []
-    assert topic.refusals.counts == {"t: second publisher": 2}
+    assert topic.message_filter.counts == {"t: second publisher": 2}
 
 
 def test_a_stranger_alone_does_not_count() -> None:
@@ -353,7 +353,7 @@ def refused(graph: Graph) -> dict[str, int]:
     """Return what all nodes have refused by kind."""
     total: dict[str, int] = {}
     for node in graph.nodes.values():
-        for kind, count in node.refusals.counts.items():
+        for kind, count in node.message_filter.counts.items():
             total[kind] = total.get(kind, 0) + count
     return total
 
@@ -376,7 +376,7 @@ def test_bad_messages_change_no_bit_of_a_run(bench: Bench, transport: str) -> No
     bench.close()
     graph = Graph(bench, common)
     graph.ear.get_ready(bench)
-    bench.until(lambda: graph.plant.diagnostic_stamp_ns() >= 60_000_000, "tick 60")
+    bench.until(lambda: graph.plant.report().stamp_ns >= 60_000_000, "tick 60")
     expected = spoil(graph)
     graph.wait_for_end()
     told_back = f"{RUN_RECORDED}: {Reason.OLD.value}"  # the ear follows a bad state with an old stamp
@@ -403,14 +403,14 @@ def test_a_second_controller_is_refused_by_name(bench: Bench) -> None:
     bench.close()
     graph = Graph(bench, common)
     graph.ear.get_ready(bench)
-    bench.until(lambda: graph.plant.diagnostic_stamp_ns() >= 20_000_000, "tick 20")
+    bench.until(lambda: graph.plant.report().stamp_ns >= 20_000_000, "tick 20")
     intruder = bench.plain("intruder").create_publisher(JointState, JOINT_COMMAND, LOSSLESS)
     names = list(graph.plant.robot.joint_names)
 
     sent: list[int] = []
 
     def sent_enough() -> bool:
-        now_ns = graph.plant.diagnostic_stamp_ns()
+        now_ns = graph.plant.report().stamp_ns
         if now_ns in sent:  # it is not faster than the run, whose numbers it would catch up with
             return len(sent) > 100
         message = JointState(name=names, effort=[5.0] * len(names))
@@ -432,9 +432,9 @@ def test_a_second_controller_is_refused_by_name(bench: Bench) -> None:
 def test_where_senders_are_not_told_apart_a_second_controller_ends_the_run(bench: Bench) -> None:
     graph = Graph(bench, {"common": {"transport": EXECUTOR}})
     graph.ear.get_ready(bench)
-    bench.until(lambda: graph.plant.diagnostic_stamp_ns() >= 20_000_000, "tick 20")
+    bench.until(lambda: graph.plant.report().stamp_ns >= 20_000_000, "tick 20")
     bench.plain("intruder").create_publisher(JointState, JOINT_COMMAND, LOSSLESS)
-    bench.until(lambda: graph.plant.endpoints.intruders, "the second controller to be found")
+    bench.until(lambda: graph.plant.endpoints.other_publishers, "the second controller to be found")
     with pytest.raises(MessageError, match="'/intruder', which publishes joint_command too") as caught:
         graph.plant.publish_diagnostics()
     assert caught.value.reason is Reason.SENDER

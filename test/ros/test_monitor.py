@@ -3,10 +3,9 @@
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import Point, PoseStamped
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
@@ -30,20 +29,23 @@ from sms_handover.ros.codecs.convert import (
     event_message,
     header,
     phase_message,
-    pose_stamped,
     run_event_message,
 )
-from sms_handover.ros.node.graph_node import INPUTS
+from sms_handover.ros.node.node_inputs import INPUTS
 from sms_handover.ros.qos import LATCHED, LOSSLESS
 from sms_handover.ros.transport.inputs import ExecutorInputs, Inputs
 from sms_handover.simulation.parameters import DIRECT
-from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, Pose, TaskPhase
+from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, TaskPhase
 
 from .bench import Bench
 
 pytestmark = pytest.mark.ros
 
-LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
+
+def position_stamped(x: float, y: float, z: float) -> PoseStamped:
+    message = PoseStamped(header=header(0))
+    message.pose.position = Point(x=x, y=y, z=z)
+    return message
 
 
 class FakeGraph:
@@ -104,9 +106,9 @@ def test_progress_is_followed(graph: FakeGraph) -> None:
     phase = phase_message(TaskPhase(40_000_000, 1, "carry"))
     graph.until(lambda: progress.phase == "carry", "the phase", (TASK_PHASE, phase))
     assert progress.stamp_ns == 40_000_000
-    graph.state(RunState.FINISHED, 50_000_000, "the whole run is done")
+    graph.state(RunState.FINISHED, 50_000_000, "run complete")
     graph.until(lambda: graph.monitor.finished, "the end")
-    assert (progress.stamp_ns, progress.detail) == (50_000_000, "the whole run is done")
+    assert (progress.stamp_ns, progress.detail) == (50_000_000, "run complete")
 
 
 def test_a_failed_run_is_over_too(graph: FakeGraph) -> None:
@@ -218,8 +220,8 @@ def test_a_run_without_events_has_none_to_wait_for(graph: FakeGraph) -> None:
 
 def test_tool_errors_are_distances_to_the_targets(graph: FakeGraph) -> None:
     error = graph.monitor.progress.tool_error
-    target = pose_stamped(Pose(np.array([1.0, 2.0, 3.0]), LEVEL), 0)
-    tool = pose_stamped(Pose(np.array([1.002, 1.997, 3.006]), LEVEL), 0)
+    target = position_stamped(1.0, 2.0, 3.0)
+    tool = position_stamped(1.002, 1.997, 3.006)
     said = ((target_pose("arm_b"), target), (tool_pose("arm_b"), tool))
     graph.until(lambda: "arm_b" in error, "the tool", *said)
     assert error == {"arm_b": pytest.approx(0.007, rel=1e-12)}

@@ -240,5 +240,5 @@ def test_nothing_changes_while_a_node_runs(bench: Bench) -> None:
 
 def test_simulated_time_is_refused(bench: Bench) -> None:
     bench.start({CONTROLLER: {"use_sim_time": True}})
-    with pytest.raises(ConfigurationError, match="'use_sim_time' is true, allowed is false"):
+    with pytest.raises(ConfigurationError, match="'use_sim_time' is true, must be false"):
         reject_unknown(node_of(bench))

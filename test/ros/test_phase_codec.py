@@ -1,4 +1,4 @@
-"""Phases keep every field over the wire, and other senders' bytes are read as well."""
+"""Phases keep every field through the codec, and other senders' bytes are read as well."""
 
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
@@ -27,9 +27,9 @@ PHASES = [
 
 def test_packed_bytes_are_those_of_rclpy() -> None:
     """But for padding, which rclpy leaves as it finds it, and what it may add behind the end."""
-    wire, types = PhaseCodec(), MessageTypes()
+    codec, types = PhaseCodec(), MessageTypes()
     for phase in PHASES:
-        data = wire.pack(phase)
+        data = codec.pack(phase)
         whole = serialize_message(phase_message(phase))
         assert types.deserialize(data, TYPE) == types.deserialize(whole, TYPE)
         assert 0 <= len(whole) - len(data) <= 8

@@ -25,8 +25,7 @@ from sms_handover.graph.topics import (
     TASK_PHASE,
     Rate,
 )
-from sms_handover.messages.values import header_ns
-from sms_handover.ros.codecs.convert import stamp_ns_of
+from sms_handover.messages.values import header_ns, time_ns
 from sms_handover.simulation.parameters import TRANSPORTS
 
 from .bench import Bench
@@ -63,7 +62,7 @@ def test_every_stamp_comes_once_and_in_order(bench: Bench, transport: str) -> No
         (RunState.RUNNING, 0),
         (RunState.FINISHED, TICKS - 1),
     ]
-    assert states[-1].detail == "the whole run is done"
+    assert states[-1].detail == "run complete"
 
 
 def test_every_node_tells_how_much_it_has_published(graph: Graph) -> None:
@@ -88,12 +87,12 @@ def test_deputy_changes_hands(graph: Graph) -> None:
         round((APPROACH_S + CARRY_S) * 1e9),
     ]
     assert events[1].detail == "arm_b holds the deputy"
-    assert graph.plant.diagnostic_values()["holder"] == "arm_b"
+    assert graph.plant.report().values["holder"] == "arm_b"
 
 
 def test_robot_description_comes_before_the_run(graph: Graph) -> None:
     """Also if all others are ready before the plant looks whether its endpoints have matched."""
-    look = graph.plant._matching
+    look = graph.plant.membership.matching
     look.timer_period_ns = 500_000_000  # ns
     look.reset()
     graph.run()
@@ -133,7 +132,7 @@ def test_the_transport_changes_no_bit(bench: Bench, law: str) -> None:
 
 
 def wait_for_tick(graph: Graph, tick: int) -> None:
-    graph.bench.until(lambda: graph.plant.diagnostic_stamp_ns() >= tick * TICK_NS, f"tick {tick}")
+    graph.bench.until(lambda: graph.plant.report().stamp_ns >= tick * TICK_NS, f"tick {tick}")
 
 
 def reset(graph: Graph) -> None:
@@ -220,16 +219,16 @@ def test_steps_are_counted_exactly(graph: Graph) -> None:
     graph.ear.get_ready(graph.bench)
     wait_for_tick(graph, 30)
     assert pause(graph, True)
-    at = graph.plant.diagnostic_stamp_ns()
+    at = graph.plant.report().stamp_ns
     for ticks in (1, 1, 7, 45):
         answer = graph.call("step", StepTicks, ticks=ticks)
         assert answer.success
         at += ticks * TICK_NS
-        assert stamp_ns_of(answer.stamp) == at
+        assert time_ns(answer.stamp) == at
         wait_for_commands(graph, at // TICK_NS + 1)
         last = Messages().of(graph, RUN_STATE)[-1]
         assert (last.state, last.tick, header_ns(last)) == (RunState.PAUSED, at // TICK_NS, at)
-        assert graph.plant.diagnostic_stamp_ns() == at
+        assert graph.plant.report().stamp_ns == at
         assert graph.stamps(JOINT_STATES) == [k * TICK_NS for k in range(at // TICK_NS + 1)]
     assert pause(graph, False)
     graph.wait_for_end()
@@ -257,10 +256,10 @@ def test_steps_end_with_the_run(graph: Graph) -> None:
     wait_for_tick(graph, 20)
     pause(graph, True)
     answer = graph.call("step", StepTicks, ticks=2**32 - 1)
-    assert answer.success and stamp_ns_of(answer.stamp) == END_NS
+    assert answer.success and time_ns(answer.stamp) == END_NS
     answer = graph.call("step", StepTicks, ticks=1)
     assert not answer.success and "the last tick has been reached" in answer.message
-    graph.bench.until(lambda: graph.plant.diagnostic_stamp_ns() == END_NS, "the last tick")
+    graph.bench.until(lambda: graph.plant.report().stamp_ns == END_NS, "the last tick")
     pause(graph, False)
     graph.wait_for_end()
     assert graph.stamps(JOINT_STATES) == [k * TICK_NS for k in range(TICKS)]
@@ -272,7 +271,7 @@ def test_a_reset_ends_the_steps(graph: Graph) -> None:
     pause(graph, True)
     graph.call("step", StepTicks, ticks=200)
     reset(graph)
-    graph.bench.until(lambda: graph.plant.diagnostic_stamp_ns() == 0, "the reset")
+    graph.bench.until(lambda: graph.plant.report().stamp_ns == 0, "the reset")
     answered = len(graph.heard[JOINT_STATES])
     wait_for_commands(graph, answered + 1)
     assert graph.call("step", StepTicks, ticks=1).success
@@ -330,7 +329,7 @@ def test_a_missed_grasp_is_reported_and_the_deputy_stays(bench: Bench) -> None:
     assert transfer.position_error != transfer.position_error  # NaN: it does not apply
     poses = messages.of(graph, DEPUTY_POSE)
     assert all(pose.pose == poses[0].pose for pose in poses)
-    assert graph.plant.diagnostic_values()["holder"] == "none"
+    assert graph.plant.report().values["holder"] == "none"
 
 
 def test_phases_and_references_keep_to_the_schedule(graph: Graph) -> None:

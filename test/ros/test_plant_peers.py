@@ -12,6 +12,7 @@ from sms_handover_interfaces.msg import GraspEvent, LoopTiming, RunState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
+from sms_handover.graph.events import RESYNCHRONISED
 from sms_handover.graph.topics import (
     BASE_ODOMETRY,
     CLOCK,
@@ -33,6 +34,7 @@ from sms_handover.graph.topics import (
     TASK_PHASE,
 )
 from sms_handover.messages.stamps import stamp_ns
+from sms_handover.messages.values import run_event
 from sms_handover.ros.codecs.convert import header, phase_message
 from sms_handover.ros.node.endpoints import Endpoints
 from sms_handover.simulation.parameters import DIRECT
@@ -135,7 +137,7 @@ def test_every_state_tells_what_was_applied_before_it(bench: Bench) -> None:
     graph = plant_with(bench, lambda tick: wanted * (tick % 3))
     graph.run()
     assert efforts(graph) == [[0.0] * 14] + [(wanted * (k % 3)).tolist() for k in range(40)]
-    assert not any(name.startswith("saturated") for name in graph.plant.diagnostic_values())
+    assert not any(name.startswith("saturated") for name in graph.plant.report().values)
 
 
 def test_saturation_is_applied_and_reported(bench: Bench) -> None:
@@ -155,7 +157,7 @@ def test_saturation_is_applied_and_reported(bench: Bench) -> None:
     limits = [39.0] * 4 + [9.0] * 3
     assert efforts(graph)[1] == limits + [-limit for limit in limits]
     assert efforts(graph)[11] == [0.0, 0.0, 39.0] + [0.0] * 11
-    told = graph.plant.diagnostic_values()
+    told = graph.plant.report().values
     names = graph.plant.robot.joint_names
     assert {name: told[f"saturated_{name}"] for name in names} == {**dict.fromkeys(names, 10), names[2]: 15}
 
@@ -174,9 +176,9 @@ def test_a_command_without_a_joint_is_as_none(bench: Bench) -> None:
     names = [f"{arm}_joint_{number}" for arm in ("arm_a", "arm_b") for number in range(1, 8)]
     graph = plant_with(bench, names=[*names[:-1], "arm_b_joint_8"])
     graph.ear.get_ready(bench)
-    bench.until(lambda: graph.plant.refusals.counts, "a refusal")
-    assert graph.plant.refusals.counts == {f"{JOINT_COMMAND}: wrong names": 1}
-    assert graph.plant.diagnostic_stamp_ns() == 0
+    bench.until(lambda: graph.plant.message_filter.counts, "a refusal")
+    assert graph.plant.message_filter.counts == {f"{JOINT_COMMAND}: wrong names": 1}
+    assert graph.plant.report().stamp_ns == 0
 
 
 def test_without_an_answer_the_plant_waits(bench: Bench) -> None:
@@ -196,7 +198,7 @@ def test_a_state_that_nobody_answers_is_sent_again(bench: Bench) -> None:
     assert all(len(set(graph.heard[topic])) == 1 for topic in asked)
     assert len(graph.heard[CLOCK]) == 1
     assert graph.call("pause", SetBool, data=True).success
-    assert graph.plant.diagnostic_stamp_ns() == 0
+    assert graph.plant.report().stamp_ns == 0
 
 
 def test_a_grasp_far_away_misses_and_what_makes_no_sense_is_rejected(bench: Bench) -> None:
@@ -320,18 +322,40 @@ def test_in_real_time_a_reset_after_the_end_runs_again(bench: Bench, fast_clock:
 def test_in_real_time_a_paused_plant_stands_still_and_goes_on(bench: Bench, fast_clock: None) -> None:
     graph = plant_with(bench, common=REALTIME, duration=0.3)
     graph.ear.get_ready(bench)
-    run_until(graph, lambda: graph.plant.diagnostic_stamp_ns() >= 50 * TICK_NS)
+    run_until(graph, lambda: graph.plant.report().stamp_ns >= 50 * TICK_NS)
     pause = graph.client.create_client(SetBool, f"{PLANT}/pause")
     bench.until(pause.service_is_ready, "the service")
     asked = pause.call_async(SetBool.Request(data=True))
     run_until(graph, asked.done)
-    at = graph.plant.diagnostic_stamp_ns()
+    at = graph.plant.report().stamp_ns
     looks = iter(range(51))
     run_until(graph, lambda: next(looks) == 50)
-    assert graph.plant.diagnostic_stamp_ns() == at
+    assert graph.plant.report().stamp_ns == at
     pause.call_async(SetBool.Request(data=False))
     run_until(graph, lambda: graph.plant.finished and graph.everything_heard())
     assert graph.stamps(JOINT_STATES) == [k * TICK_NS for k in range(301)]
+
+
+def test_in_real_time_a_suspension_is_skipped_and_reported(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """5 s asleep are no 5000 ticks back to back: simulated time stays behind, and no tick is left out."""
+    clock = FastClock()
+    monkeypatch.setattr("sms_handover.ros.transport.loop_clock.monotonic", clock)
+    graph = plant_with(bench, common=REALTIME, plant={"catch_up": 1.0}, duration=0.2)
+    graph.ear.get_ready(bench)
+    run_until(graph, lambda: graph.plant.report().stamp_ns >= 50 * TICK_NS)
+    clock.now += 5.0
+    before, ticked_at = clock.now, graph.plant.report().stamp_ns
+    run_until(graph, lambda: graph.plant.finished and graph.everything_heard())
+    events = [run_event(message) for message in Messages().of(graph, RUN_EVENTS)]
+    (event,) = (event for event in events if event.kind == RESYNCHRONISED)
+    assert (event.limit, event.unit) == (1.0, "s of wall time")
+    assert event.stamp_ns == ticked_at + TICK_NS and 5.0 < event.value < 6.0
+    assert graph.plant.report().values["skipped_s"] == event.value
+    assert clock.now - before > 0.14  # s: the ticks that were left took at least their time
+    assert graph.stamps(JOINT_STATES) == [k * TICK_NS for k in range(201)]
+    assert "s of lag were skipped" in Messages().of(graph, RUN_STATE)[-1].detail
 
 
 def test_in_real_time_the_loop_reports_its_timing(bench: Bench) -> None:
@@ -342,7 +366,7 @@ def test_in_real_time_the_loop_reports_its_timing(bench: Bench) -> None:
     report: LoopTiming = Messages().of(graph, LOOP_TIMING)[0]
     assert 0 < report.ticks <= len(graph.heard[JOINT_STATES])
     assert 0.0 < report.period_mean <= report.period_max
-    assert stamp_ns(graph.heard[LOOP_TIMING][0]) <= graph.plant.diagnostic_stamp_ns()
+    assert stamp_ns(graph.heard[LOOP_TIMING][0]) <= graph.plant.report().stamp_ns
 
 
 def test_it_waits_for_a_recorder_that_is_behind(bench: Bench) -> None:

@@ -7,7 +7,7 @@ from types import FrameType
 import numpy as np
 import pytest
 
-from sms_handover.graph.topics import PLANT
+from sms_handover.graph.topics import JOINT_COMMAND, PLANT, TASK_PHASE
 from sms_handover.nodes.plant import PlantNode
 from sms_handover.ros.codecs.loop_messages import JointStateCodec
 from sms_handover.ros.codecs.task_phase import PhaseCodec
@@ -55,10 +55,10 @@ class Loop:
         """Answer the state of a tick."""
         if tick % PER_PERIOD == 0:
             phase = self._phase.pack(TaskPhase(tick * TICK_NS, 0, "approach"))
-            self.plant._on_phase(self._phase.checked(phase), 0)
+            self.plant._on_input(TASK_PHASE, self._phase.checked(phase), 0)
         command = self._command.pack(tick * TICK_NS, effort=np.zeros(14))
-        self.plant._on_command(self._command.checked(command), 0)
-        assert self.plant.diagnostic_stamp_ns() == (tick + 1) * TICK_NS
+        self.plant._on_input(JOINT_COMMAND, self._command.checked(command), 0)
+        assert self.plant._plant.stamp_ns == (tick + 1) * TICK_NS
 
 
 @pytest.fixture

@@ -36,12 +36,12 @@ from sms_handover.graph.topics import (
     Rate,
 )
 from sms_handover.messages.message_types import MessageTypes
+from sms_handover.messages.values import time_ns
 from sms_handover.nodes.controller import ControllerNode
 from sms_handover.nodes.ik import IkNode
 from sms_handover.nodes.plant import PlantNode
 from sms_handover.nodes.recorder import RecorderNode
 from sms_handover.nodes.trajectory import TrajectoryNode
-from sms_handover.ros.codecs.convert import stamp_ns_of
 from sms_handover.ros.codecs.loop_messages import JointStateCodec
 from sms_handover.ros.node.endpoints import Endpoints
 from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED
@@ -210,9 +210,9 @@ def test_only_the_graph_is_recorded_if_wanted(bench: Bench) -> None:
 def test_asked_to_stop_it_stops_and_the_bag_is_whole(bench: Bench) -> None:
     """The graph goes on; that must not keep the recorder from its end."""
     recorded = Recorded(bench, {"common": {"schedule": ""}})
-    code = recorded.run(lambda: recorded.recorder.diagnostic_stamp_ns() >= 100_000_000)
+    code = recorded.run(lambda: recorded.recorder.report().stamp_ns >= 100_000_000)
     assert not recorded.plant.finished
-    assert recorded.plant.diagnostic_stamp_ns() < 59_000_000_000
+    assert recorded.plant.report().stamp_ns < 59_000_000_000
     assert code == EXIT_STOPPED
     run = read_run(recorded.folder)
     assert len(run.tick_ns) >= 100
@@ -226,7 +226,7 @@ def test_an_error_leaves_a_whole_bag(bench: Bench) -> None:
     recorded = Recorded(bench)
 
     def fail_later() -> bool:
-        if recorded.recorder.diagnostic_stamp_ns() >= 50_000_000:
+        if recorded.recorder.report().stamp_ns >= 50_000_000:
             raise RuntimeError("as a bug would")
         return False
 
@@ -242,7 +242,7 @@ def test_every_run_has_a_bag_of_its_own(bench: Bench) -> None:
     asked: list[Any] = []
 
     def reset_once() -> bool:
-        if not asked and recorded.plant.diagnostic_stamp_ns() >= 150_000_000 and client.service_is_ready():
+        if not asked and recorded.plant.report().stamp_ns >= 150_000_000 and client.service_is_ready():
             asked.append(client.call_async(Trigger.Request()))
         return False
 
@@ -277,8 +277,8 @@ class FakePlant:
         diagnostics = self._endpoints.publisher(DIAGNOSTICS)
         node.create_timer(0.05, lambda: diagnostics.publish(DiagnosticArray()))  # s, well below drain_timeout
         self.recorded: list[int] = []  # stamps in ns up to which the recorder says it has everything
-        self._endpoints.subscribe(RUN_RECORDED, lambda m: self.recorded.append(stamp_ns_of(m.stamp)))
-        self._wire = JointStateCodec(("joint",), ("position",))
+        self._endpoints.subscribe(RUN_RECORDED, lambda m: self.recorded.append(time_ns(m.stamp)))
+        self._codec = JointStateCodec(("joint",), ("position",))
 
     def matched(self) -> bool:
         """Whether the recorder listens."""
@@ -287,7 +287,7 @@ class FakePlant:
     def publish(self, ticks: Iterable[int]) -> None:
         """Publish the states of ticks."""
         for tick in ticks:
-            self._state.publish(self._wire.pack(tick * 1_000_000, position=np.ones(1)))
+            self._state.publish(self._codec.pack(tick * 1_000_000, position=np.ones(1)))
 
     def run(self, ticks: list[int], told: int) -> None:
         """Publish a whole run, and tell a count."""

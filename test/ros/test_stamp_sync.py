@@ -84,15 +84,15 @@ def test_an_input_that_never_comes_does_not_fill_the_memory() -> None:
 
 def test_time_zero_begins_a_run_only_after_another() -> None:
     sync: StampSync[int] = StampSync()
-    assert not sync.begins_anew(0)
+    assert not sync.restarts_run(0)
     sync.add(0, "a", 0)
-    assert not sync.begins_anew(0)  # the other inputs of the first stamp
+    assert not sync.restarts_run(0)  # the other inputs of the first stamp
     sync.take(0, ("a",))
-    assert not sync.begins_anew(0)  # the same once more
+    assert not sync.restarts_run(0)  # the same once more
     sync.add(1, "a", 1)
     sync.take(1, ("a",))
-    assert sync.begins_anew(0)
-    assert not sync.begins_anew(1)
+    assert sync.restarts_run(0)
+    assert not sync.restarts_run(1)
 
 
 def test_as_many_stamps_wait_as_asked_for() -> None:
@@ -115,14 +115,14 @@ def test_what_is_missing_is_told_from_the_last() -> None:
     assert sync.missing(3, ("a", "b")) == ""
 
 
-def test_a_run_that_begins_anew_takes_the_same_stamps_again() -> None:
+def test_a_run_that_restarts_run_takes_the_same_stamps_again() -> None:
     sync: StampSync[str] = StampSync()
     sync.add(0, "a", "old")
     sync.take(0, ("a",))
     sync.add(1, "a", "left over")
     sync.reset()
     assert sync.take(1, ("a",)) is None
-    assert not sync.begins_anew(0)
+    assert not sync.restarts_run(0)
     sync.add(0, "a", "new")
     assert sync.take(0, ("a",)) == {"a": "new"}
     assert sync.dropped == 0
@@ -157,12 +157,12 @@ def test_a_run_in_real_time_may_go_on_as_the_wall_clock_does(monkeypatch: pytest
 
 def test_an_input_used_as_it_comes_is_used_in_order_and_once() -> None:
     order = StampOrder(ahead_ns=0)
-    order.take(0, 0)
-    order.take(5, 7)
+    order.accept(0, 0)
+    order.accept(5, 7)
     for stamp, now, reason in ((5, 7, Reason.DUPLICATE), (4, 7, Reason.OLD), (8, 7, Reason.FUTURE)):
         with pytest.raises(MessageError) as caught:
-            order.take(stamp, now)
+            order.accept(stamp, now)
         assert caught.value.reason is reason
-    order.take(7, 7)  # nothing that was refused has moved the newest
+    order.accept(7, 7)  # nothing that was refused has moved the newest
     order.reset()
-    order.take(0, 0)
+    order.accept(0, 0)

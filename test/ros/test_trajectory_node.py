@@ -1,6 +1,7 @@
 """The trajectory node: what it refuses before a run, and what it does with the answers it gets."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import count
 from typing import Any
 
@@ -82,7 +83,7 @@ def graph_with(bench: Bench, **answer: Any) -> Graph:
 
 def test_a_refusal_of_the_ik_service_ends_the_run_in_words(bench: Bench) -> None:
     graph = graph_with(bench, valid=False)
-    with pytest.raises(GraphError, match="the IK service refused a request: made up"):
+    with pytest.raises(GraphError, match="the IK service rejected a request: made up"):
         graph.run()
 
 
@@ -91,7 +92,7 @@ def test_a_solution_that_has_not_converged_is_used_and_counted(bench: Bench) -> 
     graph.run()
     trajectory = graph.nodes["trajectory"]
     assert isinstance(trajectory, TrajectoryNode)
-    told = trajectory.diagnostic_values()
+    told = trajectory.report().values
     assert told["ik_not_converged"] == told["references"] == len(graph.heard[JOINT_REFERENCE])
     assert {status.status for status in Messages().of(graph, IK_STATUS)} == {2}
 
@@ -138,16 +139,16 @@ def test_a_request_without_an_answer_is_repeated(
     graph = Graph(bench, {"plant": {"resend_after": 0.05}, "common": {"transport": transport}})
     trajectory = graph.nodes["trajectory"]
     assert isinstance(trajectory, TrajectoryNode)
-    ask, asked = trajectory._solver.ask, count()
+    ask, asked = trajectory._solver.call, count()
 
     def ask_badly(request: Any) -> None:
         if next(asked) != 3:
             ask(request)
         elif answers:
             ask(request)
-            trajectory._ask_again(trajectory._stamp_ns)
+            trajectory._repeat_request(trajectory._stamp_ns)
 
-    monkeypatch.setattr(trajectory._solver, "ask", ask_badly)
+    monkeypatch.setattr(trajectory, "_solver", replace(trajectory._solver, call=ask_badly))
     graph.run()
     schedule = {"common": {"schedule": str(bench.folder / "schedule.yaml")}}
     expected = simulate(load_scenario(schedule))

@@ -123,7 +123,7 @@ def test_bad_messages_are_refused_and_end_no_viewer(graph: Graph) -> None:
     def refused() -> dict[str, int]:
         for publisher, data in say:  # again and again, as the viewer is no reliable reader
             publisher.publish(data)
-        return viewer.refusals.counts
+        return viewer.message_filter.counts
 
     expected = {
         "deputy/pose: duplicate stamp",
@@ -133,7 +133,7 @@ def test_bad_messages_are_refused_and_end_no_viewer(graph: Graph) -> None:
         "task/phase: wrong names",
     }
     graph.bench.until(lambda: refused().keys() >= expected, "the refusals")
-    assert viewer.refusals.counts.keys() == expected
+    assert viewer.message_filter.counts.keys() == expected
     assert shown(viewer) == before
     viewer.server.close()
 

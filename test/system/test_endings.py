@@ -207,7 +207,7 @@ def test_a_missed_grasp_has_an_exit_code_of_its_own(tmp_path: Path) -> None:
 def test_without_a_recorder_nothing_is_recorded(schedule: Path, tmp_path: Path) -> None:
     done = sms_handover("run", "--no-record", "--schedule", schedule, "-o", "run", cwd=tmp_path)
     assert done.code == 0, done
-    assert "the whole run is done at 2.04 s" in done.out
+    assert "run complete at 2.04 s" in done.out
     assert not (tmp_path / "run" / "bag").exists()
 
 

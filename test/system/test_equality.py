@@ -33,7 +33,7 @@ def test_first_run(law: str, recorded: dict[str, tuple[Path, Ended]], simulated:
     assert len(run.tick_ns) == TICKS
     assert [event.status for event in run.grasp_events] == [GraspStatus.SUCCEEDED] * 2
     assert_same_bits(run, simulated[law])
-    assert "the whole run is done at 2.04 s" in ended.out
+    assert "run complete at 2.04 s" in ended.out
     assert "grasp by arm_a: succeeded" in ended.err and "transfer by arm_b: succeeded" in ended.err
 
 

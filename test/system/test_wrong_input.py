@@ -73,11 +73,11 @@ WRONG = {
     "domain that is no number": (["--domain-id", "one"], "invalid int value"),
     "node of a host": (
         ["--nodes", "plant,recoder", "--domain-id", "5"],
-        "'recoder' cannot be started, allowed",
+        "'recoder' cannot be started, must be of plant",
     ),
     "recorder of no recording": (
         ["--nodes", "recorder", "--no-record"],
-        "allowed without a recorder are plant",
+        "cannot be started without a recorder, must be of plant",
     ),
     "hosts without a domain": (["--peers", "127.0.0.1"], "give each host the same --domain-id"),
     "nodes without a domain": (["--nodes", "plant"], "give each host the same --domain-id"),

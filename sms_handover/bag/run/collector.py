@@ -104,7 +104,7 @@ class RunCollector:
         def decode(data: bytes) -> None:
             try:
                 take(self._types.deserialize(data, type_name))
-            except (AttributeError, IndexError) as error:
+            except (AttributeError, KeyError) as error:
                 raise BagError(
                     f"{self._info.path}: {name} is not as this version knows it: {error}"
                 ) from error

@@ -23,8 +23,8 @@ class GuidanceParts:
         self.reference_ns = 0  # stamp of the last complete guidance
         self.complete = False  # whether there has been one
 
-    def take(self, topic: str, stamp_ns: int, content: Any) -> Guidance | None:
-        """Take one part; return the guidance if this is the last part of its instant."""
+    def add(self, topic: str, stamp_ns: int, content: Any) -> Guidance | None:
+        """Add one part; return the guidance if this is the last part of its instant."""
         self._parts[topic] = stamp_ns, content
         if {stamp for stamp, _ in self._parts.values()} != {stamp_ns} or len(self._parts) < len(self.topics):
             return None

@@ -1,4 +1,4 @@
-"""The marker that shows the deputy in viewers: they draw the robot from its description alone."""
+"""Marker that shows the deputy in viewers, which draw only the robot from its description."""
 
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker

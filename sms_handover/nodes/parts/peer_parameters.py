@@ -1,6 +1,7 @@
-"""Asks other nodes for all their parameters, so that a recording can tell what it was made with."""
+"""Peer parameters: all parameters of other nodes, so that a recording has what it was made with."""
 
 from collections.abc import Collection, Iterable
+from functools import partial
 from time import monotonic
 from typing import Any
 
@@ -14,49 +15,38 @@ _ASK_AGAIN_S = 2.0  # [s] of wall time; many times what an answer takes
 class PeerParameters:
     """Collects the parameters of some nodes without blocking; call :meth:`poll` until it is done.
 
-    An answer may be lost: a service drops it where it has not found the reader of the one who asks, who
-    has already found it. So a node that is silent is asked again.
+    A response may be lost: a service drops it if it has not found the client's reader, though the client has
+    found the service. So a node that is silent is asked again.
     """
 
     def __init__(self, node: Node, peers: Collection[str], ask_again_s: float = _ASK_AGAIN_S) -> None:
-        """Prepare to ask ``peers``, again after so long in s."""
         self._clients = {peer: AsyncParameterClient(node, peer) for peer in peers}
         self._ask_again_s = ask_again_s
         self._asked_at: dict[str, float] = {}
         self.values: dict[str, dict[str, object]] = {}
 
     def ask_again(self) -> None:
-        """Forget the answers, for nodes that may have been configured anew."""
+        """Forget the answers, of nodes that may have been configured again."""
         self._asked_at.clear()
         self.values = {}
 
     def poll(self) -> bool:
-        """Ask every node that has appeared since or has not answered; tell whether all have answered."""
+        """Ask every node that has appeared since or has not answered; return whether all have answered."""
         now = monotonic()
         for peer in self._clients.keys() - self.values.keys():
             due = peer not in self._asked_at or now - self._asked_at[peer] > self._ask_again_s
             if due and self._clients[peer].services_are_ready():
                 self._asked_at[peer] = now
-                self._clients[peer].list_parameters(callback=self._then_get(peer))
+                self._clients[peer].list_parameters(callback=partial(self._on_names, peer))
         return len(self.values) == len(self._clients)
 
-    def _then_get(self, peer: str) -> Any:
-        """Return what to do with the list of a node's parameter names: get the values."""
+    def _on_names(self, peer: str, future: Any) -> None:
+        names = sorted(future.result().result.names)
+        self._clients[peer].get_parameters(names, callback=partial(self._on_values, peer, names))
 
-        def on_names(future: Any) -> None:
-            names = sorted(future.result().result.names)
-            self._clients[peer].get_parameters(names, callback=self._keep(peer, names))
-
-        return on_names
-
-    def _keep(self, peer: str, names: list[str]) -> Any:
-        """Return what to do with a node's parameter values: keep them."""
-
-        def on_values(future: Any) -> None:
-            values = [_plain(parameter_value_to_python(value)) for value in future.result().values]
-            self.values[peer] = dict(zip(names, values, strict=True))
-
-        return on_values
+    def _on_values(self, peer: str, names: list[str], future: Any) -> None:
+        values = [_plain(parameter_value_to_python(value)) for value in future.result().values]
+        self.values[peer] = dict(zip(names, values, strict=True))
 
 
 def _plain(value: object) -> object:

@@ -1,4 +1,4 @@
-"""What the plant publishes of its state: each tick what the loop waits for, each period what goes with it."""
+"""Plant outputs: each tick what the loop waits for, each period what goes with it."""
 
 from collections.abc import Callable
 from typing import Any
@@ -40,9 +40,9 @@ class PlantOutputs:
         self._lockstep = lockstep
         names = (*_LOOP, *_PERIOD, CLOCK, *(tool_pose(arm) for arm in robot.arms))
         self._publish: dict[str, Callable[[Any], None]] = {name: publisher(name).publish for name in names}
-        self._state_wire = StateCodec(robot.joint_names, WORLD, BASE)
-        self._pose_wire, self._vector_wire = PoseCodec(WORLD), vector_codec(WORLD)
-        self._energy_wire = energy_codec(WORLD)
+        self._state_codec = StateCodec(robot.joint_names, WORLD, BASE)
+        self._pose_codec, self._vector_codec = PoseCodec(WORLD), vector_codec(WORLD)
+        self._energy_codec = energy_codec(WORLD)
 
     def publish_loop(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
         """Publish what the other nodes of the loop wait for.
@@ -51,7 +51,7 @@ class PlantOutputs:
         done with it. In real time the controller is the one who must not wait.
         """
         publish = self._publish
-        joints, odometry = self._state_wire.pack_arrays(plant.stamp_ns, plant.q, plant.v, plant.joint_effort)
+        joints, odometry = self._state_codec.pack_arrays(plant.stamp_ns, plant.q, plant.v, plant.joint_effort)
         if with_reference and self._lockstep:
             self._publish_sample(plant, joints, odometry)
         publish[JOINT_STATES](joints)
@@ -64,7 +64,7 @@ class PlantOutputs:
         publish = self._publish
         publish[SAMPLED_JOINT_STATES](joints)
         publish[SAMPLED_BASE_ODOMETRY](odometry)
-        publish[DEPUTY_POSE](self._pose_wire.pack(plant.stamp_ns, pose_row(plant.deputy.deputy_in_world)))
+        publish[DEPUTY_POSE](self._pose_codec.pack(plant.stamp_ns, pose_row(plant.deputy.deputy_in_world)))
 
     def publish_rest(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
         """Publish what nobody in the loop waits for: tools, momenta, energy, the clock."""
@@ -72,10 +72,10 @@ class PlantOutputs:
         if with_reference:
             conserved = plant.conserved
             for arm, pose in plant.tools_in_world.items():
-                publish[tool_pose(arm)](self._pose_wire.pack(now_ns, pose_row(pose)))
+                publish[tool_pose(arm)](self._pose_codec.pack(now_ns, pose_row(pose)))
             energy = np.array([conserved.kinetic_energy, plant.work])
-            publish[LINEAR_MOMENTUM](self._vector_wire.pack(now_ns, conserved.linear_momentum))
-            publish[ANGULAR_MOMENTUM](self._vector_wire.pack(now_ns, conserved.angular_momentum))
-            publish[ENERGY](self._energy_wire.pack(now_ns, energy))
+            publish[LINEAR_MOMENTUM](self._vector_codec.pack(now_ns, conserved.linear_momentum))
+            publish[ANGULAR_MOMENTUM](self._vector_codec.pack(now_ns, conserved.angular_momentum))
+            publish[ENERGY](self._energy_codec.pack(now_ns, energy))
         if now_ns % CLOCK_PERIOD_NS == 0:
             publish[CLOCK](head(now_ns))

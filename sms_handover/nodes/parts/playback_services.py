@@ -9,8 +9,8 @@ from sms_handover_interfaces.srv import Seek, SetRate
 from std_srvs.srv import Trigger
 
 from sms_handover.errors import ConfigurationError
+from sms_handover.messages.values import time_ns
 from sms_handover.playback.schedule import PlaybackSchedule
-from sms_handover.ros.codecs.convert import stamp_ns_of
 
 
 def offer_services(node: Node, schedule: PlaybackSchedule, stop: Callable[[], None]) -> None:
@@ -24,7 +24,7 @@ def offer_services(node: Node, schedule: PlaybackSchedule, stop: Callable[[], No
     }
     for name, act in simple.items():
         node.create_service(Trigger, f"~/{name}", _answering(act))
-    seek = _answering(lambda request: schedule.seek(stamp_ns_of(request.time), monotonic_ns()))
+    seek = _answering(lambda request: schedule.seek(time_ns(request.time), monotonic_ns()))
     node.create_service(Seek, "~/seek", seek)
     rate = _answering(lambda request: schedule.set_rate(request.rate, monotonic_ns()))
     node.create_service(SetRate, "~/set_rate", rate)

@@ -1,4 +1,4 @@
-"""Messages from the values of the core and back; every number keeps its bits.
+"""Conversion of the values of the core to messages and back; every number keeps its bits.
 
 Phases and grasp events are read back by :mod:`sms_handover.messages.values`, which reads fields by name.
 """
@@ -9,9 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Pose as PoseMessage
-from geometry_msgs.msg import PoseStamped, Vector3, Vector3Stamped
 from sensor_msgs.msg import JointState
-from sms_handover_interfaces.msg import EnergyStamped
 from sms_handover_interfaces.msg import GraspCommand as GraspCommandMessage
 from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
 from sms_handover_interfaces.msg import IkStatus as IkStatusMessage
@@ -21,47 +19,10 @@ from std_msgs.msg import Header
 
 from sms_handover.errors import MessageError, Reason
 from sms_handover.frames import WORLD
-from sms_handover.graph.events import RunEvent, Severity
-from sms_handover.types import (
-    Array,
-    GraspAction,
-    GraspCommand,
-    GraspEvent,
-    GraspStatus,
-    IkResult,
-    IkStatus,
-    PhaseState,
-    Pose,
-    TaskPhase,
-    frozen,
-)
+from sms_handover.graph.events import RunEvent
+from sms_handover.graph.message_constants import CONSTANTS
+from sms_handover.types import Array, GraspCommand, GraspEvent, IkResult, Pose, TaskPhase, frozen
 from sms_handover.units import NS_PER_S
-
-_ACTIONS = {
-    GraspAction.GRASP: GraspCommandMessage.GRASP,
-    GraspAction.RELEASE: GraspCommandMessage.RELEASE,
-    GraspAction.TRANSFER: GraspCommandMessage.TRANSFER,
-}
-_GRASP_STATUS = {
-    GraspStatus.SUCCEEDED: GraspEventMessage.SUCCEEDED,
-    GraspStatus.MISSED: GraspEventMessage.MISSED,
-    GraspStatus.REJECTED: GraspEventMessage.REJECTED,
-}
-_IK_STATUS = {
-    IkStatus.CONVERGED: IkStatusMessage.CONVERGED,
-    IkStatus.STALLED: IkStatusMessage.STALLED,
-    IkStatus.ITERATION_LIMIT: IkStatusMessage.ITERATION_LIMIT,
-}
-
-_PHASE_STATE = {
-    PhaseState.ACTIVE: TaskPhaseMessage.ACTIVE,
-    PhaseState.FAILED: TaskPhaseMessage.FAILED,
-}
-_SEVERITY = {
-    Severity.INFO: RunEventMessage.INFO,
-    Severity.WARNING: RunEventMessage.WARNING,
-    Severity.ERROR: RunEventMessage.ERROR,
-}
 
 
 def time_message(stamp_ns: int) -> Time:
@@ -69,24 +30,9 @@ def time_message(stamp_ns: int) -> Time:
     return Time(sec=stamp_ns // NS_PER_S, nanosec=stamp_ns % NS_PER_S)
 
 
-def set_time(message: Time, stamp_ns: int) -> None:
-    """Fill a time message from integer nanoseconds."""
-    message.sec, message.nanosec = divmod(stamp_ns, NS_PER_S)
-
-
-def stamp_ns_of(message: Time) -> int:
-    """Return integer nanoseconds from a time message."""
-    return int(message.sec) * NS_PER_S + int(message.nanosec)
-
-
 def header(stamp_ns: int, frame: str = WORLD) -> Header:
     """Return a header with a stamp and a frame."""
     return Header(stamp=time_message(stamp_ns), frame_id=frame)
-
-
-def pose_message(pose: Pose) -> PoseMessage:
-    """Return a pose as a message."""
-    return set_pose(PoseMessage(), pose)
 
 
 def set_pose(message: PoseMessage, pose: Pose) -> PoseMessage:
@@ -104,30 +50,9 @@ def pose_of_message(message: PoseMessage) -> Pose:
     return Pose(row[:3], row[3:])
 
 
-def pose_stamped(pose: Pose, stamp_ns: int) -> PoseStamped:
-    """Return a pose in ``world`` with its stamp."""
-    return PoseStamped(header=header(stamp_ns), pose=pose_message(pose))
-
-
-def vector_stamped(vector: Array, stamp_ns: int) -> Vector3Stamped:
-    """Return a vector in the axes of ``world`` with its stamp."""
-    x, y, z = vector.tolist()
-    return Vector3Stamped(header=header(stamp_ns), vector=Vector3(x=x, y=y, z=z))
-
-
-def energy_message(kinetic: float, work: float, stamp_ns: int) -> EnergyStamped:
-    """Return the energy account of the plant."""
-    return EnergyStamped(header=header(stamp_ns), kinetic=kinetic, work=work)
-
-
-def joint_positions_message(names: Sequence[str], position: Array, stamp_ns: int) -> JointState:
-    """Return joint angles as a message."""
-    return set_joint_positions(JointState(name=list(names)), position, stamp_ns)
-
-
 def set_joint_positions(message: JointState, position: Array, stamp_ns: int) -> JointState:
     """Fill a message that has the names with joint angles, and return it."""
-    set_time(message.header.stamp, stamp_ns)
+    message.header.stamp = time_message(stamp_ns)
     message.position = array("d", position.tobytes())
     return message
 
@@ -158,7 +83,7 @@ def phase_message(phase: TaskPhase) -> TaskPhaseMessage:
         index=phase.index,
         name=phase.name,
         commands=[_command_message(command) for command in phase.commands],
-        state=_PHASE_STATE[phase.state],
+        state=CONSTANTS[phase.state],
         attempt=phase.attempt,
         end=time_message(phase.end_ns),
     )
@@ -169,7 +94,7 @@ def event_message(event: GraspEvent) -> GraspEventMessage:
     return GraspEventMessage(
         header=header(event.stamp_ns),
         command=_command_message(event.command),
-        status=_GRASP_STATUS[event.status],
+        status=CONSTANTS[event.status],
         position_error=event.position_error,
         angle_error=event.angle_error,
         relative_speed=event.relative_speed,
@@ -178,12 +103,12 @@ def event_message(event: GraspEvent) -> GraspEventMessage:
 
 
 def run_event_message(event: RunEvent) -> RunEventMessage:
-    """Return what a node has decided as a message."""
+    """Return an event of a run as a message."""
     return RunEventMessage(
         header=header(event.stamp_ns),
         node=event.node,
         kind=event.kind,
-        severity=_SEVERITY[event.severity],
+        severity=CONSTANTS[event.severity],
         phase=event.phase,
         detail=event.detail,
         value=event.value,
@@ -192,15 +117,10 @@ def run_event_message(event: RunEvent) -> RunEventMessage:
     )
 
 
-def ik_status_message(result: IkResult, stamp_ns: int) -> IkStatusMessage:
-    """Return how a solve ended as a message."""
-    return set_ik_status(IkStatusMessage(header=header(stamp_ns)), result, stamp_ns)
-
-
 def set_ik_status(message: IkStatusMessage, result: IkResult, stamp_ns: int) -> IkStatusMessage:
     """Fill a message that has a frame with how a solve ended, and return it."""
-    set_time(message.header.stamp, stamp_ns)
-    message.status = _IK_STATUS[result.status]
+    message.header.stamp = time_message(stamp_ns)
+    message.status = CONSTANTS[result.status]
     message.iterations = result.iterations
     message.position_error = result.position_error
     message.orientation_error = result.orientation_error
@@ -211,9 +131,8 @@ def set_ik_status(message: IkStatusMessage, result: IkResult, stamp_ns: int) -> 
 
 
 def _command_message(command: GraspCommand) -> GraspCommandMessage:
-    """Return a grasp command as a message."""
     return GraspCommandMessage(
-        action=_ACTIONS[command.action],
+        action=CONSTANTS[command.action],
         arm=command.arm,
         grasp_frame=command.grasp_frame,
         from_arm=command.from_arm,

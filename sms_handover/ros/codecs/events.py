@@ -1,4 +1,4 @@
-"""Reads the messages that tell of events, of whatever sender."""
+"""Event messages of any publisher as values."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -16,19 +16,19 @@ V = TypeVar("V")
 
 
 def read_grasp_event(data: bytes) -> GraspEvent:
-    """Return what came of a grasp command; raises MessageError."""
-    return _read(data, GraspEventMessage, grasp_event)
+    """Return the event of a GraspEvent message; raises MessageError."""
+    return read_value(data, GraspEventMessage, grasp_event)
 
 
 def read_run_event(data: bytes) -> RunEvent:
-    """Return what a node has decided; raises MessageError."""
-    return _read(data, RunEventMessage, run_event)
+    """Return the event of a RunEvent message; raises MessageError."""
+    return read_value(data, RunEventMessage, run_event)
 
 
-def _read(data: bytes, kind: Any, value: Callable[[Any], V]) -> V:
-    """Return the value of a message; raises MessageError if a number in it stands for nothing known."""
+def read_value(data: bytes, kind: Any, value: Callable[[Any], V]) -> V:
+    """Return the value of a message; raises MessageError on a number without a meaning."""
     try:
         return value(decoded(data, kind))
-    except IndexError as error:
-        text = f"a {kind.__name__} has an action, status or severity that is not known"
+    except KeyError as error:
+        text = f"a {kind.__name__} has an unknown action, state, status or severity"
         raise MessageError(Reason.NAMES, text) from error

@@ -1,4 +1,4 @@
-"""The phase of the task as CDR bytes; it changes a few times in a run, so its bytes are kept."""
+"""Task phase as CDR bytes; it changes a few times in a run, so its bytes are kept."""
 
 from collections.abc import Collection
 from dataclasses import replace
@@ -12,7 +12,8 @@ from sms_handover.messages.stamps import stamp_ns
 from sms_handover.messages.template import head
 from sms_handover.messages.values import task_phase
 from sms_handover.ros.codecs.convert import phase_message
-from sms_handover.ros.codecs.loop_messages import Stamped, arrival_ns, decoded
+from sms_handover.ros.codecs.events import read_value
+from sms_handover.ros.codecs.loop_messages import Stamped, arrival_ns
 from sms_handover.types import GraspAction, TaskPhase
 
 _STAMP_AT = 4  # [byte] behind the encapsulation
@@ -24,7 +25,7 @@ class PhaseCodec:
     """Packs and reads TaskPhase messages; all but the stamp is worked out once per phase."""
 
     def __init__(self, arms: Collection[str] = (), grasp_frames: Collection[str] = ()) -> None:
-        """Know the type of the message, and for :meth:`checked` of which robot and deputy it may speak."""
+        """Take the names of robot and deputy that :meth:`checked` accepts."""
         self._arms, self._grasp_frames = frozenset(arms), frozenset(grasp_frames)
         self._types = MessageTypes()
         self._packed: tuple[TaskPhase, bytes] | None = None
@@ -40,12 +41,7 @@ class PhaseCodec:
         """Return the phase in the bytes of a message, of any sender; raises MessageError if it is none."""
         rest = data[:_STAMP_AT] + data[_BODY_AT:]
         if self._read is None or self._read[0] != rest:
-            message = decoded(data, TaskPhaseMessage)
-            try:
-                self._read = rest, task_phase(message)
-            except IndexError as error:
-                text = "a phase has a grasp command of no known action"
-                raise MessageError(Reason.NAMES, text) from error
+            self._read = rest, read_value(data, TaskPhaseMessage, task_phase)
         return replace(self._read[1], stamp_ns=stamp_ns(data))
 
     def checked(self, data: bytes) -> Stamped[TaskPhase]:
@@ -67,7 +63,7 @@ class PhaseCodec:
     def _serialize(self, phase: TaskPhase) -> bytes:
         """Return what follows the stamp in the bytes of a message.
 
-        rclpy may put up to 8 bytes behind the end, which strict readers of bags refuse.
+        rclpy may put up to 8 bytes behind the end, which strict readers of bags reject.
         """
         data: bytes = serialize_message(phase_message(phase))
         end = len(self._types.serialize(self._types.deserialize(data, _TYPE)))

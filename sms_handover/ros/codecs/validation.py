@@ -1,4 +1,4 @@
-"""Checks on the numbers of a message, cheap enough for every message of a loop of 1 kHz."""
+"""Validation of the numbers of a message, cheap enough for every message of a loop of 1 kHz."""
 
 from math import isfinite
 
@@ -24,5 +24,5 @@ def check_unit(quaternion_xyzw: Array, what: str) -> None:
     squared = quaternion_xyzw.dot(quaternion_xyzw)
     if not abs(squared - 1.0) <= _UNIT_TOLERANCE:
         raise MessageError(
-            Reason.NOT_UNIT, f"{what} has a quaternion of length {np.sqrt(squared):.6g}, expected is 1"
+            Reason.NOT_UNIT, f"{what} has a quaternion of length {np.sqrt(squared):.6g}, must be 1"
         )

@@ -1,4 +1,4 @@
-"""Which processes a graph consists of, and what each is started with."""
+"""Composition of a graph: its processes, and what each is started with."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -75,8 +75,8 @@ def placed(asked: str, *, record: bool) -> tuple[tuple[str, ...], tuple[str, ...
     for name in names:
         if name not in graph:
             unrecorded = " without a recorder" if name in NODES else ""
-            allowed = f"allowed{unrecorded} are {', '.join(graph)}, with commas between"
-            raise ConfigurationError(f"node {name!r} cannot be started, {allowed}")
+            allowed = f"must be of {', '.join(graph)}, with commas between"
+            raise ConfigurationError(f"node {name!r} cannot be started{unrecorded}, {allowed}")
     return tuple(n for n in graph if n in names), tuple(n for n in graph if n not in names)
 
 

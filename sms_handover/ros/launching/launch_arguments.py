@@ -1,4 +1,4 @@
-"""The arguments of ``ros2 launch sms_handover handover.launch.py`` that set parameters of the nodes.
+"""Launch arguments of ``ros2 launch sms_handover handover.launch.py``, which set parameters of the nodes.
 
 An argument that is not given leaves its parameter to the parameter file of the user, then to ``config/``.
 """
@@ -15,6 +15,7 @@ from sms_handover.ros.reference.interfaces import COMMON_GROUP, OWN_GROUPS, Para
 from sms_handover.simulation.parameters import LOCKSTEP
 
 _EVERY_NODE = ""
+_COMMON = ("schedule", "robot", "duration", "mode", "dynamics", "external", "autostart")
 _TRUE = "true"
 
 
@@ -32,12 +33,12 @@ class LaunchArgument:
 
     @property
     def spec(self) -> ParameterSpec:
-        """What is known of the parameter."""
+        """Unit, range and description of the parameter."""
         return next(spec_of(item) for item in fields(self.group.cls) if item.name == self.parameter)
 
     @property
     def text(self) -> str:
-        """What ``--show-args`` tells."""
+        """The description in ``--show-args``."""
         unit = f" [{self.spec.unit}]" if self.spec.unit else ""
         return f"{self.spec.description}{unit}; not given: as in params_file, else config/{self.group.file}"
 
@@ -52,14 +53,8 @@ class LaunchArgument:
 ARGUMENTS = {
     "controller": LaunchArgument(CONTROLLER, "law"),
     "time_law": LaunchArgument(TRAJECTORY, "time_law"),
-    "schedule": LaunchArgument(_EVERY_NODE, "schedule"),
-    "robot": LaunchArgument(_EVERY_NODE, "robot"),
-    "duration": LaunchArgument(_EVERY_NODE, "duration"),
-    "mode": LaunchArgument(_EVERY_NODE, "mode"),
-    "dynamics": LaunchArgument(_EVERY_NODE, "dynamics"),
     "bag": LaunchArgument(RECORDER, "folder"),
-    "external": LaunchArgument(_EVERY_NODE, "external"),
-    "autostart": LaunchArgument(_EVERY_NODE, "autostart"),
+    **{name: LaunchArgument(_EVERY_NODE, name) for name in _COMMON},
 }
 
 
@@ -67,8 +62,7 @@ def launch_processes(given: Mapping[str, str], *, record: bool, compose: bool) -
     """Return the processes to start, each with the arguments that the launch arguments make.
 
     ``given`` may hold other launch arguments too; '' is one that was not given. Its ``nodes`` names the
-    nodes of this host, with commas between. Raises
-    ConfigurationError on a number that is none.
+    nodes of this host, with commas between. Raises ConfigurationError on a number that is none.
     """
     here, _ = placed(given.get("nodes", ""), record=record)
     values: dict[str, dict[str, object]] = {}

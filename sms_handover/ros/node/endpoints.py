@@ -1,4 +1,4 @@
-"""The publishers and subscriptions of a node, made from the table of topics and counted."""
+"""Endpoints of a node: its publishers and subscriptions, made from the table of topics and counted."""
 
 from collections.abc import Callable, Collection
 from time import monotonic, sleep
@@ -14,17 +14,18 @@ from sms_handover.errors import GraphError
 from sms_handover.graph.topics import RECORDER, Rate, Topic
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.qos import profile_of, serves
-from sms_handover.ros.transport.inputs import Deliver, Inputs
+from sms_handover.ros.transport.inputs import Inputs, OnSerialized
 from sms_handover.ros.transport.publisher_identity import PublisherIdentity
 
+_Found = Collection[TopicEndpointInfo]
 _RclError = rclpy_implementation.RCLError
 
 _RETRY_S = 0.001  # [s] between two tries to publish while a reader is behind
-_PATIENCE_S = 30.0  # [s] after which a reader that takes nothing is given up
+_TIMEOUT_S = 30.0  # [s] after which a reader that takes nothing is given up
 
 
 class Endpoints:
-    """Makes a node's publishers and subscriptions, tells when all have matched, counts what it publishes."""
+    """Makes a node's publishers and subscriptions, finds when all have matched, counts what it publishes."""
 
     def __init__(
         self, node: Node, topics: Collection[Topic], peers: Collection[str], external: Collection[str] = ()
@@ -40,7 +41,7 @@ class Endpoints:
         self._external = frozenset(external) - {node.get_name()}
         self._publishers: dict[str, CountedPublisher] = {}
         self._subscriptions: dict[str, Subscription] = {}
-        self._senders: dict[str, PublisherIdentity] = {}
+        self._identities: dict[str, PublisherIdentity] = {}
 
     def publisher(self, name: str) -> "CountedPublisher":
         """Return a publisher on a topic of the table."""
@@ -49,30 +50,30 @@ class Endpoints:
         self._publishers[name] = CountedPublisher(publisher)
         return self._publishers[name]
 
-    def receive(self, name: str, inputs: Inputs, deliver: Deliver) -> None:
-        """Hand every message of a topic of the table to ``deliver`` by the inputs of a node's loop."""
+    def subscribe_serialized(self, name: str, inputs: Inputs, on_data: OnSerialized) -> None:
+        """Hand every message of a topic of the table to ``on_data`` by the inputs of a node's loop."""
         topic = self._topics[name]
         self._subscriptions[name] = inputs.subscribe(
-            message_class(topic.type), topic.name, profile_of(topic), deliver
+            message_class(topic.type), topic.name, profile_of(topic), on_data
         )
 
-    def sender(self, name: str) -> PublisherIdentity:
-        """Return what knows the publishers of a topic.
+    def identity(self, name: str) -> PublisherIdentity:
+        """Return what knows the publishers of a topic that count.
 
         From now on the endpoints count as unmatched as long as somebody else publishes on the topic.
         """
         several = len(self._topics[name].publishers) > 1
         full_name = self._node.resolve_topic_name(name)
-        self._senders[name] = PublisherIdentity(self._node, full_name, self._peers, several=several)
-        return self._senders[name]
+        self._identities[name] = PublisherIdentity(self._node, full_name, self._peers, several=several)
+        return self._identities[name]
 
     @property
-    def intruders(self) -> list[str]:
-        """Return in words which other nodes publish where one alone is to."""
+    def other_publishers(self) -> list[str]:
+        """Which other nodes publish where one alone is to, in words."""
         return [
             f"the end of node {other!r}, which publishes {name} too"
-            for name, sender in self._senders.items()
-            for other in sender.others
+            for name, identity in self._identities.items()
+            for other in identity.others
         ]
 
     def subscribe(self, name: str, callback: Callable[[Any], None], *, raw: bool = False) -> Subscription:
@@ -86,45 +87,45 @@ class Endpoints:
 
     @property
     def unmatched(self) -> list[str]:
-        """Return in words what has not been found yet of the endpoints of the peers."""
-        me, node = self._node.get_name(), self._node
-        missing = []
+        """What has not been found yet of the endpoints of the peers, in words."""
+        me, node = {self._node.get_name()}, self._node
+        missing: list[str] = []
         for name, publisher in self._publishers.items():
-            there = node.get_subscriptions_info_by_topic(publisher.topic_name)
-            profile = profile_of(self._topics[name])
-            served = [reader for reader in there if serves(profile, reader.qos_profile)]
-            readers = self._wanted(name, {*self._topics[name].subscribers} - {me} | {RECORDER}, served)
-            found = _found(publisher.subscription_count, served, readers)
-            if found < len(readers):
-                missing.append(f"{found} of {len(readers)} subscriptions of {name}")
+            topic, profile = self._topics[name], profile_of(self._topics[name])
+            readers = node.get_subscriptions_info_by_topic(publisher.topic_name)
+            served = [reader for reader in readers if serves(profile, reader.qos_profile)]
+            nodes = {*topic.subscribers} - me | {RECORDER}
+            missing += self._missing("subscriptions", topic, publisher.subscription_count, served, nodes)
         for name, subscription in self._subscriptions.items():
-            there = node.get_publishers_info_by_topic(subscription.topic_name)
-            profile = profile_of(self._topics[name])
-            serving = [writer for writer in there if serves(writer.qos_profile, profile)]
-            writers = self._wanted(name, {*self._topics[name].publishers} - {me}, serving)
-            found = _found(subscription.get_publisher_count(), serving, writers)
-            if found < len(writers):
-                missing.append(f"{found} of {len(writers)} publishers of {name}")
-        return missing + self._absent or self.intruders
+            topic, profile = self._topics[name], profile_of(self._topics[name])
+            writers = node.get_publishers_info_by_topic(subscription.topic_name)
+            serving = [writer for writer in writers if serves(writer.qos_profile, profile)]
+            matched, nodes = subscription.get_publisher_count(), {*topic.publishers} - me
+            missing += self._missing("publishers", topic, matched, serving, nodes)
+        return missing + self._absent or self.other_publishers
 
-    def silent(self, name: str) -> frozenset[str]:
-        """Return the external nodes that do not publish on a topic."""
+    def _missing(self, kind: str, topic: Topic, matched: int, there: _Found, nodes: set[str]) -> list[str]:
+        """Return how many of the endpoints of some nodes have matched, in words, unless all have."""
+        wanted = self._wanted(topic, nodes, there)
+        found = _found(matched, there, wanted)
+        return [f"{found} of {len(wanted)} {kind} of {topic.name}"] if found < len(wanted) else []
+
+    def not_publishing(self, name: str) -> frozenset[str]:
+        """Return the external nodes that have no publisher on a topic."""
         there = self._node.get_publishers_info_by_topic(self._node.resolve_topic_name(name))
         return self._external - {writer.node_name for writer in there}
 
     @property
     def _absent(self) -> list[str]:
-        """Return in words which external nodes have not appeared, on topics that this node does not read."""
+        """Which external nodes have not appeared, on topics that this node does not read, in words."""
         return [
             f"the external node {name!r}, which publishes {topic.name}"
             for topic in self._topics.values()
             if topic.rate is Rate.TICK and topic.name not in self._subscriptions
-            for name in sorted(self.silent(topic.name).intersection(topic.publishers))
+            for name in sorted(self.not_publishing(topic.name).intersection(topic.publishers))
         ]
 
-    def _wanted(
-        self, name: str, nodes: Collection[str], there: Collection[TopicEndpointInfo]
-    ) -> frozenset[str]:
+    def _wanted(self, topic: Topic, nodes: set[str], there: _Found) -> frozenset[str]:
         """Return the nodes whose endpoint on a topic has to match.
 
         They are the peers among ``nodes``; of the external ones those that are ``there``, whatever the
@@ -134,13 +135,13 @@ class Endpoints:
         if not self._external:
             return wanted
         here = {endpoint.node_name for endpoint in there}
-        if self._topics[name].rate is Rate.TICK:
+        if topic.rate is Rate.TICK:
             here |= wanted
         return (wanted - self._external) | (self._external & here)
 
     @property
     def counts(self) -> dict[str, int]:
-        """Return how many messages have been published on each topic, by its full name."""
+        """How many messages have been published on each topic, by its full name."""
         return {publisher.topic_name: publisher.count for publisher in self._publishers.values()}
 
     def reset_run(self) -> None:
@@ -150,14 +151,14 @@ class Endpoints:
 
     @property
     def topics(self) -> tuple[Topic, ...]:
-        """Return every topic of the graph."""
+        """Every topic of the graph."""
         return tuple(self._topics.values())
 
 
-def _found(matched: int, there: Collection[TopicEndpointInfo], wanted: Collection[str]) -> int:
+def _found(matched: int, there: _Found, wanted: Collection[str]) -> int:
     """Return how many of the wanted nodes' endpoints have surely matched.
 
-    Which ones have matched is not told, only how many; so others that are there too, such as those of
+    The middleware tells only how many have matched, not which; so others that are there too, such as those of
     a display, are taken to have matched before the wanted ones.
     """
     names = [endpoint.node_name for endpoint in there]
@@ -169,7 +170,6 @@ class CountedPublisher:
     """A publisher that counts, and waits when a reader is too far behind."""
 
     def __init__(self, publisher: Publisher) -> None:
-        """Wrap a publisher of rclpy."""
         self._publisher = publisher
         self.count = 0
 
@@ -186,8 +186,7 @@ class CountedPublisher:
     def publish(self, message: Any) -> None:
         """Publish a message or CDR bytes; raises GraphError if a reader takes nothing for a long time.
 
-        With KEEP_ALL history a full queue refuses the message; that is the back-pressure, so it is
-        tried again.
+        With KEEP_ALL history a full queue rejects the message; that is the back-pressure, so it is retried.
         """
         begin = 0.0
         while True:
@@ -195,7 +194,7 @@ class CountedPublisher:
                 self._publisher.publish(message)
             except _RclError as error:
                 begin = begin or monotonic()
-                if monotonic() - begin > _PATIENCE_S:
+                if monotonic() - begin > _TIMEOUT_S:
                     raise GraphError(f"a reader of {self.topic_name} is stuck: {error}") from error
                 sleep(_RETRY_S)
             else:

@@ -1,6 +1,4 @@
-"""How a node tells what it has decided: on ``run/events``, hence in the bag, and in its log."""
-
-from math import nan
+"""Event publisher: what a node has decided goes to ``run/events``, hence into the bag, and to its log."""
 
 from rclpy.node import Node
 
@@ -12,13 +10,13 @@ from sms_handover.ros.node.endpoints import CountedPublisher
 class EventPublisher:
     """Publishes events of one node and logs each at its severity.
 
-    The topic is latched and reliable with a bounded history: whoever may decide often counts, and tells
+    The topic is latched and reliable with a bounded history: what may happen often is counted, and reported
     at most once per second.
     """
 
     def __init__(self, node: Node, publisher: CountedPublisher) -> None:
         """Speak for a node on a publisher of ``run/events``."""
-        self._name, self._log = node.get_name(), node.get_logger()
+        self._log = node.get_logger()
         self._publisher = publisher
 
     def publish(self, event: RunEvent) -> None:
@@ -31,20 +29,3 @@ class EventPublisher:
             self._log.warning(text)
         else:
             self._log.error(text)
-
-    def tell(
-        self,
-        kind: str,
-        severity: Severity,
-        detail: str,
-        stamp_ns: int,
-        *,
-        phase: str = "",
-        value: float = nan,
-        limit: float = nan,
-        unit: str = "",
-    ) -> None:
-        """Publish and log an event of this node."""
-        self.publish(
-            RunEvent(stamp_ns, self._name, kind, severity, detail, phase, value=value, limit=limit, unit=unit)
-        )

@@ -1,6 +1,6 @@
-"""A node of the ROS 2 lifecycle: hooks for what a transition does; an error in one ends the node."""
+"""Lifecycle node of ROS 2: hooks for what a transition does; an error in one ends the node."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from lifecycle_msgs.msg import State
@@ -18,7 +18,7 @@ class LifecycleNode(LifecycleNodeMixin, RunnableNode):
     ``ros2 lifecycle`` and the launcher ask by these services, a node that starts itself by
     :meth:`start`. A node overrides the hooks; what :meth:`configure` makes of publishers, services,
     timers and so on is destroyed when the node is cleaned up. An error in a transition goes by
-    ErrorProcessing to ``finalized``, and :meth:`goes_on` raises it, so that the process ends by it.
+    ErrorProcessing to ``finalized``, and :meth:`should_run` raises it, so that the process ends by it.
     """
 
     def __init__(self, name: str) -> None:
@@ -48,21 +48,13 @@ class LifecycleNode(LifecycleNodeMixin, RunnableNode):
 
     @property
     def state_name(self) -> str:
-        """Return the state of the lifecycle: unconfigured, inactive, active, finalized or one between."""
+        """The state of the lifecycle: unconfigured, inactive, active, finalized or one between."""
         return str(self._state_machine.current_state[1])
 
     @property
     def active(self) -> bool:
         """Whether the node takes part in the run."""
         return bool(self._state_machine.current_state[0] == State.PRIMARY_STATE_ACTIVE)
-
-    @property
-    def configured(self) -> bool:
-        """Whether the node has its endpoints."""
-        return self._state_machine.current_state[0] in (
-            State.PRIMARY_STATE_INACTIVE,
-            State.PRIMARY_STATE_ACTIVE,
-        )
 
     @property
     def finalized(self) -> bool:
@@ -72,7 +64,7 @@ class LifecycleNode(LifecycleNodeMixin, RunnableNode):
     # For the process
 
     def start(self) -> None:
-        """Configure and activate, as a node does that nobody manages; raises what goes wrong."""
+        """Configure and activate, as an unmanaged node does; raises the error of a transition."""
         for trigger in (self.trigger_configure, self.trigger_activate):
             trigger()
             self._raise_error()
@@ -86,11 +78,11 @@ class LifecycleNode(LifecycleNodeMixin, RunnableNode):
         super().destroy_node()
         self.__dict__.pop("_state_machine", None)
 
-    def keep_company(self, others: tuple["LifecycleNode", ...]) -> None:
-        """Look after other nodes of the same process and thread too."""
-        self._companions = others
+    def accompany(self, others: Sequence[RunnableNode]) -> None:
+        """Run until the other nodes of the same process and thread have been shut down too."""
+        self._companions = tuple(other for other in others if isinstance(other, LifecycleNode))
 
-    def goes_on(self, stop: Stop) -> bool:
+    def should_run(self, stop: Stop) -> bool:
         """Whether the loop is to have another turn; raises the error of a transition that failed.
 
         It ends when it is asked to, or when every node of the process has been shut down.
@@ -101,7 +93,6 @@ class LifecycleNode(LifecycleNodeMixin, RunnableNode):
         return not (stop.asked or all(node.finalized for node in nodes))
 
     def _raise_error(self) -> None:
-        """Raise what went wrong in a transition."""
         if self._error is not None:
             raise self._error
 
@@ -133,11 +124,11 @@ class LifecycleNode(LifecycleNodeMixin, RunnableNode):
         return self._carry_out(self._take_down)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Give the node up: there is no telling what of it is there."""
+        """Give the node up: its parts may be there or not."""
         return TransitionCallbackReturn.FAILURE
 
     def _on_change_state(self, request: Any, response: Any) -> Any:
-        """Answer a request for a transition; one that this state does not have is refused.
+        """Answer a request for a transition; one that this state does not have is rejected.
 
         rclpy 7.1 lets the error of such a request end the process.
         """
@@ -145,12 +136,12 @@ class LifecycleNode(LifecycleNodeMixin, RunnableNode):
             return self._change_state(request, response)
         except rclpy_implementation.RCLError:
             asked = request.transition.label or request.transition.id
-            self.get_logger().warning(f"refused: no transition {asked!r} leads out of {self.state_name!r}")
+            self.get_logger().warning(f"rejected: no transition {asked!r} leads out of {self.state_name!r}")
             response.success = False
             return response
 
     def _carry_out(self, act: Callable[[], None]) -> TransitionCallbackReturn:
-        """Do what a transition asks; what goes wrong is kept for :meth:`goes_on`, as rclpy drops it."""
+        """Carry out a transition; its error is kept for :meth:`should_run`, as rclpy drops it."""
         try:
             act()
         except Exception as error:

@@ -1,4 +1,4 @@
-"""The door of a node: what comes in is checked, and what is refused is counted and told, never used."""
+"""Message filter: incoming messages are checked; those rejected are counted and reported, never used."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -6,73 +6,75 @@ from time import monotonic
 from typing import TypeVar
 
 from sms_handover.errors import MessageError, Reason
-from sms_handover.ros.transport.inputs import Deliver
+from sms_handover.ros.transport.inputs import OnSerialized
 from sms_handover.ros.transport.publisher_identity import PublisherIdentity
 
 T = TypeVar("T")
-Read = Callable[[bytes], T]  # CDR bytes to what is in a good message; raises MessageError on others
-Receive = Callable[[T, int], None]  # what is in a message; wall time in ns of its sending
-First = Callable[[str, MessageError], None]  # topic and error of the first refusal of its kind
+Decode = Callable[[bytes], T]  # CDR bytes to the content of a good message; raises MessageError on others
+OnMessage = Callable[[T, int], None]  # content of a message; wall time in ns at which it was sent
+OnFirst = Callable[[str, MessageError], None]  # topic and error of the first rejection of its kind
 
-REFUSED = "refused "  # begins the keys in the diagnostics of a node that count its refusals
-
-_TELL_S = 1.0  # [s] of wall time at least between two lines of the log
+_REPORT_S = 1.0  # [s] of wall time at least between two lines of the log
 
 
 class MessageFilter:
-    """Counts the messages that a node has refused, by topic and reason, and tells of them.
+    """Counts the messages that a node has rejected, by topic and reason, and reports them.
 
-    The first of each topic and reason is told at once; of a thousand more in a second the log has one
-    line, with the newest of them and how many.
+    The first of each topic and reason is reported at once; of a thousand more in a second the log has one
+    line, with the latest of them and how many.
     """
 
-    def __init__(self, tell: Callable[[str], None], first: First) -> None:
-        """Write lines with ``tell``; ``first`` is called with the first refusal of each topic and reason."""
-        self._tell = tell
-        self._first = first
+    def __init__(self, log: Callable[[str], None], on_first: OnFirst) -> None:
+        """Write lines with ``log``; call ``on_first`` for the first rejection of each topic and reason."""
+        self._log = log
+        self._on_first = on_first
         self._counts: Counter[tuple[str, Reason]] = Counter()
-        self._untold = 0
-        self._newest = ""
-        self._told_at = -_TELL_S
+        self._unreported = 0
+        self._latest = ""
+        self._reported_at = -_REPORT_S
 
     @property
     def counts(self) -> dict[str, int]:
-        """Return how many were refused in all by topic and reason, e.g. ``joint_command: not finite``."""
+        """How many were rejected in all by topic and reason, e.g. ``joint_command: not finite``."""
         return {f"{topic}: {reason.value}": count for (topic, reason), count in self._counts.items()}
 
-    def add(self, topic: str, error: MessageError) -> None:
-        """Count a message that is refused."""
+    def reject(self, topic: str, error: MessageError) -> None:
+        """Count a message that is rejected."""
         kind = topic, error.reason
         self._counts[kind] += 1
         if self._counts[kind] == 1:
-            self._first(topic, error)
+            self._on_first(topic, error)
             return
-        self._untold += 1
-        self._newest = f"{topic}: refused, {error.reason.value}: {error}"
-        self.tell()
+        self._unreported += 1
+        self._latest = f"{topic}: rejected, {error.reason.value}: {error}"
+        self.report()
 
-    def tell(self) -> None:
-        """Write what has not been told yet, unless the last line is too young."""
+    def report(self) -> None:
+        """Write what has not been reported yet, unless the last line is too young."""
         now = monotonic()
-        if self._untold and now - self._told_at >= _TELL_S:
-            more = f" ({self._untold - 1} more since the last line)" if self._untold > 1 else ""
-            self._tell(self._newest + more)
-            self._untold, self._told_at = 0, now
+        if self._unreported and now - self._reported_at >= _REPORT_S:
+            more = f" ({self._unreported - 1} more since the last line)" if self._unreported > 1 else ""
+            self._log(self._latest + more)
+            self._unreported, self._reported_at = 0, now
 
-    def guarding(
-        self, topic: str, receive: Receive[T], read: Read[T], sender: PublisherIdentity | None = None
-    ) -> Deliver:
-        """Return what hands on what is in the messages that are good, and counts the others.
+    def wrap(
+        self,
+        topic: str,
+        on_message: OnMessage[T],
+        decode: Decode[T],
+        identity: PublisherIdentity | None = None,
+    ) -> OnSerialized:
+        """Return a callback that hands on the content of good messages, and counts the others.
 
-        ``receive`` may refuse a message too by a MessageError, as long as it has not used it.
+        ``on_message`` may reject a message too by a MessageError, as long as it has not used it.
         """
 
-        def take(data: bytes, sent_ns: int, publisher: bytes) -> None:
+        def on_data(data: bytes, sent_ns: int, publisher: bytes) -> None:
             try:
-                if sender is not None and publisher not in sender.own:
-                    sender.require(publisher)
-                receive(read(data), sent_ns)
+                if identity is not None and publisher not in identity.own:
+                    identity.require(publisher)
+                on_message(decode(data), sent_ns)
             except MessageError as error:
-                self.add(topic, error)
+                self.reject(topic, error)
 
-        return take
+        return on_data

@@ -1,13 +1,14 @@
-"""The text of ``--help`` of a node: what it does, its topics, services and parameters, and an example."""
+"""Help of a node: what it does, its topics, services and parameters, and an example."""
 
 import inspect
 import os
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from textwrap import wrap
 from typing import Any
 
 from sms_handover.configuration.parameters import defaults_of
+from sms_handover.graph.services import Service
 from sms_handover.graph.topics import (
     CONTROLLER,
     IK,
@@ -35,8 +36,8 @@ from sms_handover.ros.reference.topic_descriptions import contents_of
 _WIDTH = 100  # [characters] of a line
 
 _EXIT_CODES = """\
-Ctrl-C, SIGTERM and SIGHUP end it in order. Exit codes: 0 ended in order; 1 failed; 2 wrong input, told in
-one line before it begins; of recorder and player also 3 messages are missing, 130 interrupted too early."""
+Ctrl-C, SIGTERM and SIGHUP shut it down. Exit codes: 0 success; 1 failed; 2 wrong input, reported in one
+line before it starts; of recorder and player also 3 messages are missing, 130 interrupted too early."""
 
 EXAMPLES: dict[str, dict[str, object]] = {
     PLANT: {"integrator": "midpoint", "grasp_position_tolerance": 0.005},
@@ -83,31 +84,27 @@ def _show(text: str) -> None:
 
 def node_help(node: str, cls: object) -> str:
     """Return the help of a node of this package; ``cls`` is what makes it."""
-    parts = [_usage(node), inspect.getdoc(cls) or "", *_topics(node), *_services(node)]
-    parts += [*map(_parameters, groups_of(node)), _example(node), _EXIT_CODES]
-    return "\n\n".join(part for part in parts if part)
+    published, subscribed = topics_of(node)
+    offered, called = services_of(node)
+    parts = [
+        _usage(node),
+        inspect.getdoc(cls) or "",
+        _section("Publishes:", map(_topic, published)),
+        _section("Subscribes to:", map(_topic, subscribed)),
+        _section("Services:", map(_service, offered)),
+        _section("Calls:", map(_service, called)),
+        *map(_parameters, groups_of(node)),
+        _example(node),
+        _EXIT_CODES,
+    ]
+    return "\n\n".join(filter(None, parts))
 
 
 def _usage(node: str, parameter: str = "-p NAME:=VALUE") -> str:
-    """Return how the node is called."""
     options = f"--ros-args [{parameter} ...] [--params-file FILE]"
     return (
         f"usage: ros2 run sms_handover {node} {options}\n       python -m sms_handover.nodes.{node} {options}"
     )
-
-
-def _topics(node: str) -> Iterator[str]:
-    """Yield what the node publishes, and what it subscribes to."""
-    published, subscribed = topics_of(node)
-    yield _section("Publishes:", map(_topic, published))
-    yield _section("Subscribes to:", map(_topic, subscribed))
-
-
-def _services(node: str) -> Iterator[str]:
-    """Yield the services that the node offers, and those that it calls."""
-    offered, called = services_of(node)
-    for title, services in (("Services:", offered), ("Calls:", called)):
-        yield _section(title, (_entry(f"{s.relative_name}  {s.type}", s.does) for s in services))
 
 
 def _parameters(group: ParameterGroup) -> str:
@@ -117,19 +114,21 @@ def _parameters(group: ParameterGroup) -> str:
 
 
 def own_parameters_help(cls: type[Any]) -> str:
-    """Return the parameters of a node that is none of ours; the fields of its group have the defaults."""
+    """Return the parameters of a user's node; the fields of its group have the defaults."""
     return _section(
         "Parameters, as --ros-args -p NAME:=VALUE:", map(_parameter, rows_of(cls, defaults_of(cls)))
     )
 
 
 def _topic(topic: Topic) -> str:
-    """Return one topic."""
     return _entry(f"{topic.name}  {topic.type}, {topic.rate.value}", contents_of(topic))
 
 
+def _service(service: Service) -> str:
+    return _entry(f"{service.relative_name}  {service.type}", service.does)
+
+
 def _parameter(row: ParameterRow) -> str:
-    """Return one parameter."""
     unit = f" {row.unit}" if row.unit else ""
     return _entry(f"{row.name} = {row.default}{unit}  {row.type}", row.description, row.allowed)
 

@@ -1,4 +1,4 @@
-"""What a node offers, read from the tables that the nodes themselves are made from.
+"""Interfaces of the nodes, read from the tables that the nodes themselves are made from.
 
 ``--help`` of a node and the pages docs/parameters.md and docs/topics.md are written from this.
 """
@@ -59,7 +59,7 @@ class ParameterGroup:
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """One parameter as a reader needs it: everything as text, '' where there is nothing to say."""
+    """One parameter for readers: everything as text, '' where there is none."""
 
     name: str
     type: str

@@ -1,4 +1,4 @@
-"""What the topics of the graph carry, for readers: the help of the nodes and docs/topics.md."""
+"""Topic descriptions, for the help of the nodes and docs/topics.md."""
 
 from sms_handover.graph import topics
 from sms_handover.graph.topics import Topic
@@ -13,7 +13,7 @@ _CONTENTS = {
     topics.TASK_PHASE: "the phase of the schedule in force, and the grasp commands due at this instant",
     topics.DEPUTY_POSE: "pose of the CubeSat in world [m]",
     topics.DEPUTY_MARKER: "the shape of the CubeSat, for viewers",
-    topics.GRASP_EVENT: "what came of a grasp command, with the errors at that instant [m, rad, m/s]",
+    topics.GRASP_EVENT: "result of a grasp command, with the errors at that instant [m, rad, m/s]",
     topics.LINEAR_MOMENTUM: "linear momentum of the whole robot in world axes [kg m/s]",
     topics.ANGULAR_MOMENTUM: "angular momentum about the centre of mass in world axes [kg m^2/s]",
     topics.ENERGY: "kinetic energy and the work that the joint efforts have done [J]",
@@ -21,18 +21,18 @@ _CONTENTS = {
     topics.ROBOT_DESCRIPTION: "URDF of the robot",
     topics.RUN_STATE: "whether the run waits, runs, pauses or is over",
     topics.RUN_READY: "name of a node that is ready to begin",
-    topics.RUN_PUBLISHED: "how many messages a node has published on each topic, told once at the end",
-    topics.RUN_EVENTS: "what a node has decided by itself: a watchdog, a refused input, a phase done again",
+    topics.RUN_PUBLISHED: "how many messages a node has published on each topic, once at the end",
+    topics.RUN_EVENTS: "decisions of a node: a watchdog, a rejected message, a retried phase",
     topics.RUN_RECORDED: "up to which stamp all is in the bag; the plant goes at most 45 ms ahead",
     topics.LOOP_TIMING: "late ticks, held commands, the real period [s] and the real-time factor",
     topics.CLOCK: "simulation time",
     topics.DIAGNOSTICS: "what a node is doing or waiting for",
-    topics.target_pose(""): "where the tool shall be, in world [m]",
-    topics.tool_pose(""): "where the tool is, in world [m]",
+    topics.target_pose(""): "target pose of the tool in world [m]",
+    topics.tool_pose(""): "pose of the tool in world [m]",
 }
 
 
 def contents_of(topic: Topic) -> str:
-    """Return what a topic of the graph carries; raises KeyError if that is not told here."""
+    """Return what a topic of the graph carries; raises KeyError if it has no description."""
     of_an_arm = topic.name[topic.name.find("/") :]
     return _CONTENTS[of_an_arm if of_an_arm in _CONTENTS else topic.name]

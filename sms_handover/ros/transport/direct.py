@@ -1,4 +1,4 @@
-"""Takes what a node's loop waits for from the middleware itself, without an executor between.
+"""Direct inputs: a node's loop takes them from the middleware itself, without an executor between.
 
 An executor wakes Python for each message by itself. Here the node sleeps on the one message that it
 cannot go on without, and then takes all there are. This file alone uses names that rclpy keeps for its
@@ -18,18 +18,18 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
-from sms_handover.ros.transport.inputs import Answer, Asker, Deliver, Inputs
+from sms_handover.ros.transport.inputs import Client, Inputs, OnRequest, OnSerialized
 from sms_handover.ros.transport.rcl_take import IDENTIFIES, SerializedTaker
 from sms_handover.units import NS_PER_S
 
 _BATCH = 4096  # taken of one input at most before another has its turn
 _SERVE_S = 0.02  # [s] of wall time at most between two turns of the executor while the loop runs
 _HOT_S = 0.1  # [s] of wall time without anything for the loop after which the executor does the waiting
-_IDLE_S = 0.005  # [s] of wall time between two looks for the loop then
+_IDLE_S = 0.005  # [s] of wall time between two polls for the loop then
 
 
 class DirectInputs(Inputs):
-    """Takes messages, requests and answers of one node; the node must not be with an executor yet."""
+    """Takes messages, requests and responses of one node; the node must not be with an executor yet."""
 
     identifies = IDENTIFIES
 
@@ -40,25 +40,25 @@ class DirectInputs(Inputs):
         self._serve_at = self._hot_until = 0.0
         self._slept = False
 
-    def subscribe(self, kind: Any, topic: str, profile: QoSProfile, deliver: Deliver) -> Subscription:
-        """Hand every message of a topic to ``deliver``."""
+    def subscribe(self, kind: Any, topic: str, profile: QoSProfile, on_data: OnSerialized) -> Subscription:
+        """Hand every message of a topic to ``on_data``."""
         subscription = self._node.create_subscription(kind, topic, _never, profile, raw=True)
         self._node._subscriptions.remove(subscription)
-        self._sources[topic] = _Messages(self._node, subscription, deliver)
+        self._sources[topic] = _Messages(self._node, subscription, on_data)
         return subscription
 
-    def asker(self, kind: Any, service: str, receive: Callable[[Any], None]) -> Asker:
-        """Return what asks a service, and hand every answer to ``receive``."""
+    def create_client(self, kind: Any, service: str, on_response: Callable[[Any], None]) -> Client:
+        """Return a client, and hand every response to ``on_response``."""
         client = self._node.create_client(kind, service)
         self._node._clients.remove(client)
-        answers = self._sources[service] = _Answers(self._node, client, receive)
-        return answers
+        self._sources[service] = _Responses(self._node, client, on_response)
+        return Client(client.service_is_ready, client.handle.send_request)
 
-    def serve(self, kind: Any, service: str, answer: Answer) -> None:
+    def create_service(self, kind: Any, service: str, on_request: OnRequest) -> None:
         """Offer a service."""
         entity = self._node.create_service(kind, service, _never)
         self._node._services.remove(entity)
-        self._sources[service] = _Requests(self._node, entity, answer)
+        self._sources[service] = _Requests(self._node, entity, on_request)
 
     def accompany(self, others: Sequence[Inputs]) -> None:
         """Serve those of other nodes of the same process and thread too, in this order."""
@@ -97,7 +97,7 @@ class DirectInputs(Inputs):
             awaited.wait(min(timeout_s, _SERVE_S))
         self.give_turn(executor)
 
-    def look(self, executor: Executor) -> None:
+    def spin_some(self, executor: Executor) -> None:
         """Handle what has come for the loop; the executor has its turns elsewhere."""
         self.poll()
 
@@ -109,10 +109,10 @@ class DirectInputs(Inputs):
             executor.spin_once(timeout_sec=0.0)
 
     def _answer_each_other(self) -> bool:
-        """Hand over one message that a node cannot go on without, and tell whether there was one.
+        """Hand over one message that a node cannot go on without; return whether there was one.
 
         Among nodes of one process it is there as soon as the other has published it, so this is nearly
-        always enough; to look for the others each time would take longer than to publish them. Who
+        always enough; to poll the others each time would take longer than to publish them. Who
         answers this node is asked first: once it has answered there is something for this node.
         """
         for inputs in self._company:  # noqa: SIM110  any() with a generator takes longer
@@ -121,7 +121,7 @@ class DirectInputs(Inputs):
         return False
 
     def _take_awaited(self) -> bool:
-        """Hand over the next message that is awaited, and tell whether there was one."""
+        """Hand over the next message that is awaited; return whether there was one."""
         source = None if self.closed else self._sources.get(self.awaited())
         return source is not None and source.take_one()
 
@@ -135,21 +135,22 @@ class DirectInputs(Inputs):
 class _Source(ABC):
     """One kind of input: it can be slept on and emptied."""
 
-    def __init__(self, node: Node, entity: Any, counts: tuple[int, int, int]) -> None:
-        """Take an entity that the node no longer knows; ``counts`` of subscriptions, clients, services."""
-        subscriptions, clients, services = counts
+    _counts = (1, 0, 0)  # of subscriptions, clients and services
+
+    def __init__(self, node: Node, entity: Any) -> None:
+        """Take an entity that the node no longer knows."""
+        subscriptions, clients, services = self._counts
         self._entity = entity
-        self._wait_set = rclpy_implementation.WaitSet(
+        self._wait_set = made = rclpy_implementation.WaitSet(
             subscriptions, 0, 0, clients, services, 0, node.context.handle
+        )
+        self._add = (
+            made.add_subscription if subscriptions else made.add_client if clients else made.add_service
         )
 
     @abstractmethod
-    def _watch(self) -> None:
-        """Put the entity into the wait set."""
-
-    @abstractmethod
     def take_one(self) -> bool:
-        """Hand over the next of what has come, and tell whether there was one."""
+        """Hand over the next of what has come; return whether there was one."""
 
     def take_all(self) -> int:
         """Hand over what has come, ``_BATCH`` at most, and return how many there were."""
@@ -159,13 +160,13 @@ class _Source(ABC):
         return _BATCH
 
     def take_closed(self, *, drop: bool) -> int:
-        """Do what is due while the inputs are closed, and return how many there were: by default, wait."""
+        """Do what is due while the inputs are closed, and return how many there were: by default, nothing."""
         return 0
 
     def wait(self, timeout_s: float) -> None:
         """Sleep until something comes."""
         self._wait_set.clear_entities()
-        self._watch()
+        self._add(self._entity.handle)
         self._wait_set.wait(int(timeout_s * NS_PER_S))
 
     def destroy(self) -> None:
@@ -176,15 +177,11 @@ class _Source(ABC):
 class _Messages(_Source):
     """The messages of a topic."""
 
-    def __init__(self, node: Node, subscription: Subscription, deliver: Deliver) -> None:
-        """Take over a raw subscription."""
-        super().__init__(node, subscription, (1, 0, 0))
+    def __init__(self, node: Node, subscription: Subscription, on_data: OnSerialized) -> None:
+        super().__init__(node, subscription)
         self._taker = SerializedTaker(subscription)
         self._take = self._taker.take
-        self._deliver = deliver
-
-    def _watch(self) -> None:
-        self._wait_set.add_subscription(self._entity.handle)
+        self._on_data = on_data
 
     def take_one(self) -> bool:
         """Hand over the next message."""
@@ -192,15 +189,15 @@ class _Messages(_Source):
         if message is None:
             return False
         data, sent_ns, publisher = message
-        self._deliver(data, sent_ns or time_ns(), publisher)
+        self._on_data(data, sent_ns or time_ns(), publisher)
         return True
 
     def take_closed(self, *, drop: bool) -> int:
         """Lose what has come, if that is wanted."""
         if drop:
-            deliver, self._deliver = self._deliver, _never
+            on_data, self._on_data = self._on_data, _never
             self.take_all()
-            self._deliver = deliver
+            self._on_data = on_data
         return 0
 
     def destroy(self) -> None:
@@ -209,51 +206,41 @@ class _Messages(_Source):
         super().destroy()
 
 
-class _Answers(_Source, Asker):
-    """Asks a service, and takes its answers."""
+class _Responses(_Source):
+    """The responses of a service."""
 
-    def __init__(self, node: Node, client: Any, receive: Callable[[Any], None]) -> None:
-        super().__init__(node, client, (0, 1, 0))
+    _counts = (0, 1, 0)
+
+    def __init__(self, node: Node, client: Any, on_response: Callable[[Any], None]) -> None:
+        super().__init__(node, client)
         self._response = client.srv_type.Response
-        self._receive = receive
-
-    def ready(self) -> bool:
-        """Whether the service is there."""
-        return bool(self._entity.service_is_ready())
-
-    def ask(self, request: Any) -> None:
-        """Send a request and return at once."""
-        self._entity.handle.send_request(request)
-
-    def _watch(self) -> None:
-        self._wait_set.add_client(self._entity.handle)
+        self._on_response = on_response
 
     def take_one(self) -> bool:
-        """Hand over the next answer."""
+        """Hand over the next response."""
         header, response = self._entity.handle.take_response(self._response)
         if header is None:
             return False
-        self._receive(response)
+        self._on_response(response)
         return True
 
 
 class _Requests(_Source):
-    """Takes the requests of a service, and answers them."""
+    """The requests of a service."""
 
-    def __init__(self, node: Node, service: Any, answer: Answer) -> None:
-        super().__init__(node, service, (0, 0, 1))
+    _counts = (0, 0, 1)
+
+    def __init__(self, node: Node, service: Any, on_request: OnRequest) -> None:
+        super().__init__(node, service)
         self._kind = service.srv_type
-        self._answer = answer
-
-    def _watch(self) -> None:
-        self._wait_set.add_service(self._entity.handle)
+        self._on_request = on_request
 
     def take_one(self) -> bool:
         """Answer the next request."""
         request, header = self._entity.handle.service_take_request(self._kind.Request)
         if header is None:
             return False
-        self._entity.send_response(self._answer(request), header)
+        self._entity.send_response(self._on_request(request), header)
         return True
 
     def take_closed(self, *, drop: bool) -> int:

@@ -1,6 +1,6 @@
-"""How what a node's loop waits for reaches it: the interface, and the way that is public in rclpy.
+"""Inputs of a node's loop, as messages, requests and responses: the interface, and the way public in rclpy.
 
-A node gets the messages, requests and answers of its loop by an :class:`Inputs`, everything else by
+A node gets the messages, requests and responses of its loop by an :class:`Inputs`, everything else by
 rclpy as usual. There are two, chosen by the parameter ``transport``: this file's leaves all to an
 executor; :mod:`sms_handover.ros.transport.direct` takes them from the middleware itself. Both hand over
 the same bytes in the same order of each topic; `make bench` measures what each costs.
@@ -8,6 +8,7 @@ the same bytes in the same order of each topic; `make bench` measures what each 
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from time import time_ns
 from typing import Any
 
@@ -16,30 +17,26 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
-# CDR bytes; wall time in ns of their sending, else of their coming; global identifier of their publisher,
+# CDR bytes; wall time in ns at which they were sent, else received; global identifier of their publisher,
 # b"" if not known
-Deliver = Callable[[bytes, int, bytes], None]
-Answer = Callable[[Any], Any]  # request to response
+OnSerialized = Callable[[bytes, int, bytes], None]
+OnRequest = Callable[[Any], Any]  # request to response
 
 
-class Asker(ABC):
-    """Asks one service; the answers go to where its maker said."""
+@dataclass(frozen=True)
+class Client:
+    """Calls one service without waiting; the responses go to the callback that it was created with."""
 
-    @abstractmethod
-    def ready(self) -> bool:
-        """Whether the service is there."""
-
-    @abstractmethod
-    def ask(self, request: Any) -> None:
-        """Send a request and return at once."""
+    service_is_ready: Callable[[], bool]
+    call: Callable[[Any], object]
 
 
 class Inputs(ABC):
-    """The messages, requests and answers that the loop of one node waits for.
+    """The messages, requests and responses that the loop of one node waits for.
 
     ``wakes`` counts how often something awaited has ended a sleep: a loop that is woken more than once
     per tick loses time. ``awaited`` names the topic or service without which the loop cannot go on, "" if
-    there is none; the node sets it. ``identifies`` tells whether it is known who a message is from.
+    there is none; the node sets it. ``identifies`` is whether the publisher of a message is known.
     """
 
     wakes: int = 0
@@ -49,7 +46,7 @@ class Inputs(ABC):
     drops: bool = False
 
     def close(self, *, drop: bool) -> None:
-        """Hand over no message or answer until opened; messages wait, or with ``drop`` are lost.
+        """Hand over no message or response until opened; messages wait, or with ``drop`` are lost.
 
         Requests are answered all the same.
         """
@@ -61,15 +58,15 @@ class Inputs(ABC):
         self.closed = False
 
     @abstractmethod
-    def subscribe(self, kind: Any, topic: str, profile: QoSProfile, deliver: Deliver) -> Subscription:
-        """Hand every message of a topic to ``deliver``."""
+    def subscribe(self, kind: Any, topic: str, profile: QoSProfile, on_data: OnSerialized) -> Subscription:
+        """Hand every message of a topic to ``on_data``."""
 
     @abstractmethod
-    def asker(self, kind: Any, service: str, receive: Callable[[Any], None]) -> Asker:
-        """Return what asks a service, and hand every answer to ``receive``."""
+    def create_client(self, kind: Any, service: str, on_response: Callable[[Any], None]) -> Client:
+        """Return a client, and hand every response to ``on_response``."""
 
     @abstractmethod
-    def serve(self, kind: Any, service: str, answer: Answer) -> None:
+    def create_service(self, kind: Any, service: str, on_request: OnRequest) -> None:
         """Offer a service."""
 
     @abstractmethod
@@ -91,7 +88,7 @@ class Inputs(ABC):
         """
 
     @abstractmethod
-    def look(self, executor: Executor) -> None:
+    def spin_some(self, executor: Executor) -> None:
         """Handle what has come for the loop, without a sleep: for a loop that keeps the processor."""
 
     @abstractmethod
@@ -110,39 +107,43 @@ class ExecutorInputs(Inputs):
         """Hand over what has waited, and again what comes."""
         super().open()
         waiting, self._waiting = self._waiting, []
-        for hand_over in waiting:
-            hand_over()
+        for deliver in waiting:
+            deliver()
+
+    def _hand_over(self, deliver: Callable[[], object]) -> None:
+        """Deliver a message or response now, or when the inputs are open."""
+        if self.closed:
+            self._waiting.append(deliver)
+        else:
+            deliver()
 
     def destroy(self) -> None:
         """Forget what waits; the entities are destroyed with the node or when it is cleaned up."""
         self._waiting.clear()
 
-    def subscribe(self, kind: Any, topic: str, profile: QoSProfile, deliver: Deliver) -> Subscription:
-        """Hand every message of a topic to ``deliver``."""
+    def subscribe(self, kind: Any, topic: str, profile: QoSProfile, on_data: OnSerialized) -> Subscription:
+        """Hand every message of a topic to ``on_data``."""
 
         def callback(data: bytes) -> None:
             now_ns = time_ns()  # EventsExecutor fails on callbacks that ask for the time of sending
-            if not self.closed:
-                deliver(data, now_ns, b"")
-            elif not self.drops:
-                self._waiting.append(lambda: deliver(data, now_ns, b""))
+            if not (self.closed and self.drops):
+                self._hand_over(lambda: on_data(data, now_ns, b""))
 
         return self._node.create_subscription(kind, topic, callback, profile, raw=True)
 
-    def asker(self, kind: Any, service: str, receive: Callable[[Any], None]) -> Asker:
-        """Return what asks a service, and hand every answer to ``receive``."""
+    def create_client(self, kind: Any, service: str, on_response: Callable[[Any], None]) -> Client:
+        """Return a client, and hand every response to ``on_response``."""
+        client = self._node.create_client(kind, service)
 
-        def callback(answer: Any) -> None:
-            if self.closed:
-                self._waiting.append(lambda: receive(answer))
-            else:
-                receive(answer)
+        def call(request: Any) -> None:
+            future = client.call_async(request)
+            future.add_done_callback(lambda done: self._hand_over(lambda: on_response(done.result())))
 
-        return _ExecutorAsker(self._node, kind, service, callback)
+        return Client(client.service_is_ready, call)
 
-    def serve(self, kind: Any, service: str, answer: Answer) -> None:
+    def create_service(self, kind: Any, service: str, on_request: OnRequest) -> None:
         """Offer a service."""
-        self._node.create_service(kind, service, lambda request, empty: answer(request))
+        self._node.create_service(kind, service, lambda request, empty: on_request(request))
 
     def poll(self) -> int:
         """Return 0: the executor hands over everything."""
@@ -152,25 +153,9 @@ class ExecutorInputs(Inputs):
         """Let the executor handle what comes."""
         executor.spin_once(timeout_sec=timeout_s)
 
-    def look(self, executor: Executor) -> None:
+    def spin_some(self, executor: Executor) -> None:
         """Let the executor handle what has come."""
         executor.spin_once(timeout_sec=0.0)
 
     def give_turn(self, executor: Executor) -> None:
         """Do nothing: whatever comes is handled by the executor."""
-
-
-class _ExecutorAsker(Asker):
-    """Asks a service by rclpy's futures."""
-
-    def __init__(self, node: Node, kind: Any, service: str, receive: Callable[[Any], None]) -> None:
-        self._client = node.create_client(kind, service)
-        self._receive = receive
-
-    def ready(self) -> bool:
-        """Whether the service is there."""
-        return bool(self._client.service_is_ready())
-
-    def ask(self, request: Any) -> None:
-        """Send a request and return at once."""
-        self._client.call_async(request).add_done_callback(lambda done: self._receive(done.result()))

@@ -1,8 +1,8 @@
-"""Keeps the plant's loop on the wall clock, and accounts for how well it keeps to it."""
+"""Loop clock: keeps the plant on the wall clock, with statistics of how well."""
 
 from array import array
 from dataclasses import dataclass, field
-from math import ceil, sqrt
+from math import ceil, inf, sqrt
 from time import monotonic
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -13,6 +13,7 @@ from sms_handover.units import ns_to_seconds
 LATENCY_BIN_S = 50e-6  # [s] width of the bins of the latency from a state to its command
 LATENCY_BINS = 41  # the last one counts everything from 2 ms on
 
+_REPORT_S = 1.0  # [s] at least between two reports of skipped lag
 _IDLE_S = 0.1  # [s] wait while the loop does not run
 # Thresholds as the controller manager of ros2_control ships them, for the mean over one report
 _RATE_ERRORS_HZ = (5.0, 10.0)  # [Hz] off the wanted rate: warning, error
@@ -33,23 +34,27 @@ class _Interval:
 class LoopClock:
     """Absolute deadlines one tick apart, and statistics of the periods between ticks.
 
-    In lock step (``paced`` false) nothing is ever due or late: only the statistics are kept.
+    A lag of more than ``catch_up_s`` (and a tick) is skipped: the deadlines start again at the tick that is
+    due, so that simulated time stays behind by it. In lock step (``paced`` false) nothing is ever due or
+    late: only the statistics are kept.
     """
 
-    def __init__(self, tick_ns: int, *, paced: bool) -> None:
-        """Prepare for ticks of this length."""
+    def __init__(self, tick_ns: int, *, paced: bool, catch_up_s: float) -> None:
         self._tick_s = ns_to_seconds(tick_ns)
         self._paced = paced
+        self._catch_up_s = max(catch_up_s, self._tick_s)
         self._deadline: float | None = None
         self._last = self._published = 0.0
         self._ticks = self._late = self._held = 0
+        self.skipped_s = self._unreported_s = 0.0
+        self._reported_at = -inf
         self._interval = _Interval(monotonic())
         self._level: tuple[int, str] = (0, "")
         self._since: float | None = None
         self._ran = 0.0
 
     def start(self) -> None:
-        """Begin, or go on after a pause: the first tick is due one period from now."""
+        """Start, or resume after a pause: the first tick is due one period from now."""
         self._last = self._published = monotonic()
         self._deadline = self._last + self._tick_s if self._paced else None
         self._interval = _Interval(self._last)
@@ -64,6 +69,7 @@ class LoopClock:
     def reset(self) -> None:
         """Count the ticks and the wall time of a run from now on."""
         self._ticks = self._late = self._held = 0
+        self.skipped_s = self._unreported_s = 0.0
         self._level = (0, "")
         self._ran = 0.0
         if self._since is not None:
@@ -71,11 +77,11 @@ class LoopClock:
 
     @property
     def ran(self) -> float:
-        """Return for how many s of wall time the loop has run, pauses left out."""
+        """The wall time in s that the loop has run, without pauses."""
         return self._ran if self._since is None else self._ran + monotonic() - self._since
 
     def wait_s(self) -> float:
-        """Return how long to wait for the next deadline, at least zero."""
+        """Return the time in s to the next deadline, at least zero."""
         if self._deadline is None:
             return _IDLE_S
         return min(max(self._deadline - monotonic(), 0.0), _IDLE_S)
@@ -85,15 +91,28 @@ class LoopClock:
         return self._deadline is not None and monotonic() >= self._deadline
 
     def ticked(self, *, held: bool = False) -> None:
-        """Account for the begin of a tick; it is late if more than one period behind its deadline."""
+        """Account for the start of a tick; it is late if more than one period behind its deadline."""
         now = monotonic()
         self._interval.periods.append(now - self._last)
         self._last = now
         self._ticks += 1
         self._held += held
         if self._deadline is not None:
-            self._late += now - self._deadline > self._tick_s
+            lag_s = now - self._deadline
+            self._late += lag_s > self._tick_s
+            if lag_s > self._catch_up_s:
+                self.skipped_s += lag_s
+                self._unreported_s += lag_s
+                self._deadline = now
             self._deadline += self._tick_s
+
+    def take_skipped(self) -> float:
+        """Return the lag in s skipped since a call last returned any, at most once per second, else 0."""
+        if not self._unreported_s or monotonic() - self._reported_at < _REPORT_S:
+            return 0.0
+        skipped_s, self._unreported_s = self._unreported_s, 0.0
+        self._reported_at = monotonic()
+        return skipped_s
 
     def published(self) -> None:
         """Account for the state of the tick being out: its work is done."""
@@ -109,17 +128,18 @@ class LoopClock:
 
     @property
     def misses(self) -> str:
-        """Return in words what real time has cost so far, "" if every tick was in time."""
+        """What real time has cost so far, in words; "" if every tick was in time."""
         if not self._late and not self._held:
             return ""
+        skipped = f", and {self.skipped_s:.3g} s of lag were skipped" if self.skipped_s else ""
         return (
             f"real time was not kept: of {self._ticks} ticks {self._late} began more than a tick late and "
-            f"{self._held} held an old command; run in lock step, or with a longer tick"
+            f"{self._held} held an old command{skipped}; run in lock step, or with a longer tick"
         )
 
     @property
     def diagnosis(self) -> tuple[int, str]:
-        """Return level and words for the last report, by the thresholds that ros2_control ships."""
+        """Level and text for the last report, by the thresholds that ros2_control ships."""
         return self._level
 
     def report(self) -> LoopTiming:
@@ -148,7 +168,7 @@ class LoopClock:
         )
 
     def _diagnose(self, mean: float, work: float) -> tuple[int, str]:
-        """Return level and words for a mean period and a mean time of work, both in s."""
+        """Return level and text for a mean period and a mean time of work, both in s."""
         if not self._paced:
             return 0, ""
         rate, wanted = 1.0 / mean, 1.0 / self._tick_s

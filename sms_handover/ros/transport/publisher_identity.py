@@ -1,4 +1,4 @@
-"""Tells the messages of a topic's own publisher from those of any other, such as a second controller."""
+"""Publisher identity: whose messages on a topic count, and not those of, say, a second controller."""
 
 from collections.abc import Collection
 
@@ -8,15 +8,15 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from sms_handover.errors import MessageError, Reason
 from sms_handover.ros.transport.rcl_take import IDENTITY
 
-# The name that a publisher has as long as discovery has not told its node; its messages may be here by then.
+# The name of a publisher whose node discovery does not know yet; its messages may be here by then.
 _NAMELESS = "_NODE_NAME_UNKNOWN_"
 
 
 class PublisherIdentity:
     """The publishers whose messages on a topic count: of each node of the run one, or one in all.
 
-    It is the first that discovery gives to such a node, for as long as it is there. Against one that
-    forges identifiers only DDS-Security helps.
+    It is the first that discovery finds of such a node, as long as it exists. Against forged identifiers only
+    DDS-Security helps.
     """
 
     def __init__(self, node: Node, topic: str, peers: Collection[str], *, several: bool = False) -> None:
@@ -30,14 +30,11 @@ class PublisherIdentity:
 
     @property
     def others(self) -> list[str]:
-        """Return the names of the nodes that publish on the topic but are not to."""
+        """The names of the nodes that publish on the topic but are not to."""
         return [_name(endpoint) for endpoint in self._split()[1]]
 
     def require(self, publisher: bytes) -> None:
-        """Take a message of a publisher that is not known as one of the own, b"" where that is not told.
-
-        Raises MessageError if it is another's.
-        """
+        """Raise MessageError if a publisher, b"" if unknown, is none of the topic's own."""
         if not publisher:
             return
         name = self._strangers.get(publisher)
@@ -54,20 +51,20 @@ class PublisherIdentity:
     def _may_be_early(
         self, publisher: bytes, own: list[TopicEndpointInfo], others: list[TopicEndpointInfo]
     ) -> bool:
-        """Whether a message may be here before discovery has told of its publisher."""
+        """Whether a message may be here before discovery has found its publisher."""
         if self._several:
             return publisher not in map(_identity, others)
         return not (self.own or own or others)
 
     def _name_of(self, publisher: bytes, others: list[TopicEndpointInfo]) -> str:
-        """Return who publishes in words, and keep in mind who is a stranger for good."""
+        """Return the name of a publisher for a message, and remember strangers for good."""
         for endpoint in others:
             if _identity(endpoint) == publisher:
                 name = repr(_name(endpoint))
                 if endpoint.node_name not in self._peers and endpoint.node_name != _NAMELESS:
                     self._strangers[publisher] = name
                 return name
-        return "that is gone again"
+        return "that has ended"
 
     def _split(self) -> tuple[list[TopicEndpointInfo], list[TopicEndpointInfo]]:
         """Return the publishers that count, as far as they are there, and all others."""
@@ -84,7 +81,6 @@ class PublisherIdentity:
 
 
 def _identity(endpoint: TopicEndpointInfo) -> bytes:
-    """Return the global identifier of an endpoint."""
     return bytes(endpoint.endpoint_gid[:IDENTITY])
 
 

@@ -1,8 +1,8 @@
-"""Takes serialized messages with the identity of their publisher, which rclpy does not hand on.
+"""Takes of rcl: serialized messages with the identity of their publisher, which rclpy does not hand on.
 
-What rclpy 7.1 tells of a message is when it was sent, but not by whom. The library below rclpy, rcl,
-knows both; so it is asked directly, by the public functions and structures of its C interface, which
-are the same from Humble on. It costs no more than rclpy's own way.
+rclpy 7.1 tells when a message was sent, but not by whom. rcl below it knows both, so it is called directly,
+by the public functions and structures of its C interface, which are the same from Humble on. That costs no
+more than rclpy's own way.
 """
 
 from collections.abc import Callable
@@ -71,11 +71,14 @@ class SerializedTaker:
     """Takes the messages of one subscription, which nothing else may take from; close it."""
 
     def __init__(self, subscription: Subscription) -> None:
-        """Take from a subscription; raises ConfigurationError where rcl cannot be asked."""
-        self._library = _library()
-        self._rcl_take: Callable[..., int] = self._library.take
+        """Take from a subscription; raises ConfigurationError if rcl cannot be called."""
+        library = _library()
+        self._rcl_take: Callable[..., int] = library.take
         self._subscription = subscription  # which has to live as long as its address is used
-        self._bytes, self._info = self._library.empty(), _Info()
+        self._bytes, self._info = _Bytes(), _Info()
+        if library.init(byref(self._bytes), _CAPACITY, byref(library.allocator)):
+            raise GraphError("there is no memory for a message")
+        self._give_back = library.fini
         handle: Any = subscription.handle
         self._arguments = c_void_p(handle.pointer), byref(self._bytes), byref(self._info), None
 
@@ -96,31 +99,22 @@ class SerializedTaker:
 
     def close(self) -> None:
         """Give the memory back; nothing can be taken any more."""
-        self._rcl_take = _nothing
-        self._library.give_back(byref(self._bytes))
+        self._rcl_take = lambda *arguments: _NOTHING_THERE
+        self._give_back(byref(self._bytes))
 
 
 class _Library:
-    """The functions of the libraries that rclpy has loaded."""
+    """The functions of the libraries that rclpy has loaded; raises OSError where they have other names."""
 
     def __init__(self) -> None:
-        """Find them; raises OSError where they have other names."""
         rcl, rcutils = PyDLL("librcl.so"), PyDLL("librcutils.so")
         self.take = rcl.rcl_take_serialized_message
+        self.init, self.fini = rcutils.rcutils_uint8_array_init, rcutils.rcutils_uint8_array_fini
         self.take.argtypes, self.take.restype = (c_void_p,) * 4, c_int
-        self.give_back = rcutils.rcutils_uint8_array_fini
-        self.give_back.argtypes, self.give_back.restype = (c_void_p,), c_int
-        self._begin = rcutils.rcutils_uint8_array_init
-        self._begin.argtypes, self._begin.restype = (c_void_p, c_size_t, c_void_p), c_int
+        self.init.argtypes, self.init.restype = (c_void_p, c_size_t, c_void_p), c_int
+        self.fini.argtypes, self.fini.restype = (c_void_p,), c_int
         rcutils.rcutils_get_default_allocator.restype = _Allocator
-        self._allocator = rcutils.rcutils_get_default_allocator()
-
-    def empty(self) -> _Bytes:
-        """Return room for a message."""
-        made = _Bytes()
-        if self._begin(byref(made), _CAPACITY, byref(self._allocator)):
-            raise GraphError("there is no memory for a message")
-        return made
+        self.allocator = rcutils.rcutils_get_default_allocator()
 
 
 @cache
@@ -131,8 +125,3 @@ def _library() -> _Library:
     except (OSError, AttributeError) as error:
         text = f"transport 'direct' needs librcl.so, which cannot be used here ({error}); take 'executor'"
         raise ConfigurationError(text) from error
-
-
-def _nothing(*arguments: object) -> int:
-    """Take nothing."""
-    return _NOTHING_THERE

@@ -1,4 +1,4 @@
-"""Brings together inputs of equal stamp, whatever order they arrive in."""
+"""Stamp synchronisation: inputs of equal stamp are brought together, in whatever order they arrive."""
 
 from time import monotonic_ns
 from typing import Generic, TypeVar
@@ -15,30 +15,30 @@ class StampOrder:
     """The stamps of an input that is used as it comes: each newer than the last, none from the future."""
 
     def __init__(self, ahead_ns: int) -> None:
-        """Begin before time zero; a stamp further than ``ahead_ns`` ahead of the run is from the future."""
+        """Start before time zero; a stamp further than ``ahead_ns`` ahead of the run is from the future."""
         self._ahead_ns = ahead_ns
-        self._newest_ns = -1
+        self._latest_ns = -1
 
     def reset(self) -> None:
-        """Begin again before time zero."""
-        self._newest_ns = -1
+        """Start before time zero again."""
+        self._latest_ns = -1
 
-    def take(self, stamp_ns: int, now_ns: int) -> None:
+    def accept(self, stamp_ns: int, now_ns: int) -> None:
         """Note a stamp; raises MessageError if it is not newer, or ahead of a run that is at ``now_ns``."""
-        if stamp_ns <= self._newest_ns:
-            reason = Reason.DUPLICATE if stamp_ns == self._newest_ns else Reason.OLD
-            newest = f"the newest one has {ns_to_seconds(self._newest_ns):g} s"
-            raise MessageError(reason, f"stamped {ns_to_seconds(stamp_ns):g} s, but {newest}")
+        if stamp_ns <= self._latest_ns:
+            reason = Reason.DUPLICATE if stamp_ns == self._latest_ns else Reason.OLD
+            latest = f"the latest one has {ns_to_seconds(self._latest_ns):g} s"
+            raise MessageError(reason, f"stamped {ns_to_seconds(stamp_ns):g} s, but {latest}")
         if stamp_ns - now_ns > self._ahead_ns:
             now = f"the run is at {ns_to_seconds(now_ns):g} s"
             raise MessageError(Reason.FUTURE, f"stamped {ns_to_seconds(stamp_ns):g} s, but {now}")
-        self._newest_ns = stamp_ns
+        self._latest_ns = stamp_ns
 
 
 class StampSync(Generic[V]):
     """Keeps inputs until all that belong to one stamp are there.
 
-    Inputs have names. Stamps that are not newer than the last one taken are refused and counted.
+    Inputs have names. Those whose stamp is not newer than the last one taken are rejected and counted.
     """
 
     def __init__(self, longest: int = _LONGEST, *, ahead_ns: int | None = None, paced: bool = False) -> None:
@@ -56,10 +56,10 @@ class StampSync(Generic[V]):
         self._begun: set[str] | None = None
         self.dropped = 0
 
-    def begins_anew(self, stamp_ns: int) -> bool:
-        """Whether a stamp is the start of a run behind inputs taken of a later time.
+    def restarts_run(self, stamp_ns: int) -> bool:
+        """Whether a stamp is the start of a run after inputs of a later time were taken.
 
-        The start behind the start alone is the same state once more, to which the same answer belongs.
+        The start right after the start is the same state resent, to which the same answer belongs.
         """
         return stamp_ns == 0 and self._taken_ns > 0
 
@@ -69,9 +69,9 @@ class StampSync(Generic[V]):
         self._taken_ns = -1
 
     def reset_run(self) -> None:
-        """Begin a run behind another: of each input, what comes before its time zero is still of the other.
+        """Start a run after another: of each input, what comes before its time zero is still of the other.
 
-        Inputs keep their order, each for itself; so nothing of the other run gets into the new one.
+        Each input keeps its own order, so nothing of the other run gets into the new one.
         """
         self.reset()
         self._begun = set()
@@ -88,7 +88,7 @@ class StampSync(Generic[V]):
     def add(self, stamp_ns: int, name: str, value: V) -> None:
         """Keep an input; raises MessageError if its stamp is not one of those to come.
 
-        What is left over from the run before is dropped and counted without a word: nobody is to blame.
+        What is left over from the run before is dropped and counted without an error.
         """
         if self._begun is not None and not self.admits(stamp_ns, name):
             self.dropped += 1
@@ -100,12 +100,12 @@ class StampSync(Generic[V]):
                 raise MessageError(Reason.DUPLICATE, f"the stamp of {taken} already")
             raise MessageError(Reason.OLD, f"stamped {ns_to_seconds(stamp_ns):g} s, but {taken}")
         if self._ahead_ns is not None and stamp_ns - max(self._taken_ns, 0) > self._ahead_ns:
-            self._refuse_future(stamp_ns, self._ahead_ns)
+            self._reject_future(stamp_ns, self._ahead_ns)
         self._waiting.setdefault(stamp_ns, {})[name] = value
         if len(self._waiting) > self._longest:
             self.dropped += len(self._waiting.pop(min(self._waiting)))
 
-    def _refuse_future(self, stamp_ns: int, ahead_ns: int) -> None:
+    def _reject_future(self, stamp_ns: int, ahead_ns: int) -> None:
         """Raise MessageError if a stamp is further ahead than a run can have come."""
         known_ns = max(self._taken_ns, 0) + (monotonic_ns() - self._taken_at_ns if self._paced else 0)
         if stamp_ns - known_ns > ahead_ns:
@@ -117,11 +117,11 @@ class StampSync(Generic[V]):
 
     @property
     def oldest_ns(self) -> int | None:
-        """Return the oldest stamp of which something waits, None if nothing does."""
+        """The oldest stamp of which an input waits, None if none does."""
         return min(self._waiting) if self._waiting else None
 
     def missing(self, stamp_ns: int, names: tuple[str, ...]) -> str:
-        """Return the last of the names of which nothing is there for a stamp, "" if there is none."""
+        """Return the last of the names whose input of a stamp is missing, "" if none is."""
         inputs = self._waiting.get(stamp_ns, ())
         for name in reversed(names):
             if name not in inputs:
