@@ -47,7 +47,7 @@ class _Issue:
 
 @dataclass(frozen=True, eq=False)
 class ProgressState:
-    """Everything that the later progress of a task depends on.
+    """Everything that the later progress of a task depends on, once its decisions have been taken.
 
     Per phase: the commands ``due``, how often it has ``begun``, its ``retries``. ``issues`` has the phase
     index, the commands and the answers of every issue.
@@ -62,7 +62,6 @@ class ProgressState:
     retries: tuple[int, ...]
     issues: tuple[tuple[int, tuple[GraspCommand, ...], tuple[GraspEvent, ...]], ...]
     ik_failures: int
-    decisions: tuple[RunEvent, ...]
 
 
 class TaskProgress:
@@ -107,7 +106,6 @@ class TaskProgress:
             tuple(self._retries),
             tuple((issue.index, issue.commands, tuple(issue.answers.values())) for issue in self._issues),
             self._ik_failures,
-            tuple(self._decisions),
         )
 
     def restore(self, state: ProgressState) -> None:
@@ -123,7 +121,7 @@ class TaskProgress:
             _Issue(index, commands, {event.command: event for event in answers})
             for index, commands, answers in state.issues
         ]
-        self._decisions = list(state.decisions)
+        self._decisions = []
 
     @property
     def awaits_grasps(self) -> bool:
