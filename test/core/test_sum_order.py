@@ -36,18 +36,16 @@ def test_the_desired_motion(draw: Draw) -> None:
 
 def test_computed_torque(robot: RobotModel, draw: Draw) -> None:
     """(q_d'' - a_1 e) - a_2 e', and H_mb H_b^-1 f_b over the six columns of H_mb."""
-    q, v, desired = draw.q(), draw.v(), np.array([draw.joints(), draw.vector(14), draw.vector(14)])
-    feedback = np.array([np.full(14, 2.3), np.full(14, 3.1)])
-    wanted = np.zeros(20)
-    wanted[BASE_NV:] = in_order(
-        desired[2], -(2.3 * (q[BASE_NQ:] - desired[0])), -(3.1 * (v[BASE_NV:] - desired[1]))
-    )
-    forces = pin.rnea(robot.pin, robot.data, q, v, wanted)
-    inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.LOCAL)
-    yielding = robot.base_solver.compute(inertia[:BASE_NV, :BASE_NV]).solve(forces[:BASE_NV])
-    coupled = in_order(*(inertia[BASE_NV:, k] * yielding[k] for k in range(BASE_NV)))
-    expected = (forces[BASE_NV:] - np.array(coupled)).tolist()
-    assert ComputedTorque(robot)(q, v, desired, feedback).tolist() == expected
+    torque, feedback = ComputedTorque(robot), np.array([np.full(14, 2.3), np.full(14, 3.1)])
+    for _ in range(20):
+        q, v, desired = draw.q(), draw.v(), np.array([draw.joints(), draw.vector(14), draw.vector(14)])
+        error, rate = q[BASE_NQ:] - desired[0], v[BASE_NV:] - desired[1]
+        wanted = np.concatenate([np.zeros(BASE_NV), in_order(desired[2], -2.3 * error, -3.1 * rate)])
+        forces = pin.rnea(robot.pin, robot.data, q, v, wanted)
+        inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.LOCAL)
+        yielding = robot.base_solver.compute(inertia[:BASE_NV, :BASE_NV]).solve(forces[:BASE_NV])
+        coupled = in_order(*(inertia[BASE_NV:, k] * yielding[k] for k in range(BASE_NV)))
+        assert torque(q, v, desired, feedback).tolist() == (forces[BASE_NV:] - np.array(coupled)).tolist()
 
 
 @pytest.mark.parametrize("scheme", sorted(TABLEAUS))
@@ -66,7 +64,7 @@ def test_work(scenario: Scenario, draw: Draw) -> None:
     parameters = scenario.parameters
     plant = make_plant(scenario.robot, scenario.schedule, parameters.common, parameters.plant)
     work = 0.0
-    for _ in range(5):
+    for _ in range(20):
         before, effort = plant.q, draw.effort(plant.q)
         plant.apply(effort)
         for torque, way in zip(effort.tolist(), (plant.q - before)[BASE_NQ:].tolist(), strict=True):
