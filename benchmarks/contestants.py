@@ -11,6 +11,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 
 from benchmarks.handover_task import HandoverTask, NmpcTracker, State
 from benchmarks.mujoco_model import MujocoRobot, rotation_matrix
+from sms_handover.control.protocol import Guidance
 from sms_handover.plant.integrators import Tableau
 from sms_handover.simulation.wiring import make_controller, make_plant, make_stepper
 from sms_handover.types import BASE_NQ, BASE_NV, Array
@@ -33,8 +34,7 @@ class Ours:
     def period(self, index: int) -> None:
         """Take a reference and go through its ticks."""
         plant, controller, steps = self._plant, self._controller, range(self._steps)
-        controller.enter(self._task.run.phases[index])
-        controller.track(self._task.references[index])
+        controller.guide(Guidance(self._task.run.phases[index], self._task.references[index], {}))
         start_ns = self._task.references[index].stamp_ns
         for tick in range(self._ticks):
             effort = controller.effort(start_ns + tick * self._tick_ns, plant.q, plant.v)

@@ -9,17 +9,20 @@ import numpy as np
 
 from benchmarks.results import Result, Table, publish, row
 from benchmarks.timing import interleaved
+from sms_handover.compiled.dynamics import CompiledComputedTorque
 from sms_handover.configuration.package_files import config_file
-from sms_handover.control.controller import JointController
-from sms_handover.control.nmpc import NmpcGains
+from sms_handover.control.computed_torque import ComputedTorque
+from sms_handover.control.law import LawSetup
+from sms_handover.control.nmpc import NMPC, NmpcGains
+from sms_handover.control.protocol import Guidance
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
 from sms_handover.plant.integrators import TABLEAUS
-from sms_handover.simulation.parameters import DYNAMICS
+from sms_handover.simulation.parameters import COMPILED, DYNAMICS
 from sms_handover.simulation.scenario import load_parameters, load_scenario
 from sms_handover.simulation.simulate import simulate
-from sms_handover.simulation.wiring import make_efforts, make_stepper
-from sms_handover.types import JointReference, Pose
+from sms_handover.simulation.wiring import make_stepper
+from sms_handover.types import JointReference, Pose, TaskPhase
 from sms_handover.units import ns_to_seconds
 
 ROUNDS = 25
@@ -56,10 +59,10 @@ def ticks_of(robot: RobotModel, dynamics: str) -> Callable[[], None]:
     joints, parameters = np.tile(BENT, len(robot.arms)), load_parameters().plant
     stepper = make_stepper(robot, dynamics, TABLEAUS[parameters.integrator], ns_to_seconds(TICK_NS))
     plant = FreeFloatingPlant(robot, parameters, InitialState(HOME, joints, HOME, {}), TICK_NS, stepper)
-    start = robot.configuration(HOME, joints)
-    efforts = make_efforts(robot, dynamics)
-    controller = JointController(robot, [NmpcGains(1.0, 0)], TICK_NS, start, efforts=efforts)
-    controller.track(JointReference(0, joints + 0.1, np.zeros_like(joints)))
+    torque = CompiledComputedTorque if dynamics == COMPILED else ComputedTorque
+    controller = NMPC.make(LawSetup(robot, (NmpcGains(1.0, 0),), TICK_NS, computed_torque=torque))
+    reference = JointReference(0, joints + 0.1, np.zeros_like(joints))
+    controller.guide(Guidance(TaskPhase(0, 0, ""), reference, {}))
 
     def run() -> None:
         for _ in range(TICKS):

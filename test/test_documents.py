@@ -227,10 +227,13 @@ def test_python_imports_what_exists(block: Block) -> None:
 
 @pytest.mark.parametrize("block", [block for block in OF_PYTHON if "runs/" not in block.text], ids=place)
 def test_python_that_needs_no_recording_runs(
-    block: Block, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    block: Block, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    """What a tutorial prints stands on its page."""
     monkeypatch.chdir(tmp_path)
     exec(compile(block.text, block.place, "exec"), {})
+    if block.place.startswith("tutorial"):
+        assert capsys.readouterr().out in (ROOT / "docs" / block.place.partition(":")[0]).read_text("utf-8")
 
 
 def test_there_is_something_to_check() -> None:

@@ -22,6 +22,7 @@ setup(
         "console_scripts": [
             "task_space_pd = my_controller.node:main",
             "task_space_pd_bare = my_controller.bare_node:main",
-        ]
+        ],
+        "sms_handover.control_laws": ["task_space_pd = my_controller.law:LAW"],
     },
 )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from sms_handover.analysis.figure_catalogue import FIGURES, chosen_figures, chosen_formats
 from sms_handover.cli.recorded_runs import read_all
-from sms_handover.control.parameters import LAWS
+from sms_handover.control.registry import SHIPPED
 from sms_handover.errors import BagError, ConfigurationError, SmsHandoverError
 from sms_handover.report.recorded_run import RecordedRun
 from sms_handover.scene.recorded_scene import deputy_size_in
@@ -87,7 +87,7 @@ def command(options: Namespace) -> int:
 
 def _label(name: str) -> str:
     """Return the name of a run for a legend: NMPC and PID are written as the paper does."""
-    return name.upper() if name in LAWS else name
+    return name.upper() if name in SHIPPED else name
 
 
 def _scene(run: RecordedRun) -> Scene | None:

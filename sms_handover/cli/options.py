@@ -1,6 +1,6 @@
 """Options that several commands share, and the scenario that they describe."""
 
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -9,8 +9,8 @@ from sms_handover.bag.parameters import RecorderParameters
 from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.parameters import build, read_parameter_files
 from sms_handover.configuration.yaml_reader import load_value
-from sms_handover.control.parameters import LAWS
-from sms_handover.errors import ConfigurationError
+from sms_handover.control.registry import require_law
+from sms_handover.errors import ConfigurationError, UnknownNameError
 from sms_handover.graph.topics import CONTROLLER, RECORDER, TRAJECTORY
 from sms_handover.simulation.parameters import DYNAMICS, MODES
 from sms_handover.simulation.scenario import COMMON, Scenario, load_scenario
@@ -22,7 +22,12 @@ Overrides = dict[str, dict[str, object]]
 def add_scenario_options(parser: ArgumentParser) -> None:
     """Add the options that choose robot, schedule, controller and parameters."""
     group = parser.add_argument_group("scenario")
-    group.add_argument("--controller", choices=LAWS, help="control law (default: nmpc)")
+    group.add_argument(
+        "--controller",
+        type=_law,
+        metavar="LAW",
+        help="control law: nmpc, pid, or one of another package (default: nmpc)",
+    )
     group.add_argument("--schedule", type=Path, metavar="FILE", help="task schedule (default: handover.yaml)")
     group.add_argument("--robot", type=Path, metavar="FILE", help="robot description (default: robot.yaml)")
     group.add_argument(
@@ -52,6 +57,15 @@ def add_scenario_options(parser: ArgumentParser) -> None:
         help="one parameter, e.g. plant.integrator:=midpoint, where the node 'common' is for all of "
         "them; or a value of robot, deputy or schedule by path, e.g. robot.arms.arm_a.gripper.mass:=0.9",
     )
+
+
+def _law(name: str) -> str:
+    """Return the name of a control law; raises ArgumentTypeError."""
+    try:
+        require_law(name)
+    except UnknownNameError as error:
+        raise ArgumentTypeError(str(error)) from error
+    return name
 
 
 def overrides_of(options: Namespace) -> Overrides:

@@ -1,4 +1,4 @@
-"""Calling a C function as CasADi generates it, with arrays that belong to the caller."""
+"""C functions as CasADi generates them, called on arrays of the caller."""
 
 import ctypes
 from collections.abc import Sequence
@@ -9,14 +9,14 @@ import numpy as np
 from sms_handover.errors import ConfigurationError
 from sms_handover.types import Array
 
-_SIZES = 4  # that a generated function tells: arguments, results, integers and numbers of work space
+_SIZES = 4  # sizes reported by a generated function: arguments, results, integer and real work space
 
 
 class CFunction:
-    """A function of a library, bound to its arguments and its results.
+    """A function of a shared library, bound to its arguments and results.
 
-    ``arguments`` and ``results`` are read and written where they lie whenever it is called; they and the
-    work space are kept alive with it. The interpreter is not let go meanwhile: a call takes microseconds.
+    Each call reads ``arguments`` and writes ``results`` in place; both are kept alive with the function. The
+    GIL is not released: a call takes microseconds.
     """
 
     def __init__(
@@ -39,5 +39,5 @@ class CFunction:
         self._work = ctypes.c_void_p(work.ctypes.data)
 
     def __call__(self) -> None:
-        """Work out the results of what the arguments hold now."""
+        """Compute the results of the present arguments."""
         self._call(self._arguments, self._results, None, self._work, 0)

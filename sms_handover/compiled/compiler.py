@@ -1,4 +1,4 @@
-"""Making libraries of C code, and keeping them for the next run."""
+"""Compiler: builds shared libraries from C code and caches them."""
 
 import hashlib
 import logging
@@ -15,21 +15,20 @@ from pathlib import Path
 from sms_handover.errors import ConfigurationError
 
 _LOG = logging.getLogger(__name__)
-# No fused or reordered operations: what machines then differ in is what their sine and cosine round.
+# No fused or reordered operations: machines then differ only in the rounding of sine and cosine.
 _FLAGS = ("-O2", "-march=native", "-ffp-contract=off", "-fPIC", "-shared")
-_TIMEOUT_S = 600.0  # [s] for a compiler that hangs; it takes a few seconds
-_TELLING = ("model name", "flags", "CPU part", "Features")  # of /proc/cpuinfo, on x86 and on ARM
+_TIMEOUT_S = 600.0  # [s] for a compiler that hangs; normally a few seconds
+_CPU_KEYS = ("model name", "flags", "CPU part", "Features")  # of /proc/cpuinfo, on x86 and on ARM
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def library_of(what: str, identity: bytes, source: Callable[[], str]) -> Path:
-    """Return the shared library of some C code, compiled here unless an earlier run has done it.
+    """Return the shared library of some C code, compiled unless it is cached.
 
-    ``identity`` is all that the code depends on; it, the compiler and the processor decide whether a
-    library that lies there will do, so ``source`` is asked for only where one must be made. The libraries
-    are in ``sms_handover`` below ``$XDG_CACHE_HOME`` or ``~/.cache``, a folder of the user alone: whoever
-    could write to it could run what he likes. Raises ConfigurationError without a C compiler, or if it fails,
-    or on a folder that others can write to.
+    The key is ``identity``, all that the code depends on, with compiler and processor; ``source`` is called
+    only on a miss. The cache is ``sms_handover`` in ``$XDG_CACHE_HOME`` or ``~/.cache``, writable by the user
+    alone, as its libraries are executed. Raises ConfigurationError without a C compiler, if it fails, or on a
+    folder that others can write to.
     """
     command = _compiler()
     folder = _own_folder()
@@ -54,18 +53,18 @@ def _compiler() -> list[str]:
 
 
 def _machine(command: list[str]) -> str:
-    """Return what the compiler calls itself and which processor it compiles for."""
+    """Return the versions of platform and compiler, and the processor."""
     try:
         version = _run([*command, "--version"]).stdout
         cpu = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").partition("\n\n")[0]
     except (OSError, subprocess.SubprocessError):
         return platform.platform()
-    kept = (line for line in cpu.splitlines() if line.startswith(_TELLING))
+    kept = (line for line in cpu.splitlines() if line.startswith(_CPU_KEYS))
     return "\n".join((platform.platform(), version, *kept))
 
 
 def _own_folder() -> Path:
-    """Return the folder of the libraries, which nobody else can write to."""
+    """Return the cache folder, which nobody else can write to."""
     cache = os.environ.get("XDG_CACHE_HOME", "")
     folder = (Path(cache) if os.path.isabs(cache) else Path.home() / ".cache") / "sms_handover"
     try:
@@ -76,13 +75,13 @@ def _own_folder() -> Path:
     if found.st_uid != os.getuid() or found.st_mode & _OTHERS_WRITE:
         raise ConfigurationError(
             f"{folder} belongs to user {found.st_uid} and has mode {stat.filemode(found.st_mode)}: "
-            "what others can write to is not run; allowed is a folder of your own with mode 0700"
+            "libraries that others can write to are not executed; it must be yours, with mode 0700"
         )
     return folder
 
 
 def _compile(command: list[str], source: str, library: Path) -> None:
-    """Make a library and put it into its place at once, so that nobody meets half of one."""
+    """Compile a library and move it into place atomically."""
     try:
         with tempfile.TemporaryDirectory(dir=library.parent) as scratch:
             code, made = Path(scratch) / "dynamics.c", Path(scratch) / "dynamics.so"
@@ -98,5 +97,5 @@ def _compile(command: list[str], source: str, library: Path) -> None:
 
 
 def _run(command: list[str]) -> "subprocess.CompletedProcess[str]":
-    """Run a command to its end and return what it printed."""
+    """Run a command and return its output."""
     return subprocess.run(command, check=False, capture_output=True, text=True, timeout=_TIMEOUT_S)

@@ -1,4 +1,4 @@
-"""What plant and controller take in place of Pinocchio's algorithms: the same values, compiled."""
+"""Compiled dynamics: what plant and controller use in place of Pinocchio's algorithms."""
 
 import hashlib
 from importlib import import_module
@@ -20,23 +20,17 @@ from sms_handover.plant.stepper import PinocchioStepper
 from sms_handover.types import Array, frozen
 
 _STEP, _COMPUTED_TORQUE = "step", "computed_torque"  # names of the C functions
-_TOLERANCE = 1e-9  # [-] of the largest value; rounding leaves 1e-14, another robot's library is far off
+_TOLERANCE = 1e-9  # [-] of the largest value; rounding leaves 1e-14
 _SEED = 0
-_EXAMPLE_S = 1e-3  # [s] in which even a wrist stays where it is, so that rounding is not blown up
+_EXAMPLE_S = 1e-3  # [s] short, so that rounding is not amplified by a light wrist
 
 
 class CompiledStepper:
-    """Steps of ``h`` s of the free-floating robot, as :class:`~sms_handover.plant.stepper.PinocchioStepper`.
-
-    An instance owns work space, so it is not to be shared between threads.
-    """
+    """Steps of ``h`` s as :class:`~sms_handover.plant.stepper.PinocchioStepper`; not thread-safe."""
 
     def __init__(self, robot: RobotModel, tableau: Tableau, h: float) -> None:
-        """Compile the step unless that is done, and hold it against Pinocchio; raises ConfigurationError."""
-        bodies = body_tree(robot)
-        library = library_of(
-            _STEP, _identity(bodies, repr(tableau)), lambda: _writer().step_source(_STEP, bodies, tableau)
-        )
+        """Compile the step unless cached, and compare it with Pinocchio; raises ConfigurationError."""
+        library = _library(_STEP, robot, tableau)
         size = robot.n_joints
         self._q, self._v, self._u = np.zeros(BASE_NQ + size), np.zeros(BASE_NV + size), np.zeros(size)
         self._q_next, self._v_next = np.zeros_like(self._q), np.zeros_like(self._v)
@@ -58,19 +52,11 @@ class CompiledStepper:
 
 
 class CompiledComputedTorque:
-    """Joint efforts as :class:`~sms_handover.control.computed_torque.ComputedTorque` gives them.
-
-    An instance owns work space, so it is not to be shared between threads.
-    """
+    """Joint efforts as :class:`~sms_handover.control.computed_torque.ComputedTorque`; not thread-safe."""
 
     def __init__(self, robot: RobotModel) -> None:
-        """Compile it unless that is done, and hold it against Pinocchio; raises ConfigurationError."""
-        bodies = body_tree(robot)
-        library = library_of(
-            _COMPUTED_TORQUE,
-            _identity(bodies, ""),
-            lambda: _writer().computed_torque_source(_COMPUTED_TORQUE, bodies),
-        )
+        """Compile it unless cached, and compare it with Pinocchio; raises ConfigurationError."""
+        library = _library(_COMPUTED_TORQUE, robot)
         size = robot.n_joints
         self._q, self._v = np.zeros(BASE_NQ + size), np.zeros(BASE_NV + size)
         self._desired, self._feedback = np.zeros((3, size)), np.zeros(2)
@@ -79,22 +65,29 @@ class CompiledComputedTorque:
         self._function = CFunction(library, _COMPUTED_TORQUE, arguments, (self._efforts,))
         q, v, wanted = _example(robot)
         desired = np.array([0.9 * q[BASE_NQ:], 0.9 * v[BASE_NV:], wanted])
-        example = (q, v, desired, np.array([2.0, 3.0]))
+        example = (q, v, desired, np.array([[2.0], [3.0]]))
         _require_equal(library, [(self(*example), ComputedTorque(robot)(*example))])
 
     def __call__(self, q: Array, v: Array, desired: Array, feedback: Array) -> Array:
-        """Return the joint efforts (n,) N m, without a limit."""
+        """Return the joint efforts (n,) N m, not limited."""
         self._q[:] = q
         self._v[:] = v
         self._desired[:] = desired
-        self._feedback[:] = feedback
+        self._feedback[:] = feedback[:, 0]
         self._function()
         efforts: Array = self._efforts.copy()
         return efforts
 
 
+def _library(name: str, robot: RobotModel, *scheme: Tableau) -> Path:
+    """Return the library of a C function for a robot, and for a scheme if it needs one."""
+    bodies = body_tree(robot)
+    identity = _identity(bodies, "".join(map(repr, scheme)))
+    return library_of(name, identity, lambda: getattr(_writer(), f"{name}_source")(name, bodies, *scheme))
+
+
 def _identity(bodies: tuple[Body, ...], scheme: str) -> bytes:
-    """Return a digest of all that the C code depends on: the robot, the scheme, and who writes it."""
+    """Return a digest of all that the C code depends on: robot, scheme and code generator."""
     digest = hashlib.sha256(f"{scheme} casadi {_casadi_version()}".encode())
     for source in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(source.read_bytes())
@@ -106,7 +99,7 @@ def _identity(bodies: tuple[Body, ...], scheme: str) -> bytes:
 
 
 def _writer() -> Any:
-    """Return the module that writes C code: CasADi is asked for where there is something to write."""
+    """Return the C code generator; CasADi is imported only where code must be generated."""
     try:
         return import_module("sms_handover.compiled.source")
     except ModuleNotFoundError as error:
@@ -116,7 +109,7 @@ def _writer() -> Any:
 
 
 def _casadi_version() -> str:
-    """Return the version of CasADi, or nothing: a library that lies there does without."""
+    """Return the version of CasADi, '' without it: cached libraries do not need it."""
     try:
         return version("casadi")
     except PackageNotFoundError:
@@ -124,7 +117,7 @@ def _casadi_version() -> str:
 
 
 def _example(robot: RobotModel) -> tuple[Array, Array, Array]:
-    """Return some q, v and one value per joint, the same each time."""
+    """Return a fixed q, v and one value per joint."""
     random = np.random.default_rng(_SEED)
     base = pin.SE3ToXYZQUAT(pin.SE3(pin.exp3(random.normal(size=3)), random.normal(size=3)))
     q = np.concatenate([base, random.uniform(-1.0, 1.0, robot.n_joints)])
@@ -132,11 +125,11 @@ def _example(robot: RobotModel) -> tuple[Array, Array, Array]:
 
 
 def _require_equal(library: Path, pairs: list[tuple[Array, Array]]) -> None:
-    """Raise ConfigurationError unless a library gives what Pinocchio gives."""
+    """Raise ConfigurationError unless a library agrees with Pinocchio."""
     for ours, theirs in pairs:
         apart = float(np.abs(ours - theirs).max() / np.abs(theirs).max())
         if not apart <= _TOLERANCE:
             raise ConfigurationError(
-                f"compiled dynamics in {library} are off Pinocchio's by {apart:.1e} of the largest value, "
-                f"allowed is {_TOLERANCE:g}: remove the file, or take dynamics 'pinocchio'"
+                f"compiled dynamics in {library} differ from Pinocchio by {apart:.1e} of the largest value, "
+                f"must be <= {_TOLERANCE:g}: remove the file, or use dynamics 'pinocchio'"
             )

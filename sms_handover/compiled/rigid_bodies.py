@@ -1,4 +1,4 @@
-"""The dynamics of a free-floating tree of rigid bodies as CasADi expressions [Featherstone2008].
+"""Rigid bodies: the dynamics of a free-floating tree as CasADi expressions [Featherstone2008].
 
 Vectors are in the frame of their body. A wrench is a force and a moment about the origin of the frame.
 """
@@ -13,13 +13,13 @@ import numpy as np
 from sms_handover.compiled.tree import Body
 from sms_handover.model.robot_model import BASE_NV
 
-ca: Any = casadi  # whose types tell less than they claim
+ca: Any = casadi  # its type hints are incomplete
 Expression = Any  # casadi.SX
 
 
 @dataclass(frozen=True, eq=False)
 class _Rigid:
-    """Mass, first moment and inertia about the origin of a body, or of all that a joint carries as one."""
+    """Mass, first moment and inertia about the origin of a body, or of a composite body."""
 
     mass: float
     first_moment: Expression
@@ -32,14 +32,12 @@ class _Rigid:
 
 
 class RigidBodies:
-    """The equations of motion of a robot at angles (n,) and a velocity v (6 + n,), written out.
+    """The equations of motion H(q) v' + c(q, v) = (0, u) at angles (n,) and a velocity v (6 + n,).
 
-    H(q) v' + c(q, v) = (0, u). In free space neither depends on the pose of the base, so neither does the
-    acceleration.
+    In free space H, c and hence v' do not depend on the base pose.
     """
 
     def __init__(self, bodies: Sequence[Body], angles: Expression, v: Expression) -> None:
-        """Work out the frames of the bodies and their twists."""
         self._bodies = bodies
         self._rigids = [_Rigid(body.mass, ca.SX(body.first_moment), ca.SX(body.inertia)) for body in bodies]
         self._rates = [v[BASE_NV + joint] for joint in range(len(bodies) - 1)]
@@ -54,8 +52,8 @@ class RigidBodies:
     def joint_efforts(self, joint_acceleration: Expression) -> Expression:
         """Return u (n,) N m that brings about joint accelerations (n,), as ``reduced_inverse_dynamics``.
 
-        A base that did not accelerate would need the wrench f_b; it has none, so it accelerates by
-        a_b = -H_b^-1 f_b, and all that a joint carries goes along as one body.
+        A base at rest would need the wrench f_b; without it the base accelerates by a_b = -H_b^-1 f_b, and
+        each composite body follows.
         """
         wrenches = self._wrenches(_elements(joint_acceleration))
         yielding = _solved(self._base_inertia(), -ca.vertcat(*wrenches[0]))
@@ -79,12 +77,12 @@ class RigidBodies:
         return _solved(self._inertia_matrix(), right)
 
     def _carried(self, index: int, linear: Expression, angular: Expression) -> tuple[Expression, Expression]:
-        """Return a twist of the parent, or its acceleration, as that of a body that does not turn in it."""
+        """Return a twist or acceleration of the parent in the frame of a body."""
         into = self._rotations[index].T
         return into @ (linear + ca.cross(angular, ca.SX(self._bodies[index].place))), into @ angular
 
     def _composed(self) -> list[_Rigid]:
-        """Return for each body what it and all that it carries have as one."""
+        """Return the composite rigid body of each joint."""
         composites = list(self._rigids)
         for index in range(len(self._bodies) - 1, 0, -1):
             body, own, rotation = self._bodies[index], composites[index], self._rotations[index]
@@ -100,7 +98,7 @@ class RigidBodies:
         return composites
 
     def _wrenches(self, joint_acceleration: Sequence[Expression]) -> list[tuple[Expression, Expression]]:
-        """Return the wrench that each joint passes on if the base does not accelerate: Newton and Euler."""
+        """Return the wrench at each joint for a base that does not accelerate, by Newton-Euler."""
         zero = ca.SX.zeros(3)
         accelerations, wrenches = [(zero, zero)], []
         for index, body in enumerate(self._bodies):
@@ -130,14 +128,14 @@ class RigidBodies:
         return turned, rotation @ moment + ca.cross(ca.SX(self._bodies[index].place), turned)
 
     def _base_inertia(self) -> list[list[Expression]]:
-        """Return H_b (6, 6): that of the whole robot, were its joints locked."""
+        """Return H_b (6, 6), that of the robot with locked joints."""
         whole = self._composites[0]
         skew = ca.skew(whole.first_moment)
         matrix = ca.blockcat([[whole.mass * ca.SX.eye(3), -skew], [skew, whole.inertia]])
         return [_elements(matrix[row, :]) for row in range(BASE_NV)]
 
     def _inertia_matrix(self) -> list[list[Expression]]:
-        """Return H (6 + n, 6 + n) by composite rigid bodies; 0.0 where no joint carries the other."""
+        """Return H (6 + n, 6 + n) by composite rigid bodies; 0.0 where neither joint carries the other."""
         size = BASE_NV + len(self._bodies) - 1
         matrix: list[list[Expression]] = [[0.0] * size for _ in range(size)]
         for row, entries in enumerate(self._base_inertia()):
@@ -196,7 +194,7 @@ def _turned(body: Body, angle: Expression) -> Expression:
 
 
 def _symmetric(matrix: Expression) -> Expression:
-    """Return a symmetric matrix whose upper half is written out once, for the lower one too."""
+    """Return a symmetric matrix from its upper half."""
     return ca.blockcat([[matrix[min(i, j), max(i, j)] for j in range(3)] for i in range(3)])
 
 

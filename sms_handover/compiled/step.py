@@ -1,4 +1,4 @@
-"""One step of the plant as a CasADi function: the schemes of ``plant.integrators``, written out."""
+"""One step of the plant as a CasADi function: the schemes of ``plant.integrators``."""
 
 from typing import Any
 
@@ -13,8 +13,8 @@ _SMALL = 1e-3  # [rad^2] below, five terms of a series leave less than rounding
 def step_function(name: str, acceleration: Any, tableau: Tableau, joints: int) -> Any:
     """Return (q, v, u, h) -> (q, v) after a step of ``h`` s; ``acceleration`` maps angles, v and u to v'.
 
-    The sums are those of :class:`~sms_handover.plant.integrators.LieGroupIntegrator`. As the acceleration
-    does not depend on where the base is, the base moves at the end of the step only.
+    The sums are those of :class:`~sms_handover.plant.integrators.LieGroupIntegrator`. As accelerations do
+    not depend on the base pose, the base moves at the end of the step only.
     """
     q, v = ca.MX.sym("q", BASE_NQ + joints), ca.MX.sym("v", BASE_NV + joints)
     u, h = ca.MX.sym("u", joints), ca.MX.sym("h")
@@ -35,7 +35,7 @@ def step_function(name: str, acceleration: Any, tableau: Tableau, joints: int) -
 
 
 def _sum(weights: Any, values: list[Any]) -> Any:
-    """Return the weighted sum, leaving out what has no weight."""
+    """Return the weighted sum, without zero weights."""
     total = 0.0
     for weight, value in zip(weights, values, strict=False):
         if weight:

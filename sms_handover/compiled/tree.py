@@ -1,4 +1,4 @@
-"""The numbers of a robot that its equations of motion need, read from its Pinocchio model."""
+"""Body tree: the inertial and geometric data of a robot, read from its Pinocchio model."""
 
 from dataclasses import dataclass
 
@@ -8,13 +8,13 @@ import pinocchio as pin
 from sms_handover.model.robot_model import BASE_NV, RobotModel
 from sms_handover.types import Array, read_only
 
-_ROUNDING = 1e-14  # [-, m, kg m, kg m^2] an entry that is nearer than this to -1, 0 or 1 was meant to be it
-_BASE = 1  # index of the base among Pinocchio's joints; that of the universe is 0
+_ROUNDING = 1e-14  # [-, m, kg m, kg m^2] entries this close to -1, 0 or 1 are set to it
+_BASE = 1  # index of the base among Pinocchio's joints; the universe is 0
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A body, and the joint that carries it; all in the frame of this joint, which moves with the body.
+    """A body and the joint that carries it, in the frame of the joint, which moves with the body.
 
     ``parent`` is the index of the body that carries the joint, -1 for the base. ``rotation`` (3, 3) and
     ``place`` (3,) m are those of the joint's frame at angle zero in the frame of the parent, ``axis`` (3,)
@@ -65,10 +65,7 @@ def _axis(model: pin.Model, index: int) -> Array:
 
 
 def _tidy(values: Array) -> Array:
-    """Return an array in which entries that rounding keeps off -1, 0 and 1 are put there.
-
-    A turn by pi/2 has cosines of 6e-17; as zeros they take whole terms out of the equations.
-    """
+    """Return an array with entries close to -1, 0 and 1 set to them: cos(pi/2) as 0 removes whole terms."""
     array = np.array(values, dtype=np.float64)
     nearest = np.clip(np.round(array), -1.0, 1.0)
     return read_only(np.where(np.abs(array - nearest) < _ROUNDING, nearest + 0.0, array))

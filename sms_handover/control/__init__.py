@@ -1,1 +1,1 @@
-"""Joint controllers: the laws behind one interface, gains per phase, and the sampled-loop check."""
+"""Control: laws behind one interface, gains per phase, and the sampled-loop check."""

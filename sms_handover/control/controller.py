@@ -1,120 +1,69 @@
-"""The controller: one law, its gains phase by phase, and the reference it tracks."""
+"""The joint controller: a joint-space law, its gains phase by phase, and the reference it tracks."""
 
-from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Generic
 
 import numpy as np
 
-from sms_handover.control.base import ControlLaw
-from sms_handover.control.computed_torque import TrackingEfforts
-from sms_handover.control.nmpc import NmpcGains, NmpcLaw
-from sms_handover.control.pid import PidGains, PidLaw
+from sms_handover.control.law import G, JointLaw, LawSetup
 from sms_handover.control.protocol import Guidance
-from sms_handover.control.reference_track import ReferenceTrack
-from sms_handover.control.stability import LoopStability, loop_stability
-from sms_handover.errors import UnstableLoopError
-from sms_handover.model.reduced import reduced_dynamics
-from sms_handover.model.robot_model import RobotModel
-from sms_handover.types import Array, JointCommand, JointReference, PhaseState, RobotState, TaskPhase, frozen
+from sms_handover.control.reference_track import ReferenceTrack, TrackState
+from sms_handover.types import Array, PhaseState, frozen, read_only
 from sms_handover.units import ns_to_seconds
 
-Gains = NmpcGains | PidGains
+Entry = tuple[int, int, PhaseState]  # of a phase: its index, its attempt, whether it is carried out
 
 
-class JointController:
+@dataclass(frozen=True, eq=False)
+class JointControllerState:
+    """The phase whose gains are in use, the memory of the law, and the reference."""
+
+    entry: Entry
+    memory: Array
+    track: TrackState
+
+
+class JointController(Generic[G]):
     """Tracks joint references with a law whose gains change with the phase of the task."""
 
-    def __init__(
-        self,
-        robot: RobotModel,
-        gains_by_phase: Sequence[Gains],
-        tick_ns: int,
-        base_configuration: Array,
-        longest_ns: int | None = None,
-        efforts: TrackingEfforts | None = None,
-    ) -> None:
-        """Set up the law of the gains' kind, and check every gain set at the start configuration.
-
-        ``gains_by_phase`` has one entry per phase of the schedule, all of one kind;
-        ``base_configuration`` is q (7 + n,) at the start. A reference older than ``longest_ns`` is no
-        longer carried on: the desired joints stand still. A law of computed torque has its
-        equation worked out by ``efforts``, by default by Pinocchio. Raises UnstableLoopError.
-        """
-        self._robot = robot
-        self._efforts = efforts
-        self._gains_by_phase = tuple(gains_by_phase)
-        self._dt = ns_to_seconds(tick_ns)
-        self._law = make_law(robot, self._gains_by_phase[0], efforts)
-        self._track = ReferenceTrack(longest_ns)
-        self._entry = (0, 1, PhaseState.ACTIVE)
-        check_stability(robot, self._gains_by_phase, self._dt, base_configuration)
+    def __init__(self, law: JointLaw[G], setup: LawSetup[Any]) -> None:
+        self._law = law
+        self._gains = setup.gains
+        self._dt = ns_to_seconds(setup.tick_ns)
+        self._rest = read_only(np.zeros(setup.robot.n_joints))  # N m
+        self._track = ReferenceTrack(setup.longest_reference_ns)
+        self.reset()
 
     def reset(self) -> None:
-        """Go back to the start of the run."""
-        self._law = make_law(self._robot, self._gains_by_phase[0], self._efforts)
+        """Return to the start of a run."""
         self._track.reset()
-        self._entry = (0, 1, PhaseState.ACTIVE)
+        self._entry: Entry = (0, 1, PhaseState.ACTIVE)
+        self._law.use(self._gains[0])
+        self._law.restore(np.zeros(0))
 
     def guide(self, guidance: Guidance) -> None:
-        """Take over the gains of the phase and the joint reference; these laws follow joints, not tools."""
-        self.enter(guidance.phase)
-        self.track(guidance.reference)
-
-    def enter(self, phase: TaskPhase) -> None:
-        """Take over the gains of a phase, if it begins, begins again or is given up."""
+        """Track the joint reference, with the gains of the phase where it begins, is repeated or fails."""
+        phase = guidance.phase
         if phase.entry != self._entry:
             self._entry = phase.entry
-            self._law.use(self._gains_by_phase[phase.index])
+            self._law.use(self._gains[phase.index])
             self._track.restart()
-
-    def track(self, reference: JointReference) -> None:
-        """Take the next joint reference."""
-        self._track.update(reference)
-
-    @property
-    def reference_ns(self) -> int:
-        """Return the stamp of the last reference, 0 before the first."""
-        return self._track.stamp_ns
-
-    def step(self, state: RobotState) -> JointCommand:
-        """Return the command that answers a state; zero efforts until a first reference has come."""
-        return JointCommand(state.stamp_ns, self.effort(state.stamp_ns, state.q, state.v))
+        self._track.update(guidance.reference)
 
     def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
-        """Return the efforts (n,) of that command, read-only, for a state as bare arrays."""
+        """Return the efforts (n,) N m for a state, read-only; zero until a first reference has come."""
         if not self._track.ready:
-            return frozen(np.zeros(self._robot.n_joints))
+            return self._rest
         return frozen(self._law.effort(q, v, self._track.at(stamp_ns), self._dt))
 
+    @property
+    def state(self) -> JointControllerState:
+        """Everything that later efforts depend on."""
+        return JointControllerState(self._entry, self._law.memory, self._track.state)
 
-def make_law(robot: RobotModel, gains: Gains, efforts: TrackingEfforts | None = None) -> ControlLaw[Any]:
-    """Return the law that these gains belong to."""
-    if isinstance(gains, NmpcGains):
-        return NmpcLaw(robot, gains, efforts)
-    return PidLaw(robot, gains)
-
-
-def check_stability(
-    robot: RobotModel,
-    gains_by_phase: Sequence[Gains],
-    dt: float,
-    q: Array,
-    where: str = "at the start configuration",
-) -> tuple[LoopStability, ...]:
-    """Return the stability of the sampled loop of each gain set at rest in q (7 + n,).
-
-    Raises UnstableLoopError if one diverges; ``where`` says in its text what q is.
-    """
-    inertia = reduced_dynamics(robot, q, np.zeros(robot.pin.nv)).inertia
-    found = []
-    for gains in gains_by_phase:
-        feedback = make_law(robot, gains).linearised(inertia)
-        stability = loop_stability(inertia, feedback, dt, robot.joint_names)
-        if not stability.stable:
-            raise UnstableLoopError(
-                f"the loop of {gains} at a tick of {dt:g} s is unstable {where}: "
-                f"spectral radius {stability.spectral_radius:.6f}, allowed is below 1, "
-                f"first at {stability.joint}; use a shorter tick or smaller gains"
-            )
-        found.append(stability)
-    return tuple(found)
+    def restore(self, state: JointControllerState) -> None:
+        """Go back to a former :attr:`state`."""
+        self._entry = state.entry
+        self._law.use(self._gains[state.entry[0]])
+        self._law.restore(state.memory)
+        self._track.restore(state.track)

@@ -1,12 +1,13 @@
-"""Closed-form nonlinear model predictive control of the reduced dynamics."""
+"""NMPC: closed-form nonlinear model predictive control of the reduced dynamics."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from sms_handover.configuration.parameters import parameter
-from sms_handover.control.base import ControlLaw, LinearFeedback
 from sms_handover.control.computed_torque import ComputedTorque, TrackingEfforts
+from sms_handover.control.controller import JointController
+from sms_handover.control.law import JointLaw, Law, LawSetup, LinearFeedback
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import Array
 
@@ -15,11 +16,11 @@ MAX_CONTROL_ORDER = 3
 
 @dataclass(frozen=True)
 class NmpcGains:
-    """What shapes the law: how far it looks ahead and how many derivatives of the input it plans."""
+    """Prediction horizon and order of the input."""
 
-    rolling_period: float = parameter("prediction horizon T_r", unit="s", minimum=1e-3)
+    rolling_period: float = parameter("nmpc: prediction horizon T_r", unit="s", minimum=1e-3)
     control_order: int = parameter(
-        "order r of the Taylor expansion of the input", minimum=0, maximum=MAX_CONTROL_ORDER
+        "nmpc: order r of the Taylor expansion of the input", minimum=0, maximum=MAX_CONTROL_ORDER
     )
 
     @property
@@ -35,7 +36,7 @@ class NmpcGains:
         return (r + 1) * (r + 5) / (2.0 * self.rolling_period)
 
 
-class NmpcLaw(ControlLaw[NmpcGains]):
+class NmpcLaw(JointLaw[NmpcGains]):
     """u = H*(q_d'' - A_1 e - A_2 e') + c*, the minimiser of (1/2) int_0^T_r e(t+s)^T e(t+s) ds [Chen2003].
 
     H* and c* are those of the arms on the free base, so e'' + A_2 e' + A_1 e = 0 holds exactly for
@@ -43,26 +44,32 @@ class NmpcLaw(ControlLaw[NmpcGains]):
     """
 
     def __init__(self, robot: RobotModel, gains: NmpcGains, efforts: TrackingEfforts | None = None) -> None:
-        """Set up the law for a robot; ``efforts`` works its equation out, by default Pinocchio does."""
+        """Set up the law; ``efforts`` is the computed torque of the robot, by default by Pinocchio."""
         self._robot = robot
         self._efforts = efforts or ComputedTorque(robot)
         self.use(gains)
 
-    def reset(self) -> None:
-        """Do nothing: the law has no memory."""
-
     def use(self, gains: NmpcGains) -> None:
-        """Go on with other gains."""
-        self._gains = gains
-        self._feedback = np.array([gains.position_gain, gains.velocity_gain])
+        """Switch to other gains."""
+        pair = np.array([[gains.position_gain], [gains.velocity_gain]])
+        self._feedback = np.repeat(pair, self._robot.n_joints, axis=1)
 
     def effort(self, q: Array, v: Array, desired: Array, dt: float) -> Array:
-        """Return the joint efforts (n,) N m, limited to what the joints can give; ``dt`` plays no part."""
+        """Return the joint efforts (n,) N m, limited to what the joints can give; ``dt`` is unused."""
         return self._robot.limited(self._efforts(q, v, desired, self._feedback))
 
-    def linearised(self, inertia: Array) -> LinearFeedback:
-        """Return K_e = A_1 H*, K_v = A_2 H*, K_z = 0."""
-        gains = self._gains
-        return LinearFeedback(
-            gains.position_gain * inertia, gains.velocity_gain * inertia, np.zeros_like(inertia)
-        )
+
+def linearised(gains: NmpcGains, inertia: Array) -> LinearFeedback:
+    """Return K_e = A_1 H*, K_v = A_2 H*, K_z = 0."""
+    return LinearFeedback(
+        gains.position_gain * inertia, gains.velocity_gain * inertia, np.zeros_like(inertia)
+    )
+
+
+def _controller(setup: LawSetup[NmpcGains]) -> JointController[NmpcGains]:
+    """Return the controller of a setup."""
+    law = NmpcLaw(setup.robot, setup.gains[0], setup.computed_torque(setup.robot))
+    return JointController(law, setup)
+
+
+NMPC = Law("nmpc", "the paper's closed form, without constraints", NmpcGains, _controller, linearised)

@@ -1,46 +1,58 @@
-"""Parameters of the controller."""
+"""Parameters of the controller: its law, and the gains of every law that it may be."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields, make_dataclass
+from typing import Any
 
 from sms_handover.configuration.parameters import build, parameter
-from sms_handover.control.nmpc import MAX_CONTROL_ORDER, NmpcGains
+from sms_handover.control.law import Law
+from sms_handover.control.nmpc import NmpcGains
 from sms_handover.control.pid import PidGains
-from sms_handover.errors import UnknownNameError
-
-LAWS = ("nmpc", "pid")
+from sms_handover.control.registry import GROUP, SHIPPED
+from sms_handover.errors import ConfigurationError, UnknownNameError
 
 
 @dataclass(frozen=True)
-class ControllerParameters:
-    """Which law controls the joints and its gains; the numbers are in ``config/controller.yaml``."""
+class ControllerParameters(PidGains, NmpcGains):
+    """The law that controls the joints, and its gains; the values are in ``config/controller.yaml``."""
 
-    law: str = parameter("control law", choices=LAWS)
-    rolling_period: float = parameter("nmpc: prediction horizon T_r", unit="s", minimum=1e-3)
-    control_order: int = parameter("nmpc: order of the input", minimum=0, maximum=MAX_CONTROL_ORDER)
-    proportional: float = parameter("pid: proportional gain K_P", unit="N m/rad", minimum=0.0)
-    integral: float = parameter("pid: integral gain K_I", unit="N m/(rad s)", minimum=0.0)
-    derivative: float = parameter("pid: derivative gain K_D", unit="N m s/rad", minimum=0.0)
+    law: str = parameter(
+        f"control law: {', '.join(SHIPPED)}, or one of another package (entry points {GROUP})"
+    )
     reference_hold: float = parameter(
-        "real time: how long the desired motion is carried on when the next reference is overdue, before it "
-        "stands still",
+        "real time: how long the desired motion is extrapolated when the next reference is overdue, before "
+        "it stops",
         unit="s",
         minimum=0.0,
         maximum=3600.0,
     )
 
 
+def parameters_with(law: Law[Any]) -> type[ControllerParameters]:
+    """Return the parameters of the controller under a law, with those of a law of another package.
+
+    Raises ConfigurationError if that law calls a parameter like one that is there already.
+    """
+    if law.name in SHIPPED:
+        return ControllerParameters
+    for item in fields(law.parameters):
+        if item.name in ControllerParameters.__dataclass_fields__:
+            raise ConfigurationError(
+                f"control law {law.name!r} has a parameter {item.name!r}, as the controller has: rename it"
+            )
+    bases = (law.parameters, ControllerParameters)
+    return make_dataclass(ControllerParameters.__name__, (), bases=bases, frozen=True)
+
+
 def gains_of(
-    parameters: ControllerParameters, overrides: Mapping[str, object], where: str
-) -> NmpcGains | PidGains:
-    """Return the gains of the chosen law, with the overrides of a phase on top.
+    law: Law[Any], parameters: ControllerParameters, overrides: Mapping[str, object], where: str
+) -> Any:
+    """Return the gains of a law, with the overrides of a phase on top.
 
     Raises ConfigurationError where an override is not a gain of the law or out of range.
     """
-    cls: type[NmpcGains] | type[PidGains] = NmpcGains if parameters.law == "nmpc" else PidGains
-    names = {item.name for item in fields(cls)}
+    names = {item.name for item in fields(law.parameters)}
     for name in overrides:
         if name not in names:
-            raise UnknownNameError(f"gain of {parameters.law}", name, sorted(names), where)
-    base = {name: value for name, value in asdict(parameters).items() if name in names}
-    return build(cls, {**base, **overrides}, where)
+            raise UnknownNameError(f"gain of {law.name}", name, sorted(names), where)
+    return build(law.parameters, {**{name: getattr(parameters, name) for name in names}, **overrides}, where)

@@ -1,9 +1,9 @@
-"""What the loop asks of a controller, so that one from outside the package can take the place of ours."""
+"""Controller protocol: what the loop requires of any controller, ours or a user's."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -14,10 +14,10 @@ from sms_handover.units import ns_to_seconds
 
 @dataclass(frozen=True, eq=False)
 class Guidance:
-    """What the trajectory gives each reference period, all for the same instant.
+    """Output of the trajectory in one reference period, all for the same instant.
 
-    ``reference`` is the desired joint motion, found by inverse kinematics with the base locked where it
-    is; ``tool_in_world`` has the target pose of every arm's tool. A law may follow either.
+    ``reference`` is the desired joint motion, by inverse kinematics with the base locked at its present
+    pose; ``tool_in_world`` has the target pose of every tool, where the law declares that it needs them.
     """
 
     phase: TaskPhase
@@ -29,16 +29,16 @@ class Guidance:
 
 
 class Controller(Protocol):
-    """Answers every state with joint efforts; whatever has these three methods is one.
+    """Computes joint efforts for every state; any object with these three methods is one.
 
-    It keeps no clock and does no I/O, so that it gives the same numbers in one process and over DDS.
+    It keeps no clock and does no I/O, so results are identical in one process and over DDS.
     """
 
     def reset(self) -> None:
-        """Forget everything: a run begins."""
+        """Return to the initial state: a run begins."""
 
     def guide(self, guidance: Guidance) -> None:
-        """Take what holds from now on; called before the effort of each instant that has new guidance."""
+        """Use new guidance from now on; called before the effort of the same instant."""
 
     def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
         """Return the joint efforts (n,) N m for the tick that begins at this state.
@@ -48,25 +48,39 @@ class Controller(Protocol):
         """
 
 
+@runtime_checkable
+class Resumable(Protocol):
+    """What a controller has besides, so that a run can be branched: its state as a frozen dataclass.
+
+    The fields of the state are numbers, strings, arrays, and tuples, mappings or dataclasses of such.
+    """
+
+    @property
+    def state(self) -> Any:
+        """Everything that later efforts depend on."""
+
+    def restore(self, state: Any) -> None:
+        """Go back to a former :attr:`state`."""
+
+
 class CheckedController:
-    """A controller from outside whose efforts are checked before they reach the plant."""
+    """Checks the efforts of a user's controller before they reach the plant."""
 
     def __init__(self, controller: Controller, joint_names: Sequence[str]) -> None:
-        """Check a controller of these joints."""
-        self._controller = controller
+        self.inner = controller
         self._joint_names = tuple(joint_names)
 
     def reset(self) -> None:
-        """Pass it on."""
-        self._controller.reset()
+        """Reset the controller."""
+        self.inner.reset()
 
     def guide(self, guidance: Guidance) -> None:
-        """Pass it on."""
-        self._controller.guide(guidance)
+        """Guide the controller."""
+        self.inner.guide(guidance)
 
     def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
         """Return the efforts (n,) N m, read-only; raises ControllerError unless they are n finite numbers."""
-        effort = np.array(self._controller.effort(stamp_ns, q, v), dtype=np.float64)
+        effort = np.array(self.inner.effort(stamp_ns, q, v), dtype=np.float64)
         if effort.shape != (len(self._joint_names),):
             raise ControllerError(
                 f"the controller answered {ns_to_seconds(stamp_ns):g} s with an array of shape "

@@ -1,54 +1,71 @@
-"""The desired motion between two references, which come less often than ticks."""
+"""Reference track: the desired motion between two joint references."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
-from sms_handover.types import Array, JointReference
+from sms_handover.types import Array, JointReference, frozen, read_only
 from sms_handover.units import ns_to_seconds
 
 
+@dataclass(frozen=True, eq=False)
+class TrackState:
+    """The last reference, the desired acceleration (n,) rad/s^2, and whether the next one is zero."""
+
+    reference: JointReference | None
+    acceleration: Array
+    broken: bool
+
+
 class ReferenceTrack:
-    """Carries the last reference forward: q_d + q_d' s + q_d'' s^2 / 2 after s seconds.
+    """Extrapolates the last reference: q_d + q_d' s + q_d'' s^2 / 2 after s seconds.
 
     The acceleration is the difference quotient of the last two reference velocities, so it is zero
-    for targets that stand still and lags by one reference period for those that move. Beyond an age of
-    ``longest_ns`` the desired joints stand still where they have come to by then.
+    for targets at rest and lags by one reference period otherwise. Beyond an age of ``longest_ns`` the
+    desired joints stop where they are by then.
     """
 
     def __init__(self, longest_ns: int | None = None) -> None:
-        """Start without a reference; without ``longest_ns`` the last one is carried on for ever."""
         self._longest_ns = longest_ns
         self.reset()
 
+    def reset(self) -> None:
+        """Discard every reference."""
+        self._last: JointReference | None = None
+        self._set(np.zeros((3, 0)))
+        self._broken = False
+
     @property
     def ready(self) -> bool:
-        """Whether a reference has come."""
+        """Whether there is a reference."""
         return self._last is not None
 
     @property
-    def stamp_ns(self) -> int:
-        """Return the stamp of the last reference, 0 before the first."""
-        return self._last.stamp_ns if self._last else 0
+    def state(self) -> TrackState:
+        """Everything that the desired motion depends on."""
+        return TrackState(self._last, read_only(self._motion[2]), self._broken)
 
-    def reset(self) -> None:
-        """Forget every reference."""
-        self._last: JointReference | None = None
-        self._motion: Array = np.zeros((3, 0))  # rows q_d, q_d', q_d'' at the last reference
-        self._forward = np.eye(3)  # takes these rows to a later time
-        self._broken = False
+    def restore(self, state: TrackState) -> None:
+        """Go back to a former :attr:`state`."""
+        self.reset()
+        if state.reference:
+            reference = state.reference
+            self._set(np.array([reference.position, reference.velocity, state.acceleration]))
+        self._last, self._broken = state.reference, state.broken
 
     def restart(self) -> None:
-        """Take no difference across this instant, as at a new phase where the desired velocity jumps."""
+        """Take no velocity difference across this instant: at a new phase the desired velocity jumps."""
         self._broken = True
 
     def update(self, reference: JointReference) -> None:
-        """Take the next reference."""
+        """Track the next reference."""
         previous = self._last
         motion = np.zeros((3, reference.position.size))
         motion[0], motion[1] = reference.position, reference.velocity
         if previous is not None and not self._broken:
             period = ns_to_seconds(reference.stamp_ns - previous.stamp_ns)
             motion[2] = (reference.velocity - previous.velocity) / period
-        self._motion = motion
+        self._set(motion)
         self._last = reference
         self._broken = False
 
@@ -63,11 +80,17 @@ class ReferenceTrack:
             return stand
         return self._carried(age_ns)
 
+    def _set(self, motion: Array) -> None:
+        """Take over the rows q_d, q_d', q_d'' (3, n) at the last reference, and keep their derivatives."""
+        self._motion = frozen(motion)
+        self._first, self._second = np.zeros_like(motion), np.zeros_like(motion)
+        self._first[:2], self._second[:1] = motion[1:], motion[2:]
+        self._still = not np.any(motion[1:])
+
     def _carried(self, age_ns: int) -> Array:
-        """Return the rows of the desired motion at an age of the last reference."""
+        """Return the rows of the desired motion at an age of the last reference, summed in this order."""
+        if self._still:
+            return self._motion
         s = ns_to_seconds(age_ns)
-        forward = self._forward
-        forward[0, 1] = forward[1, 2] = s
-        forward[0, 2] = 0.5 * s * s
-        motion: Array = forward.dot(self._motion)
+        motion: Array = self._motion + s * self._first + 0.5 * s * s * self._second
         return motion

@@ -3,9 +3,14 @@
 from abc import abstractmethod
 from collections.abc import Sequence
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
-from sms_handover.control.parameters import ControllerParameters
+import numpy as np
+
+from sms_handover.control.law import Need
+from sms_handover.control.parameters import ControllerParameters, parameters_with
+from sms_handover.control.protocol import Controller
+from sms_handover.control.registry import law_named
 from sms_handover.frames import BASE, WORLD
 from sms_handover.graph.topics import (
     BASE_ODOMETRY,
@@ -15,8 +20,9 @@ from sms_handover.graph.topics import (
     JOINT_STATES,
     TASK_PHASE,
 )
+from sms_handover.nodes.parts.guidance_parts import GuidanceParts
 from sms_handover.nodes.parts.watchdogs import ReferenceWatchdog
-from sms_handover.ros.codecs.loop_messages import JointStateCodec, Stamped, StateCodec, coordinates
+from sms_handover.ros.codecs.loop_messages import JointStateCodec, PoseCodec, Stamped, StateCodec, coordinates
 from sms_handover.ros.codecs.task_phase import PhaseCodec
 from sms_handover.ros.node.diagnostics import NodeReport
 from sms_handover.ros.node.graph_node import GraphNode, P
@@ -27,26 +33,9 @@ from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import load_task
 from sms_handover.simulation.wiring import longest_reference_ns, make_controller
 from sms_handover.trajectory.schedule import Schedule
-from sms_handover.types import Array, JointReference, TaskPhase
 from sms_handover.units import NS_PER_S
 
 _STATE = (JOINT_STATES, BASE_ODOMETRY)
-
-
-class Answering(Protocol):
-    """What answers the states: :class:`JointController` is one."""
-
-    def reset(self) -> None:
-        """Go back to the start of a run."""
-
-    def enter(self, phase: TaskPhase) -> None:
-        """Use this phase from now on."""
-
-    def track(self, reference: JointReference) -> None:
-        """Use this joint reference from now on."""
-
-    def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
-        """Return the joint efforts (n,) that answer a state: configuration (7 + n,), velocity (6 + n,)."""
 
 
 class AnsweringNode(GraphNode[P]):
@@ -63,13 +52,19 @@ class AnsweringNode(GraphNode[P]):
         """Set up the controller; raises what :meth:`make_controller` does."""
         schedule = load_task(self.common, self.robot)
         self._controller = self.make_controller(schedule)
+        self._no_effort = np.zeros(self.robot.n_joints)  # N m
+        self._parts = GuidanceParts(self.robot.arms if self.follows_tools else ())
         self._lockstep = self.common.mode == LOCKSTEP
         self._tick_ns, self._reference_ns = self.common.tick_ns, self.common.reference_ns
         self._state_codec = StateCodec(self.robot.joint_names, WORLD, BASE)
         self._reference_codec = JointStateCodec(self.robot.joint_names, ("position", "velocity"))
         self._command_codec = JointStateCodec(self.robot.joint_names, ("effort",))
         self._phase_codec = PhaseCodec(self.robot.arms, schedule.deputy.grasp_frames)
-        guidance = self.guidance()
+        guidance: dict[str, Decode[Stamped[Any]]] = dict.fromkeys(
+            self._parts.topics, PoseCodec(WORLD).checked
+        )
+        guidance[TASK_PHASE] = self._phase_codec.checked
+        guidance[JOINT_REFERENCE] = self._reference_codec.checked
         state: dict[str, Decode[Stamped[Any]]] = {
             JOINT_STATES: self._state_codec.joints.checked,
             BASE_ODOMETRY: self._state_codec.odometry.checked,
@@ -85,22 +80,24 @@ class AnsweringNode(GraphNode[P]):
             self.inputs.subscribe(topic, partial(self._on_input, topic), read)
         self._command = self.endpoints.publisher(JOINT_COMMAND)  # last: then all of an external node is there
 
-    def guidance(self) -> dict[str, Decode[Stamped[Any]]]:
-        """Return the topics that come each reference period, with what reads and checks their messages."""
-        return {TASK_PHASE: self._phase_codec.checked, JOINT_REFERENCE: self._reference_codec.checked}
-
     @property
     @abstractmethod
     def law(self) -> str:
         """The name of the law in reports."""
 
+    @property
     @abstractmethod
-    def make_controller(self, schedule: Schedule) -> Answering:
+    def follows_tools(self) -> bool:
+        """Whether the controller is given the targets of the tools."""
+
+    @abstractmethod
+    def make_controller(self, schedule: Schedule) -> Controller:
         """Return what answers the states of the robot."""
 
     def begin(self) -> None:
         """Go back to the start of a run."""
         self._controller.reset()
+        self._parts.reset()
         for order in self._orders.values():
             order.reset()
 
@@ -150,7 +147,7 @@ class AnsweringNode(GraphNode[P]):
         if not self._lockstep and topic in self._orders:
             if self._inputs.admits(stamp, topic):
                 self._orders[topic].accept(stamp, self._answered_ns)
-                self.use(topic, stamp, content)
+                self._guide(topic, stamp, content)
             return
         if topic == BASE_ODOMETRY and stamp == self._answered_ns and self._lockstep and self._answer_bytes:
             self._command.publish(self._answer_bytes)  # the plant has resent it: it has missed the answer
@@ -165,23 +162,23 @@ class AnsweringNode(GraphNode[P]):
             return
         if needed is self._everything:
             for topic in self._orders:
-                self.use(topic, stamp, inputs[topic])
+                self._guide(topic, stamp, inputs[topic])
         q, v = coordinates(inputs[JOINT_STATES], inputs[BASE_ODOMETRY])
-        self._answer_bytes = self._command_codec.pack(stamp, effort=self._controller.effort(stamp, q, v))
+        effort = self._controller.effort(stamp, q, v) if self._parts.complete else self._no_effort
+        self._answer_bytes = self._command_codec.pack(stamp, effort=effort)
         self._command.publish(self._answer_bytes)
         self._answered_ns = stamp
         self.on_answered(stamp)
 
-    def use(self, topic: str, stamp: int, content: Any) -> None:
-        """Give a phase or a reference to the controller."""
-        if topic == TASK_PHASE:
-            self._controller.enter(content)
-        else:
-            self._controller.track(JointReference(stamp, *content))
+    def _guide(self, topic: str, stamp: int, content: Any) -> None:
+        """Guide the controller once all parts of an instant are there."""
+        guidance = self._parts.add(topic, stamp, content)
+        if guidance is not None:
+            self._controller.guide(guidance)
 
 
 class ControllerNode(AnsweringNode[ControllerParameters]):
-    """Answers every state with a joint command of the same stamp, under NMPC or PID.
+    """Answers every state with a joint command of the same stamp, under a law of the registry.
 
     In lock step a state that falls on a reference period waits for its reference; in real time the
     last reference holds.
@@ -189,6 +186,13 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
 
     def __init__(self) -> None:
         super().__init__(ControllerParameters)
+
+    def parameter_group(self, group: type[ControllerParameters]) -> type[ControllerParameters]:
+        """Return the parameters of the controller with those of the law that was given."""
+        if not self.has_parameter("law"):
+            return group
+        name = str(self.get_parameter("law").value)
+        return parameters_with(law_named(name, f"{CONTROLLER}: parameter 'law'"))
 
     def prepare(self) -> None:
         """Set up the law; raises UnstableLoopError if its gains cannot work at this tick."""
@@ -200,10 +204,14 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
         """The name of the law."""
         return self.parameters.law
 
-    def make_controller(self, schedule: Schedule) -> Answering:
-        """Return the controller that the parameters ask for; raises UnstableLoopError."""
-        self._tracking = make_controller(self.robot, schedule, self.common, self.parameters)
-        return self._tracking
+    @property
+    def follows_tools(self) -> bool:
+        """Whether the law needs the targets of the tools."""
+        return Need.TOOL_TARGETS in law_named(self.law).needs
+
+    def make_controller(self, schedule: Schedule) -> Controller:
+        """Return the controller that the parameters ask for; raises ConfigurationError."""
+        return make_controller(self.robot, schedule, self.common, self.parameters)
 
     def begin(self) -> None:
         """Go back to the start of a run."""
@@ -213,7 +221,7 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
     def on_answered(self, stamp: int) -> None:
         """In real time, report when references stop coming and when they come again."""
         if not self._lockstep:
-            event = self._watchdog.poll(self._tracking.reference_ns, stamp)
+            event = self._watchdog.poll(self._parts.reference_ns, stamp)
             if event is not None:
                 self.events.publish(event)
 

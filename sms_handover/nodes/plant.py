@@ -299,7 +299,7 @@ class PlantNode(GraphNode[PlantParameters]):
         """Integrate one tick with the last command that came (real time)."""
         self._loop_clock.ticked(held=self._command.stamp_ns != self._plant.stamp_ns)
         command, event = self._command_watchdog.poll(self._command, self._plant.stamp_ns)
-        self._plant.step(command)
+        self._plant.apply(command.effort)
         self._publish_state()
         if event is not None:
             self.events.publish(event)

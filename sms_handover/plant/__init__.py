@@ -1,1 +1,1 @@
-"""The simulated spacecraft: forward dynamics, integrators, and the deputy with its attachment."""
+"""The plant: forward dynamics of the spacecraft, integrators, and the deputy with its attachment."""

@@ -1,4 +1,4 @@
-"""The deputy: a CubeSat that floats or is held by one arm, and the rule by which a grasp holds."""
+"""The deputy: a CubeSat that floats or is held by one arm, and the tolerances of a grasp."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,12 +7,12 @@ import numpy as np
 import pinocchio as pin
 
 from sms_handover.model.poses import pose_distance, pose_of, se3_of
-from sms_handover.types import Array, DeputyState, Pose, Twist
+from sms_handover.types import Array, DeputyState, Pose, Twist, read_only
 
 
 @dataclass(frozen=True)
 class GraspTolerance:
-    """How far a tool may be from a grasp frame when it closes: m, rad, m/s."""
+    """The largest errors at which a grasp holds: m, rad, m/s."""
 
     position: float
     angle: float
@@ -21,14 +21,14 @@ class GraspTolerance:
 
 @dataclass(frozen=True)
 class GraspErrors:
-    """How far the tool was from the grasp frame: m, rad, m/s."""
+    """Errors of the tool with respect to the grasp frame: m, rad, m/s."""
 
     position: float
     angle: float
     speed: float
 
     def within(self, tolerance: GraspTolerance) -> bool:
-        """Whether every error is inside its tolerance."""
+        """Whether every error is within its tolerance."""
         return (
             self.position <= tolerance.position
             and self.angle <= tolerance.angle
@@ -36,16 +36,33 @@ class GraspErrors:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class DeputyMotion:
+    """Free motion since the deputy was last placed, and how it is held.
+
+    Matrices are homogeneous (4, 4): ``start`` is the pose then in ``world``, ``in_tool`` that in the tool of
+    ``holder``.
+    """
+
+    start: Array
+    twist: Twist
+    drifted_s: float
+    holder: str
+    in_tool: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", read_only(self.start))
+        object.__setattr__(self, "in_tool", read_only(self.in_tool))
+
+
 class MasslessDeputy:
     """A rigid deputy whose mass is neglected: held, it moves with the tool; free, it drifts.
 
-    Free motion keeps the twist it had when let go: constant velocity of its origin and constant
-    angular velocity. A grasp keeps the relative pose of tool and deputy of that instant, so a
-    position error of the grasp is carried on and nothing jumps.
+    Free motion keeps the twist at release: constant velocity of the origin and constant angular velocity. A
+    grasp freezes the relative pose of tool and deputy, so its position error persists and nothing jumps.
     """
 
     def __init__(self, deputy_in_world: Pose, grasp_frames: Mapping[str, Pose]) -> None:
-        """Start at rest at a pose, with the grasp frames as poses in the deputy."""
         self._grasp_frames = {name: se3_of(pose) for name, pose in grasp_frames.items()}
         self._place(se3_of(deputy_in_world), Twist(np.zeros(3), np.zeros(3)))
         self._holder = ""
@@ -57,12 +74,24 @@ class MasslessDeputy:
         return DeputyState(pose_of(self._pose()), self._twist, self._holder)
 
     @property
+    def motion(self) -> DeputyMotion:
+        """Everything that its later motion depends on."""
+        start, in_tool = self._start.homogeneous, self._deputy_in_tool.homogeneous
+        return DeputyMotion(start, self._twist, self._drifted_s, self._holder, in_tool)
+
+    def restore(self, motion: DeputyMotion) -> None:
+        """Go back to a former :attr:`motion`."""
+        self._place(pin.SE3(motion.start), motion.twist)
+        self._drifted_s, self._holder = motion.drifted_s, motion.holder
+        self._deputy_in_tool = pin.SE3(motion.in_tool)
+
+    @property
     def holder(self) -> str:
         """Return the name of the arm that holds the deputy, '' while it floats."""
         return self._holder
 
     def errors_of(self, grasp_frame: str, tool_in_world: Pose, tool_twist_in_world: Twist) -> GraspErrors:
-        """Return how far a tool is from a grasp frame; the speed is that of the two origins."""
+        """Return the errors of a tool with respect to a grasp frame; the speed is between the two origins."""
         deputy = self._pose()
         frame = deputy * self._grasp_frames[grasp_frame]
         position, angle = pose_distance(pose_of(frame), tool_in_world)
@@ -72,12 +101,12 @@ class MasslessDeputy:
         return GraspErrors(position, angle, speed)
 
     def attach(self, arm: str, tool_in_world: Pose) -> None:
-        """Fix the deputy to a tool at their present relative pose."""
+        """Attach the deputy to a tool at their present relative pose."""
         self._holder = arm
         self._deputy_in_tool = se3_of(tool_in_world).actInv(self._pose())
 
     def detach(self) -> None:
-        """Let the deputy float with the twist it has."""
+        """Release the deputy: it drifts with its present twist."""
         self._holder = ""
 
     def follow(self, tool_in_world: Pose, tool_twist_in_world: Twist) -> None:
@@ -106,6 +135,6 @@ class MasslessDeputy:
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """Return a x b; NumPy's own is for any axes of any arrays and takes twenty times as long."""
+    """Return a x b; ``np.cross`` takes twenty times as long."""
     (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])

@@ -1,5 +1,6 @@
-"""The plant: the free-floating robot and the deputy, advanced tick by tick under joint efforts."""
+"""Free-floating plant: robot and deputy, advanced tick by tick under joint efforts."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,8 +8,8 @@ import numpy as np
 from sms_handover.errors import ConfigurationError
 from sms_handover.model.conserved import ConservedQuantities, conserved_quantities
 from sms_handover.model.robot_model import BASE_NQ, RobotModel
-from sms_handover.plant.deputy import MasslessDeputy
-from sms_handover.plant.grasping import answer
+from sms_handover.plant.deputy import DeputyMotion, MasslessDeputy
+from sms_handover.plant.grasping import execute_grasp
 from sms_handover.plant.integrators import TABLEAUS
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.plant.stepper import PinocchioStepper, Stepper
@@ -17,7 +18,6 @@ from sms_handover.types import (
     DeputyState,
     GraspCommand,
     GraspEvent,
-    JointCommand,
     Pose,
     RobotState,
     frozen,
@@ -33,15 +33,27 @@ class InitialState:
     base_in_world: Pose
     joint_position: Array
     deputy_in_world: Pose
-    deputy_grasp_frames: "dict[str, Pose]"
+    deputy_grasp_frames: Mapping[str, Pose]
+
+
+@dataclass(frozen=True, eq=False)
+class PlantState:
+    """Everything that the later motion of a plant and its counts depend on."""
+
+    tick: int
+    q: Array
+    v: Array
+    joint_effort: Array
+    work: float
+    saturated_ticks: tuple[int, ...]
+    deputy: DeputyMotion
 
 
 class FreeFloatingPlant:
     """H(q) v' + c(q, v) = (0, u): a base without actuators that carries arms, and no gravity.
 
     The efforts of a tick are held constant over it. Time is counted in whole ticks, so stamps are exact.
-    ``q``, ``v`` and ``joint_effort`` are those of :attr:`state`, as bare arrays that nobody changes: a
-    tick makes new ones.
+    ``q``, ``v`` and ``joint_effort`` are those of :attr:`state`, as read-only arrays, new ones each tick.
     """
 
     def __init__(
@@ -52,10 +64,7 @@ class FreeFloatingPlant:
         tick_ns: int,
         stepper: Stepper | None = None,
     ) -> None:
-        """Place robot and deputy at rest; raises ConfigurationError on a joint outside its limits.
-
-        ``stepper`` advances the robot by a tick; by default Pinocchio does.
-        """
+        """Place robot and deputy at rest; raises ConfigurationError on a joint outside its limits."""
         self._robot = robot
         self._tolerance = parameters.grasp_tolerance
         self._initial = initial
@@ -67,7 +76,7 @@ class FreeFloatingPlant:
 
     def reset(self) -> None:
         """Go back to the initial state at time zero."""
-        self._tick = 0
+        self.tick = 0  # integrated since the start
         robot, initial = self._robot, self._initial
         self.q = read_only(robot.configuration(initial.base_in_world, initial.joint_position))
         self.v = read_only(np.zeros(robot.pin.nv))
@@ -76,15 +85,27 @@ class FreeFloatingPlant:
         self._saturated_ticks = np.zeros(robot.n_joints, dtype=np.int64)
         self._deputy = MasslessDeputy(initial.deputy_in_world, initial.deputy_grasp_frames)
 
-    @property
-    def tick(self) -> int:
-        """Number of ticks integrated since the start."""
-        return self._tick
+    def snapshot(self) -> PlantState:
+        """Return the state to :meth:`restore`."""
+        counts, motion = tuple(self._saturated_ticks.tolist()), self._deputy.motion
+        return PlantState(self.tick, self.q, self.v, self.joint_effort, self._work, counts, motion)
+
+    def restore(self, state: PlantState) -> None:
+        """Go back to a former state; raises ConfigurationError if it is that of another robot."""
+        shapes = [array.shape for array in (state.q, state.v, state.joint_effort)]
+        if shapes != [self.q.shape, self.v.shape, self.joint_effort.shape]:
+            raise ConfigurationError(
+                f"the snapshot has {state.joint_effort.size} joints, must have {self.joint_effort.size}"
+            )
+        self.tick, self._work = state.tick, state.work
+        self.q, self.v, self.joint_effort = (read_only(a) for a in (state.q, state.v, state.joint_effort))
+        self._saturated_ticks = np.array(state.saturated_ticks, dtype=np.int64)
+        self._deputy.restore(state.deputy)
 
     @property
     def stamp_ns(self) -> int:
         """Simulation time in ns."""
-        return self._tick * self._tick_ns
+        return self.tick * self._tick_ns
 
     @property
     def state(self) -> RobotState:
@@ -104,10 +125,7 @@ class FreeFloatingPlant:
 
     @property
     def saturated_ticks(self) -> dict[str, int]:
-        """Return for each joint in how many ticks its command was at the effort limit or beyond.
-
-        The laws of this package stop at the limit themselves; another controller may ask for more.
-        """
+        """Return per joint the number of ticks whose command was at the effort limit or beyond."""
         return dict(zip(self._robot.joint_names, self._saturated_ticks.tolist(), strict=True))
 
     @property
@@ -116,12 +134,12 @@ class FreeFloatingPlant:
         return self._robot.tools_at(self.q)
 
     @property
-    def receipt(self) -> ConservedQuantities:
+    def conserved(self) -> ConservedQuantities:
         """Return momenta, energy and centre of mass of the robot."""
         return conserved_quantities(self._robot, self.q, self.v)
 
     def execute(self, commands: tuple[GraspCommand, ...]) -> tuple[GraspEvent, ...]:
-        """Carry out grasp commands at this instant, in order, and return what came of each."""
+        """Execute grasp commands at this instant, in order, and return their events."""
         if not commands:
             return ()
         self._deputy_follow()
@@ -129,30 +147,27 @@ class FreeFloatingPlant:
         tools = {arm: pose for arm, (pose, _) in motions.items()}
         twists = {arm: twist for arm, (_, twist) in motions.items()}
         return tuple(
-            answer(command, self._deputy, tools, twists, self._tolerance, self.stamp_ns)
+            execute_grasp(command, self._deputy, tools, twists, self._tolerance, self.stamp_ns)
             for command in commands
         )
 
-    def step(self, command: JointCommand) -> None:
-        """Integrate one tick under the command's efforts, each limited to what the joint can give."""
-        self.apply(command.effort)
-
     def apply(self, asked: Array) -> None:
-        """Integrate one tick under read-only efforts (n,), each limited to what the joint can give.
+        """Integrate one tick under read-only efforts (n,), each limited to what its joint can give.
 
         The work is u . (q_m(t + h) - q_m(t)), exact because u is constant over the tick.
         """
         effort = self._limited(asked)
         before = self.q
         q, v = self._stepper.step(before, self.v, effort)
-        self._work += float(effort.dot(q[BASE_NQ:] - before[BASE_NQ:]))
+        for part in (effort * (q[BASE_NQ:] - before[BASE_NQ:])).tolist():
+            self._work += part
         self.q, self.v, self.joint_effort = q, v, effort
-        self._tick += 1
+        self.tick += 1
         if not self._deputy.holder:
             self._deputy.drift(self._tick_s)
 
     def _limited(self, asked: Array) -> Array:
-        """Return the efforts that the joints give, and count those at their limit or beyond."""
+        """Return the efforts that act, and count those at their limit or beyond."""
         effort = asked
         at_limit = np.abs(asked) >= self._robot.effort_limit
         if np.count_nonzero(at_limit):
@@ -161,7 +176,7 @@ class FreeFloatingPlant:
         return effort
 
     def _deputy_follow(self) -> None:
-        """Bring a held deputy to where its tool is now."""
+        """Move a held deputy with its tool."""
         holder = self._deputy.holder
         if holder:
             self._deputy.follow(*self._robot.tool_motion(self.q, self.v, holder))
@@ -172,5 +187,5 @@ class FreeFloatingPlant:
         for name, value, low, high in zip(robot.joint_names, start, robot.lower, robot.upper, strict=True):
             if not low <= value <= high:
                 raise ConfigurationError(
-                    f"initial position of {name} is {value} rad, allowed is {low} to {high} rad"
+                    f"initial position of {name} is {value} rad, must be in [{low}, {high}] rad"
                 )

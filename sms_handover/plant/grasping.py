@@ -1,4 +1,4 @@
-"""The plant's answer to a grasp command: who holds the deputy afterwards, and why."""
+"""Grasping: executes grasp commands and decides who holds the deputy afterwards."""
 
 from collections.abc import Mapping
 from math import nan
@@ -8,7 +8,7 @@ from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatu
 from sms_handover.units import DEG_PER_RAD, MM_PER_M
 
 
-def answer(
+def execute_grasp(
     command: GraspCommand,
     deputy: MasslessDeputy,
     tools_in_world: Mapping[str, Pose],
@@ -16,14 +16,14 @@ def answer(
     tolerance: GraspTolerance,
     stamp_ns: int,
 ) -> GraspEvent:
-    """Carry out one grasp command on the deputy and return the event.
+    """Execute one grasp command on the deputy and return the event.
 
-    A grasp holds only if position, angle and relative speed are within tolerance; otherwise it is
-    missed and the deputy stays with whom it was. A command that contradicts who holds the deputy is rejected.
+    A grasp holds only if position, angle and relative speed are within tolerance; otherwise it is missed and
+    the holder stays the same. A command that contradicts the present holder is rejected.
     """
-    refusal = _refusal(command, deputy.holder)
-    if refusal:
-        return _event(stamp_ns, command, GraspStatus.REJECTED, None, refusal)
+    rejection = _rejection(command, deputy.holder)
+    if rejection:
+        return _event(stamp_ns, command, GraspStatus.REJECTED, None, rejection)
     if command.action is GraspAction.RELEASE:
         deputy.detach()
         return _event(stamp_ns, command, GraspStatus.SUCCEEDED, None, f"{command.arm} let go")
@@ -35,8 +35,8 @@ def answer(
     return _event(stamp_ns, command, GraspStatus.SUCCEEDED, errors, f"{command.arm} holds the deputy")
 
 
-def _refusal(command: GraspCommand, holder: str) -> str:
-    """Return why a command makes no sense while ``holder`` holds the deputy, or ''."""
+def _rejection(command: GraspCommand, holder: str) -> str:
+    """Return why a command contradicts the present ``holder``, or ''."""
     if command.action is GraspAction.RELEASE and holder != command.arm:
         return f"{command.arm} does not hold the deputy"
     if command.action is GraspAction.GRASP and holder:
@@ -47,7 +47,7 @@ def _refusal(command: GraspCommand, holder: str) -> str:
 
 
 def _miss(errors: GraspErrors, tolerance: GraspTolerance) -> str:
-    """Return which errors were outside their tolerance, with units."""
+    """Return the errors that exceed their tolerance, with units."""
     table = (
         ("distance", errors.position, tolerance.position, MM_PER_M, "mm"),
         ("angle", errors.angle, tolerance.angle, DEG_PER_RAD, "deg"),

@@ -1,4 +1,4 @@
-"""What advances the robot by one tick under constant joint efforts."""
+"""Steppers: advance the robot by one tick under constant joint efforts."""
 
 from typing import Protocol
 
@@ -28,7 +28,6 @@ class PinocchioStepper:
     """
 
     def __init__(self, robot: RobotModel, tableau: Tableau, h: float) -> None:
-        """Set up the scheme for a robot."""
         self._model, self._data = robot.pin, robot.data
         self._integrator = LieGroupIntegrator(robot.pin, tableau, h)
         self._generalized = np.zeros(robot.pin.nv)  # (0, u): no wrench on the base

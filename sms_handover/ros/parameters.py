@@ -31,10 +31,12 @@ _ROS_OWN = (_SIMULATED_TIME, "start_type_description_service")
 def declare(node: Node, cls: type[T], file: str | None, section: str) -> T:
     """Declare the fields of ``cls`` as read-only parameters of ``node`` and return them checked.
 
-    The defaults are those of a section of a file in the package's ``config/``, without one those of
-    the fields; what was given on the command line comes on top. Raises ConfigurationError.
+    The defaults are those of the fields, then of a section of a file in the package's ``config/`` if there is
+    one; what was given on the command line comes on top. Raises ConfigurationError.
     """
-    values = defaults_of(cls) if file is None else read_parameter_files([config_file(file)], section)
+    values = defaults_of(cls)
+    if file is not None:
+        values.update(read_parameter_files([config_file(file)], section))
     given = [item.name for item in fields(cls) if node.has_parameter(item.name)]  # type: ignore[arg-type]
     values.update({name: node.get_parameter(name).value for name in given})
     checked = build(cls, values, node.get_name())  # before ROS checks the range with errors of its own

@@ -1,1 +1,1 @@
-"""The whole loop in one process: what the graph does, by plain calls."""
+"""Simulation: the whole loop in one process, by plain calls instead of messages."""

@@ -1,6 +1,7 @@
 """Check of a whole scenario before anything moves."""
 
-from sms_handover.control.controller import check_stability
+from sms_handover.control.registry import law_named
+from sms_handover.control.stability import check_stability
 from sms_handover.graph.topics import CONTROLLER
 from sms_handover.simulation.feasibility import PhasePrediction, check_feasibility
 from sms_handover.simulation.scenario import Scenario
@@ -24,8 +25,9 @@ def check_scenario(scenario: Scenario) -> tuple[PhasePrediction, ...]:
     if not ours:
         return predictions
     gains = gains_by_phase(schedule, parameters.controller)
+    law = law_named(parameters.controller.law)
     for one, end in zip(gains, predictions, strict=True):
         q = robot.configuration(end.base_in_world, end.joint_position)
         where = f"where phase {end.phase!r} ends"
-        check_stability(robot, (one,), ns_to_seconds(parameters.common.tick_ns), q, where)
+        check_stability(law, robot, (one,), ns_to_seconds(parameters.common.tick_ns), q, where)
     return predictions

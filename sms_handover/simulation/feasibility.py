@@ -13,7 +13,7 @@ from sms_handover.model.poses import pose_distance
 from sms_handover.model.reduced import base_twist_per_joint_rate
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.deputy import GraspTolerance, MasslessDeputy
-from sms_handover.plant.grasping import answer
+from sms_handover.plant.grasping import execute_grasp
 from sms_handover.simulation.wiring import initial_joints
 from sms_handover.trajectory.generator import goal_in_world
 from sms_handover.trajectory.schedule import GraspFrameTarget, JointTarget, Phase, Schedule, ToolTarget
@@ -119,7 +119,7 @@ class _Walk:
         tools = self._carry_deputy(self._base, self._joints)
         at_rest = dict.fromkeys(tools, _AT_REST)
         for command in phase.commands:
-            event = answer(command, self._deputy, tools, at_rest, self._tolerance, phase.start_ns)
+            event = execute_grasp(command, self._deputy, tools, at_rest, self._tolerance, phase.start_ns)
             if event.status is GraspStatus.MISSED:
                 raise ScheduleError(
                     f"phase {phase.name!r}: {command.arm} would miss grasp frame {command.grasp_frame!r}: "

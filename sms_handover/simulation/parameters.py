@@ -18,7 +18,7 @@ EXTERNAL = (CONTROLLER,)
 
 @dataclass(frozen=True)
 class CommonParameters:
-    """Clock and files of a run; the numbers are in ``config/common.yaml``."""
+    """Parameters that all nodes share; the values are in ``config/common.yaml``."""
 
     tick: float = parameter("simulated time between two states", unit="s", minimum=1e-6, maximum=1.0)
     reference_period: float = parameter(
@@ -35,40 +35,39 @@ class CommonParameters:
     )
 
     dynamics: str = parameter(
-        "what works out the equations of motion; pinocchio: its algorithms; compiled: the same equations as "
-        "C code for this robot, made once, which is several times faster and needs CasADi and a C compiler",
+        "equations of motion; pinocchio: its algorithms; compiled: the same equations as C code, generated "
+        "once for this robot: several times faster, needs CasADi and a C compiler",
         choices=DYNAMICS,
     )
     mode: str = parameter(
         "lockstep: every tick waits for its command; realtime: paced by the wall clock", choices=MODES
     )
     transport: str = parameter(
-        "how a node gets the inputs of its loop; direct: from the middleware itself; executor: by rclpy's "
-        "executor, which is slower and all public",
+        "how a node takes its inputs; direct: from rcl; executor: by the executor of rclpy, which is slower "
+        "and uses public interfaces only",
         choices=TRANSPORTS,
     )
-    cpu: int = parameter("processor that the nodes of the loop run on; -1: any", minimum=-1, maximum=4095)
+    cpu: int = parameter("CPU core of the nodes of the loop; -1: any", minimum=-1, maximum=4095)
     priority: int = parameter(
-        "real-time priority of the nodes of the loop (SCHED_FIFO), where the system permits it; 0: none",
+        "real-time priority of the nodes of the loop (SCHED_FIFO), where permitted; 0: none",
         minimum=0,
         maximum=99,
     )
-    lock_memory: bool = parameter("keep the memory of the nodes of the loop from being swapped out")
+    lock_memory: bool = parameter("lock the memory of the nodes of the loop (mlockall)")
     autostart: bool = parameter(
-        "whether a node configures and activates itself; false: its lifecycle services ask it to"
+        "whether a node configures and activates itself; false: by its lifecycle services"
     )
-    peers: tuple[str, ...] = parameter("nodes of the graph; the run starts when all have matched")
+    peers: tuple[str, ...] = parameter("nodes of the graph; the run starts once all have matched")
     external: tuple[str, ...] = parameter(
-        "those of the peers that are not of this package; of them only states and commands are waited for",
+        "peers from outside this package; only states and commands are required of them",
         choices=EXTERNAL,
     )
 
     def __post_init__(self) -> None:
-        """Refuse a reference period that is no whole number of ticks, and peers that do not exist."""
         if self.reference_ns % self.tick_ns:
             raise ConfigurationError(
-                f"reference_period is {self.reference_period:g} s, allowed is a multiple of the tick "
-                f"of {self.tick:g} s"
+                f"reference_period is {self.reference_period:g} s, must be a multiple of the tick of "
+                f"{self.tick:g} s"
             )
         for name in self.peers:
             if name not in NODES:
@@ -85,7 +84,7 @@ class CommonParameters:
         return seconds_to_ns(self.reference_period)
 
     def last_tick(self, task_end_ns: int, *, failed: bool = False) -> int:
-        """Return the number of ticks that the run integrates; a task that has failed ends it early."""
+        """Return the number of ticks that the run integrates; a failed task ends it early."""
         end_ns = seconds_to_ns(self.duration) if self.duration > 0.0 else task_end_ns
         return (min(end_ns, task_end_ns) if failed else end_ns) // self.tick_ns
 

@@ -1,156 +1,79 @@
-"""Collects the rows of a run while it happens and gives them back as arrays."""
-
-from collections.abc import Iterable, Mapping
-from typing import TypeVar
+"""Run recorder: collects the ticks of a run and returns them as arrays."""
 
 import numpy as np
-import numpy.typing as npt
 
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.message_constants import CONSTANTS
-from sms_handover.model.conserved import ConservedQuantities
+from sms_handover.model.poses import pose_row
 from sms_handover.run_data import RunData
-from sms_handover.types import (
-    BASE_NQ,
-    BASE_NV,
-    Array,
-    GraspEvent,
-    IkStatus,
-    JointReference,
-    Pose,
-    TaskPhase,
-)
+from sms_handover.simulation.loop import Observation, Period
+from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, Pose
 
-N = TypeVar("N", bound=np.generic)
+_NOT_ASKED = -1  # in place of a status where inverse kinematics was not asked
 
 
 class RunRecorder:
-    """Preallocated arrays for a run of known length, filled row by row."""
+    """Arrays with a row per tick, filled as the run goes on; the periods are kept as they are."""
 
-    def __init__(self, joint_names: tuple[str, ...], arms: tuple[str, ...], ticks: int, periods: int) -> None:
-        """Make room for ``ticks`` states and ``periods`` references."""
+    def __init__(self, joint_names: tuple[str, ...], arms: tuple[str, ...], ticks: int) -> None:
+        """Make room for ``ticks`` states; more make more room."""
         n = len(joint_names)
         self._joint_names, self._arms = joint_names, arms
-        self._tick_ns = np.zeros(ticks, dtype=np.int64)
-        self._q = np.full((ticks, BASE_NQ + n), np.nan)
-        self._v = np.full((ticks, BASE_NV + n), np.nan)
-        self._effort = np.full((ticks, n), np.nan)
-        self._command = np.full((ticks, n), np.nan)
-        self._reference_ns = np.zeros(periods, dtype=np.int64)
-        self._reference = np.full((2, periods, n), np.nan)  # position, velocity
-        self._poses = np.full((2, len(arms), periods, 7), np.nan)  # target, tool
-        self._deputy = np.full((periods, 7), np.nan)
-        self._receipts = np.full((periods, 8), np.nan)  # momenta, kinetic energy, work
-        self._ik_status = np.full(periods, -1, dtype=np.int64)
-        self._phases: list[TaskPhase] = []
-        self._events: list[GraspEvent] = []
-        self._decisions: list[RunEvent] = []
-        self._tick = 0
-        self._period = 0
+        stamps = np.zeros(ticks, dtype=np.int64)
+        widths = (BASE_NQ + n, BASE_NV + n, n, n)  # of q, v, the efforts that acted, and those that answer
+        self._rows = [stamps, *(np.full((ticks, width), np.nan) for width in widths)]
+        self._count = 0
+        self._periods: list[Period] = []
 
-    def make_room(self, ticks: int, periods: int) -> None:
-        """Make room for as many states and references in all, if there is less."""
-        for name in ("_tick_ns", "_q", "_v", "_effort", "_command"):
-            setattr(self, name, _longer(getattr(self, name), ticks, 0))
-        for name in ("_reference_ns", "_deputy", "_receipts", "_ik_status"):
-            setattr(self, name, _longer(getattr(self, name), periods, 0))
-        self._reference, self._poses = _longer(self._reference, periods, 1), _longer(self._poses, periods, 2)
-
-    def tick(self, stamp_ns: int, q: Array, v: Array, effort: Array, command: Array) -> None:
-        """Add the row of one tick: state, the efforts (n,) that led to it, and those that answer it."""
-        k = self._tick
-        self._tick_ns[k] = stamp_ns
-        self._q[k] = q
-        self._v[k] = v
-        self._effort[k] = effort
-        self._command[k] = command
-        self._tick += 1
-
-    def reference(
-        self,
-        phase: TaskPhase,
-        reference: JointReference,
-        targets_in_world: Mapping[str, Pose],
-        ik: IkStatus | None,
-    ) -> None:
-        """Add what the trajectory gave in one reference period; :meth:`plant` completes the row."""
-        row = self._period
-        self._reference_ns[row] = reference.stamp_ns
-        self._reference[0, row] = reference.position
-        self._reference[1, row] = reference.velocity
-        for index, arm in enumerate(self._arms):
-            _put(targets_in_world[arm], self._poses[0, index, row])
-        if ik is not None:
-            self._ik_status[row] = CONSTANTS[ik]
-        self._phases.append(phase)
-        self._period += 1
-
-    def plant(
-        self,
-        tools_in_world: Mapping[str, Pose],
-        deputy_in_world: Pose,
-        receipt: ConservedQuantities,
-        work: float,
-    ) -> None:
-        """Add what the plant gave in one reference period, before :meth:`reference`."""
-        row = self._period
-        for index, arm in enumerate(self._arms):
-            _put(tools_in_world[arm], self._poses[1, index, row])
-        _put(deputy_in_world, self._deputy[row])
-        receipts = self._receipts[row]
-        receipts[:3] = receipt.linear_momentum
-        receipts[3:6] = receipt.angular_momentum
-        receipts[6:] = receipt.kinetic_energy, work
-
-    def events(self, events: Iterable[GraspEvent]) -> None:
-        """Add grasp events."""
-        self._events.extend(events)
-
-    def decisions(self, events: Iterable[RunEvent]) -> None:
-        """Add what has been decided about the task."""
-        self._decisions.extend(events)
+    def add(self, tick: Observation) -> None:
+        """Add one tick."""
+        k = self._count
+        if k == len(self._rows[0]):
+            self._rows = [np.concatenate([rows, np.zeros_like(rows)]) for rows in self._rows]
+        stamps, q, v, effort, command = self._rows
+        stamps[k] = tick.stamp_ns
+        q[k] = tick.q
+        v[k] = tick.v
+        effort[k] = tick.joint_effort
+        command[k] = tick.effort
+        self._count += 1
+        if tick.period:
+            self._periods.append(tick.period)
 
     def data(self) -> RunData:
-        """Return what has been collected so far."""
-        ticks, periods = slice(self._tick), slice(self._period)
-
-        def per_arm(kind: int) -> dict[str, Array]:
-            return {arm: self._poses[kind, i, periods].copy() for i, arm in enumerate(self._arms)}
-
+        """Return the run so far."""
+        stamps, q, v, effort, command = (rows[: self._count] for rows in self._rows)
+        periods = self._periods
+        events: list[GraspEvent] = [event for period in periods for event in period.events]
+        decisions: list[RunEvent] = [event for period in periods for event in period.decisions]
+        status = [CONSTANTS[p.ik_status] if p.ik_status else _NOT_ASKED for p in periods]
         return RunData(
             joint_names=self._joint_names,
             arms=self._arms,
-            tick_ns=self._tick_ns[ticks].copy(),
-            joint_position=self._q[ticks, BASE_NQ:].copy(),
-            joint_velocity=self._v[ticks, BASE_NV:].copy(),
-            joint_effort=self._effort[ticks].copy(),
-            joint_command=self._command[ticks].copy(),
-            base_pose=self._q[ticks, :BASE_NQ].copy(),
-            base_twist=self._v[ticks, :BASE_NV].copy(),
-            reference_ns=self._reference_ns[periods].copy(),
-            reference_position=self._reference[0, periods].copy(),
-            reference_velocity=self._reference[1, periods].copy(),
-            target_pose=per_arm(0),
-            tool_pose=per_arm(1),
-            deputy_pose=self._deputy[periods].copy(),
-            linear_momentum=self._receipts[periods, :3].copy(),
-            angular_momentum=self._receipts[periods, 3:6].copy(),
-            kinetic_energy=self._receipts[periods, 6].copy(),
-            work=self._receipts[periods, 7].copy(),
-            ik_status=self._ik_status[periods].copy(),
-            phases=tuple(self._phases),
-            grasp_events=tuple(self._events),
-            run_events=tuple(self._decisions),
+            tick_ns=stamps.copy(),
+            joint_position=q[:, BASE_NQ:].copy(),
+            joint_velocity=v[:, BASE_NV:].copy(),
+            joint_effort=effort.copy(),
+            joint_command=command.copy(),
+            base_pose=q[:, :BASE_NQ].copy(),
+            base_twist=v[:, :BASE_NV].copy(),
+            reference_ns=np.array([period.reference.stamp_ns for period in periods], dtype=np.int64),
+            reference_position=np.array([period.reference.position for period in periods]),
+            reference_velocity=np.array([period.reference.velocity for period in periods]),
+            target_pose={arm: _poses([p.targets_in_world[arm] for p in periods]) for arm in self._arms},
+            tool_pose={arm: _poses([p.tools_in_world[arm] for p in periods]) for arm in self._arms},
+            deputy_pose=_poses([period.deputy.deputy_in_world for period in periods]),
+            linear_momentum=np.array([period.conserved.linear_momentum for period in periods]),
+            angular_momentum=np.array([period.conserved.angular_momentum for period in periods]),
+            kinetic_energy=np.array([period.conserved.kinetic_energy for period in periods]),
+            work=np.array([period.work for period in periods]),
+            ik_status=np.array(status, dtype=np.int64),
+            phases=tuple(period.phase for period in periods),
+            grasp_events=tuple(events),
+            run_events=tuple(decisions),
         )
 
 
-def _put(pose: Pose, row: Array) -> None:
-    """Write a pose into a row (7,): position, then quaternion x y z w."""
-    row[:3] = pose.position
-    row[3:] = pose.quaternion_xyzw
-
-
-def _longer(array: npt.NDArray[N], size: int, axis: int) -> npt.NDArray[N]:
-    """Return an array that has at least ``size`` rows along an axis; new ones are -1, no status of IK."""
-    missing = [(0, max(size - length, 0) if place == axis else 0) for place, length in enumerate(array.shape)]
-    return np.pad(array, missing, constant_values=array.dtype.type(-1)) if size > array.shape[axis] else array
+def _poses(poses: list[Pose]) -> Array:
+    """Return poses as rows: position, then quaternion x y z w."""
+    return np.array([pose_row(pose) for pose in poses])

@@ -1,4 +1,4 @@
-"""A scenario: everything a run is made of, read from files and checked before anything moves."""
+"""A scenario: parameters, robot and schedule of a run, read from files and checked."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,7 +10,8 @@ from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.parameters import EVERY_NODE, build, read_parameter_files
 from sms_handover.configuration.sections import Section
 from sms_handover.configuration.values import DOCUMENTS, written
-from sms_handover.control.parameters import ControllerParameters
+from sms_handover.control.parameters import ControllerParameters, parameters_with
+from sms_handover.control.registry import law_named
 from sms_handover.errors import UnknownNameError
 from sms_handover.graph.topics import CONTROLLER, IK, NODES, PLANT, PLAYER, TOPIC_RECORDER, TRAJECTORY, VIEWER
 from sms_handover.ik.parameters import IkParameters
@@ -24,16 +25,16 @@ from sms_handover.trajectory.schedule import Schedule
 T = TypeVar("T")
 
 _SECTIONS = (EVERY_NODE, *NODES, PLAYER, TOPIC_RECORDER, VIEWER)  # of parameter files
-_SLIP = 0.8  # [-] likeness of names, from difflib, from which on one is a slip of the pen
+_SLIP = 0.8  # [-] similarity of names, by difflib, from which one is a misspelling
 
-COMMON = "common"  # prefix of an override that holds for every node
+COMMON = "common"  # prefix of an override for every node
 
 Overrides = Mapping[str, Mapping[str, object]]
 
 
 @dataclass(frozen=True)
 class ParameterSet:
-    """The parameters of every node that takes part in the loop."""
+    """Parameters of the nodes of the loop."""
 
     common: CommonParameters
     plant: PlantParameters
@@ -53,7 +54,7 @@ class Scenario:
 
 
 def load_parameters(overrides: Overrides | None = None, files: Sequence[Path] = ()) -> ParameterSet:
-    """Return the shipped parameters with those of ``files`` and then ``overrides`` on top.
+    """Return the default parameters, overridden by ``files`` and then by ``overrides``.
 
     ``overrides`` maps a node name, or ``common``, to parameters. Raises ConfigurationError.
     """
@@ -66,28 +67,38 @@ def load_parameters(overrides: Overrides | None = None, files: Sequence[Path] = 
     for path in files:
         _reject_misspelt(path)
 
-    def group(cls: type[T], node: str, section: str, external: Sequence[str] = ()) -> T:
-        if node in external:  # what is given is for a node that we know nothing of
-            return build(cls, read_parameter_files([config_file(f"{node}.yaml")], section), node)
-        values = read_parameter_files([config_file(f"{node}.yaml"), *files], section)
-        given = overrides.get(node, {})
-        places = {name: place for name, place in values.places.items() if name not in given}
-        return build(cls, {**values, **given}, node, places)
+    def given(node: str, section: str) -> tuple[dict[str, object], dict[str, str]]:
+        values, over = (
+            read_parameter_files([config_file(f"{node}.yaml"), *files], section),
+            overrides.get(node, {}),
+        )
+        return {**values, **over}, {name: place for name, place in values.places.items() if name not in over}
+
+    def group(cls: type[T], node: str, section: str) -> T:
+        values, places = given(node, section)
+        return build(cls, values, node, places)
 
     common = group(CommonParameters, COMMON, EVERY_NODE)
+    if CONTROLLER in common.external:  # overrides are for a node that we do not know
+        shipped = read_parameter_files([config_file("controller.yaml")], CONTROLLER)
+        controller = build(ControllerParameters, shipped, CONTROLLER)
+    else:
+        values, places = given(CONTROLLER, CONTROLLER)
+        law = law_named(str(values["law"]), f"{places.get('law', CONTROLLER)}: parameter 'law'")
+        controller = build(parameters_with(law), values, CONTROLLER, places)
     return ParameterSet(
         common=common,
         plant=group(PlantParameters, PLANT, PLANT),
         trajectory=group(TrajectoryParameters, TRAJECTORY, TRAJECTORY),
         ik=group(IkParameters, IK, IK),
-        controller=group(ControllerParameters, CONTROLLER, CONTROLLER, common.external),
+        controller=controller,
     )
 
 
 def _reject_misspelt(path: Path) -> None:
-    """Raise UnknownNameError on a section of a parameter file that nearly has the name of a node.
+    """Raise UnknownNameError on a section of a parameter file whose name resembles that of a node.
 
-    A file may have sections for nodes of others, so only what looks like a slip is refused.
+    A file may have sections for other nodes, so only what looks misspelt is rejected.
     """
     document = Section.read(path)
     for section in document.keys:
@@ -117,6 +128,6 @@ def load_robot_model(common: CommonParameters) -> RobotModel:
 
 
 def load_task(common: CommonParameters, robot: RobotModel) -> Schedule:
-    """Return the schedule that the parameters name, checked against the robot."""
+    """Return the schedule named by the parameters, checked against the robot."""
     path = Path(common.schedule) if common.schedule else config_file("handover.yaml")
     return load_schedule(path, robot, common.reference_ns, common.values)

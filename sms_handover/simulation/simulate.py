@@ -1,18 +1,13 @@
-"""The loop in one process: the same objects as in the graph, joined by plain calls."""
+"""Simulate a scenario in one process: the same objects as in the graph, joined by plain calls."""
 
 from collections.abc import Callable
 
-from sms_handover.control.protocol import CheckedController, Controller, Guidance
-from sms_handover.errors import ConfigurationError
-from sms_handover.graph.topics import CONTROLLER
-from sms_handover.ik.levenberg_marquardt import find_joints
+from sms_handover.control.protocol import Controller
 from sms_handover.run_data import RunData
-from sms_handover.simulation.parameters import CommonParameters
+from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.recorder import RunRecorder
-from sms_handover.simulation.scenario import Scenario, load_scenario
-from sms_handover.simulation.wiring import make_controller, make_plant
-from sms_handover.trajectory.generator import TrajectoryGenerator
-from sms_handover.types import IkStatus, TaskPhase
+from sms_handover.simulation.scenario import Scenario
+from sms_handover.types import TaskPhase
 
 Progress = Callable[[int, TaskPhase], None]
 
@@ -23,67 +18,17 @@ def simulate(
     controller: Controller | None = None,
     progress: Progress | None = None,
 ) -> RunData:
-    """Return the run of a scenario, by default the shipped one over its whole schedule.
+    """Return the run of a scenario, by default the shipped one.
 
-    Per tick: the plant gives its state; each reference period the trajectory generator gives phase,
-    targets and, through inverse kinematics, the joint reference; the controller answers; the plant
-    carries out grasp commands and integrates. The last state is answered too, but not integrated. What
-    came of a grasp or of inverse kinematics the generator takes into account in the next period.
-    ``controller`` takes the place of the one that the scenario names; it is reset first. ``progress`` is
-    called with the time in ns and the phase each reference period. Raises ControllerError if efforts of a
-    controller are no numbers, and ConfigurationError if the scenario's is external and none is given.
+    ``controller`` replaces that of the scenario and is reset first. ``progress`` is called each reference
+    period with the time in ns and the phase. Raises what :class:`~sms_handover.simulation.loop.Loop` does.
     """
-    scenario = scenario or load_scenario()
-    parameters, robot, schedule = scenario.parameters, scenario.robot, scenario.schedule
-    common = parameters.common
-    plant = make_plant(robot, schedule, common, parameters.plant)
-    law: Controller
-    if controller is None:
-        _require_ours(common)
-        law = make_controller(robot, schedule, common, parameters.controller)
-    else:
-        law = CheckedController(controller, robot.joint_names)
-        law.reset()
-    generator = TrajectoryGenerator(robot, schedule, parameters.trajectory)
-    last_tick, per_reference = common.last_tick(schedule.end_ns), common.ticks_per_reference
-    recorder = RunRecorder(robot.joint_names, robot.arms, last_tick + 1, last_tick // per_reference + 1)
-    tick = 0
-    while tick <= last_tick:
-        stamp_ns = plant.stamp_ns
-        if tick % per_reference == 0:
-            state = plant.state
-            deputy = plant.deputy
-            recorder.plant(plant.tools_in_world, deputy.deputy_in_world, plant.receipt, plant.work)
-            phase, targets = generator.targets(state, deputy.deputy_in_world)
-            request = generator.ik_request(state, targets)
-            solution = find_joints(robot, request, parameters.ik) if request.tool_in_world else None
-            joints = solution.joint_position if solution else targets.joint_position
-            reference, targets_in_world = generator.reference(state, targets, joints)
-            recorder.reference(phase, reference, targets_in_world, solution.status if solution else None)
-            law.guide(Guidance(phase, reference, targets_in_world))
-            events = plant.execute(phase.commands)
-            generator.grasped(events)
-            if solution:
-                generator.solved(converged=solution.status is IkStatus.CONVERGED)
-            recorder.events(events)
-            recorder.decisions(generator.take_decisions())
-            before, last_tick = last_tick, common.last_tick(phase.end_ns, failed=phase.failed)
-            if last_tick > before:
-                recorder.make_room(last_tick + 1, last_tick // per_reference + 1)
-            if progress:
-                progress(stamp_ns, phase)
-        effort = law.effort(stamp_ns, plant.q, plant.v)
-        recorder.tick(stamp_ns, plant.q, plant.v, plant.joint_effort, effort)
-        if tick < last_tick:
-            plant.apply(effort)
-        tick += 1
+    loop = Loop(scenario, controller)
+    robot = loop.scenario.robot
+    recorder = RunRecorder(robot.joint_names, robot.arms, loop.last_tick + 1)
+    while not loop.finished:
+        tick = loop.advance()
+        recorder.add(tick)
+        if progress and tick.period:
+            progress(tick.stamp_ns, tick.phase)
     return recorder.data()
-
-
-def _require_ours(common: CommonParameters) -> None:
-    """Raise ConfigurationError if the controller of a scenario is none of this package."""
-    if CONTROLLER in common.external:
-        raise ConfigurationError(
-            "the controller is external, and one process has no other: give simulate() a controller, "
-            "or check a recording with 'sms-handover play --closed-loop'"
-        )

@@ -1,13 +1,17 @@
-"""Making the parts of the loop from a scenario; the nodes and the in-process loop share this."""
+"""Wiring: makes plant and controller of a scenario, for nodes and for one process alike."""
+
+from typing import Any
 
 import numpy as np
 
 from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
-from sms_handover.control.computed_torque import ComputedTorque, TrackingEfforts
-from sms_handover.control.controller import Gains, JointController
-from sms_handover.control.nmpc import NmpcGains
-from sms_handover.control.parameters import LAWS, ControllerParameters, gains_of
-from sms_handover.errors import UnknownNameError
+from sms_handover.control.computed_torque import ComputedTorque
+from sms_handover.control.law import LawSetup, Need
+from sms_handover.control.parameters import ControllerParameters, gains_of
+from sms_handover.control.protocol import CheckedController, Controller
+from sms_handover.control.registry import SHIPPED, law_named, require_law
+from sms_handover.control.stability import check_stability
+from sms_handover.errors import ConfigurationError
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
 from sms_handover.plant.integrators import TABLEAUS, Tableau
@@ -43,42 +47,41 @@ def make_plant(
 
 
 def make_stepper(robot: RobotModel, dynamics: str, tableau: Tableau, h: float) -> Stepper:
-    """Return what advances the robot by steps of ``h`` s; raises ConfigurationError."""
+    """Return the stepper for steps of ``h`` s; raises ConfigurationError."""
     kind = CompiledStepper if dynamics == COMPILED else PinocchioStepper
     return kind(robot, tableau, h)
 
 
-def make_efforts(robot: RobotModel, dynamics: str) -> TrackingEfforts:
-    """Return what works out computed torque; raises ConfigurationError."""
-    return CompiledComputedTorque(robot) if dynamics == COMPILED else ComputedTorque(robot)
-
-
-def gains_by_phase(schedule: Schedule, parameters: ControllerParameters) -> tuple[Gains, ...]:
-    """Return the gains of the chosen law for every phase; a phase changes only what it names."""
-    found = []
+def gains_by_phase(schedule: Schedule, parameters: ControllerParameters) -> tuple[Any, ...]:
+    """Return the gains of the law for every phase; a phase overrides only the gains it names."""
+    law, found = law_named(parameters.law), []
     for phase in schedule.phases:
         where = f"gains of phase {phase.name!r}"
-        for law in phase.gains:
-            if law not in LAWS:
-                raise UnknownNameError("control law", law, LAWS, where)
-        found.append(gains_of(parameters, phase.gains.get(parameters.law, {}), where))
+        for name in phase.gains:
+            require_law(name, where)
+        found.append(gains_of(law, parameters, phase.gains.get(law.name, {}), where))
     return tuple(found)
 
 
 def make_controller(
     robot: RobotModel, schedule: Schedule, common: CommonParameters, parameters: ControllerParameters
-) -> JointController:
-    """Return the controller, its gains checked for stability at the start of the schedule.
+) -> Controller:
+    """Return the controller of the scenario's law, with gains stable at the start.
 
-    Raises ConfigurationError.
+    The efforts of a law of another package are checked. Raises ConfigurationError.
     """
+    law, gains = law_named(parameters.law), gains_by_phase(schedule, parameters)
+    missing = sorted(need.value for need in law.needs - {Need.TOOL_TARGETS})
+    if missing:
+        raise ConfigurationError(f"control law {law.name!r} needs {missing[0]}, which the loop has not")
     start = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
+    check_stability(law, robot, gains, ns_to_seconds(common.tick_ns), start)
+    computed_torque = CompiledComputedTorque if common.dynamics == COMPILED else ComputedTorque
     longest_ns = longest_reference_ns(common, parameters)
-    gains = gains_by_phase(schedule, parameters)
-    efforts = make_efforts(robot, common.dynamics) if isinstance(gains[0], NmpcGains) else None
-    return JointController(robot, gains, common.tick_ns, start, longest_ns, efforts)
+    controller = law.make(LawSetup(robot, gains, common.tick_ns, longest_ns, computed_torque))
+    return controller if law.name in SHIPPED else CheckedController(controller, robot.joint_names)
 
 
 def longest_reference_ns(common: CommonParameters, parameters: ControllerParameters) -> int:
-    """Return the age in ns up to which the controller carries a reference on."""
+    """Return the age in ns up to which the controller extrapolates a reference."""
     return common.reference_ns + seconds_to_ns(parameters.reference_hold)

@@ -20,7 +20,7 @@ from sms_handover.trajectory.schedule import (
     Schedule,
     ToolTarget,
 )
-from sms_handover.trajectory.task_progress import Stage, TaskProgress
+from sms_handover.trajectory.task_progress import ProgressState, Stage, TaskProgress
 from sms_handover.trajectory.time_law import TIME_LAWS, Progress
 from sms_handover.types import (
     Array,
@@ -33,6 +33,7 @@ from sms_handover.types import (
     Twist,
     freeze,
     frozen,
+    read_only,
 )
 from sms_handover.units import ns_to_seconds
 
@@ -57,6 +58,15 @@ class Targets:
         freeze(self, "joint_position", "joint_velocity")
 
 
+@dataclass(frozen=True, eq=False)
+class GeneratorState:
+    """Progress of the task, and where joints (n,) rad and tools were when the phase began."""
+
+    progress: ProgressState
+    joints_at_start: Array
+    tools_at_start: Mapping[str, Pose]
+
+
 class TrajectoryGenerator:
     """Follows a schedule; each reference period it gives targets, an IK request and a reference.
 
@@ -76,6 +86,17 @@ class TrajectoryGenerator:
         self._progress.reset()
         self._joints_at_start: Array = np.zeros(self._robot.n_joints)
         self._tools_at_start: Mapping[str, Pose] = {}
+
+    def snapshot(self) -> GeneratorState:
+        """Return the state to :meth:`restore`."""
+        return GeneratorState(
+            self._progress.snapshot(), read_only(self._joints_at_start), dict(self._tools_at_start)
+        )
+
+    def restore(self, state: GeneratorState) -> None:
+        """Go back to a former state; raises ConfigurationError if it is that of another schedule."""
+        self._progress.restore(state.progress)
+        self._joints_at_start, self._tools_at_start = state.joints_at_start, state.tools_at_start
 
     def targets(self, state: RobotState, deputy_in_world: Pose) -> tuple[TaskPhase, Targets]:
         """Return the current phase and the targets of the arms; starts the next phase when it is due."""

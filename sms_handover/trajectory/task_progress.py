@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import nan
 
+from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import GRASP_FAILED, GRASP_MISSED, IK_FAILED, PHASE_RETRIED, RunEvent, Severity
 from sms_handover.graph.topics import TRAJECTORY
 from sms_handover.trajectory.parameters import TrajectoryParameters
@@ -44,6 +45,25 @@ class _Issue:
         return [event for event in self.answers.values() if event.status is not GraspStatus.SUCCEEDED]
 
 
+@dataclass(frozen=True, eq=False)
+class ProgressState:
+    """Everything that the later progress of a task depends on, once its decisions have been taken.
+
+    Per phase: the commands ``due``, how often it has ``begun``, its ``retries``. ``issues`` has the phase
+    index, the commands and the answers of every issue.
+    """
+
+    shift_ns: int
+    end_ns: int
+    failed: bool
+    now: tuple[int, bool] | None
+    due: tuple[tuple[GraspCommand, ...], ...]
+    begun: tuple[int, ...]
+    retries: tuple[int, ...]
+    issues: tuple[tuple[int, tuple[GraspCommand, ...], tuple[GraspEvent, ...]], ...]
+    ik_failures: int
+
+
 class TaskProgress:
     """Follows a schedule, depending on the outcomes of grasps and of inverse kinematics.
 
@@ -72,6 +92,35 @@ class TaskProgress:
         self._issues: list[_Issue] = []
         self._ik_failures = 0
         self._decisions: list[RunEvent] = []
+
+    def snapshot(self) -> ProgressState:
+        """Return the state to :meth:`restore`."""
+        return ProgressState(
+            self._shift_ns,
+            self._end_ns,
+            self._failed,
+            self._now,
+            tuple(self._due),
+            tuple(self._begun),
+            tuple(self._retries),
+            tuple((issue.index, issue.commands, tuple(issue.answers.values())) for issue in self._issues),
+            self._ik_failures,
+        )
+
+    def restore(self, state: ProgressState) -> None:
+        """Go back to a former state; raises ConfigurationError if it is that of another schedule."""
+        if len(state.due) != len(self._due):
+            raise ConfigurationError(
+                f"the snapshot has {len(state.due)} phases, must have the {len(self._due)} of the schedule"
+            )
+        self._shift_ns, self._end_ns, self._failed = state.shift_ns, state.end_ns, state.failed
+        self._now, self._ik_failures = state.now, state.ik_failures
+        self._due, self._begun, self._retries = list(state.due), list(state.begun), list(state.retries)
+        self._issues = [
+            _Issue(index, commands, {event.command: event for event in answers})
+            for index, commands, answers in state.issues
+        ]
+        self._decisions = []
 
     @property
     def awaits_grasps(self) -> bool:

@@ -7,6 +7,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from sms_handover.control.nmpc import NmpcGains, NmpcLaw
+from sms_handover.control.pid import PidGains, PidLaw
 from sms_handover.model.poses import pose_of
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import BASE_NV, RobotModel
@@ -21,6 +23,14 @@ from .report_bags import write_handovers
 # value and third derivative (m, rad, kg, s) that is 1.7e-10 + 2.2e-10.
 FD_STEP = 1e-5
 FD_BOUND = 4e-10
+
+
+Gains = NmpcGains | PidGains
+
+
+def law_of(robot: RobotModel, gains: Gains) -> NmpcLaw | PidLaw:
+    """Return a fresh law with these gains."""
+    return NmpcLaw(robot, gains) if isinstance(gains, NmpcGains) else PidLaw(robot, gains)
 
 
 class Draw:

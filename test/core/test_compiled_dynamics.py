@@ -102,11 +102,16 @@ def _desired(draw: Draw) -> Array:
     return np.array([draw.joints(), *draw.random.uniform(-1.0, 1.0, (2, draw.robot.n_joints))])
 
 
+def _feedback(position: float, velocity: float) -> Array:
+    """Return the feedback gains of computed torque, the same for every joint."""
+    return np.array([[position], [velocity]])
+
+
 def test_joint_efforts_are_those_of_the_free_base(any_robot: RobotModel) -> None:
     """Against Pinocchio by two ways: eliminating the base from the forces, and from the matrix."""
     draw, compiled = Draw(any_robot, seed=5), CompiledComputedTorque(any_robot)
     for _ in range(20):
-        q, v, desired, gains = draw.q(), draw.v(), _desired(draw), np.array([7.0, 3.0])
+        q, v, desired, gains = draw.q(), draw.v(), _desired(draw), _feedback(7.0, 3.0)
         error, error_rate = q[BASE_NQ:] - desired[0], v[BASE_NV:] - desired[1]
         wanted = desired[2] - gains[0] * error - gains[1] * error_rate
         found, reduced = compiled(q, v, desired, gains), reduced_dynamics(any_robot, q, v)
@@ -121,7 +126,7 @@ def test_joint_efforts_bring_about_what_was_asked_for(robot: RobotModel) -> None
     for _ in range(5):
         q, v, wanted = draw.q(), draw.v(), draw.vector(robot.n_joints)
         desired = np.array([q[BASE_NQ:], v[BASE_NV:], wanted])
-        _, v_next = stepper.step(q, v, efforts(q, v, desired, np.array([1e3, 1e2])))
+        _, v_next = stepper.step(q, v, efforts(q, v, desired, _feedback(1e3, 1e2)))
         assert (v_next - v)[BASE_NV:] / h == pytest.approx(wanted, abs=1e-4)
 
 
@@ -129,7 +134,7 @@ def test_the_results_of_a_call_are_its_own(robot: RobotModel, draw: Draw) -> Non
     """What one tick gave does not change with the next, and cannot be changed."""
     stepper, torque = CompiledStepper(robot, TABLEAUS["rk4"], _TICK), CompiledComputedTorque(robot)
     q, v, effort = draw.q(), draw.v(), np.zeros(robot.n_joints)
-    desired, gains = _desired(draw), np.ones(2)
+    desired, gains = _desired(draw), _feedback(1.0, 1.0)
     first, efforts = stepper.step(q, v, effort), torque(q, v, desired, gains)
     kept = [array.copy() for array in (*first, efforts)]
     stepper.step(*first, effort)
@@ -202,7 +207,7 @@ def test_a_library_of_another_robot_is_not_used(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(dynamics, "library_of", remember)
     CompiledComputedTorque(wrong)
-    with pytest.raises(ConfigurationError, match=r"torque-\w+\.so are off Pinocchio's by .*: remove"):
+    with pytest.raises(ConfigurationError, match=r"torque-\w+\.so differ from Pinocchio by .*: remove"):
         CompiledComputedTorque(RobotModel.load())
 
 
@@ -261,7 +266,7 @@ def test_a_folder_that_others_can_write_to_is_not_used(
     folder = tmp_path / "sms_handover"
     folder.mkdir()
     folder.chmod(0o777)
-    with pytest.raises(ConfigurationError, match=r"has mode drwxrwxrwx: .* allowed is a folder of your own"):
+    with pytest.raises(ConfigurationError, match=r"has mode drwxrwxrwx: .* it must be yours"):
         CompiledComputedTorque(robot)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from sms_handover.model.poses import pose_distance, pose_of, se3_of
 from sms_handover.plant.deputy import GraspTolerance, MasslessDeputy
-from sms_handover.plant.grasping import answer
+from sms_handover.plant.grasping import execute_grasp
 from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, Pose, Twist
 
 from .conftest import Draw
@@ -45,7 +45,7 @@ class Scene:
 
     def answer(self, command: GraspCommand) -> GraspEvent:
         """Return the answer of the plant."""
-        return answer(command, self.deputy, self.tools, self.twists, _TOLERANCE, stamp_ns=5)
+        return execute_grasp(command, self.deputy, self.tools, self.twists, _TOLERANCE, stamp_ns=5)
 
 
 @pytest.fixture

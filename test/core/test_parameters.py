@@ -15,9 +15,9 @@ from sms_handover.configuration.parameters import (
     spec_of,
 )
 from sms_handover.configuration.yaml_reader import read_yaml
-from sms_handover.control.nmpc import NmpcGains
-from sms_handover.control.parameters import ControllerParameters, gains_of
-from sms_handover.control.pid import PidGains
+from sms_handover.control.nmpc import NMPC, NmpcGains
+from sms_handover.control.parameters import gains_of
+from sms_handover.control.pid import PID, PidGains
 from sms_handover.errors import ConfigurationError, SmsHandoverError, UnknownNameError
 from sms_handover.simulation.scenario import load_parameters
 
@@ -216,20 +216,21 @@ def test_overrides_lie_over_files(tmp_path: Path) -> None:
 
 def test_gains_of_a_phase_lie_over_those_of_the_controller() -> None:
     """A phase changes what it names and nothing else, and only gains of the law in use."""
-    nmpc = ControllerParameters("nmpc", 1.0, 1, 2.0, 3.0, 4.0, 0.1)
-    assert gains_of(nmpc, {}, "here") == NmpcGains(1.0, 1)
-    assert gains_of(nmpc, {"rolling_period": 2}, "here") == NmpcGains(2.0, 1)
-    pid = ControllerParameters("pid", 1.0, 1, 2.0, 3.0, 4.0, 0.1)
-    assert gains_of(pid, {"integral": 0.5}, "here") == PidGains(2.0, 0.5, 4.0)
+    gains: dict[str, object] = {"control_order": 1, "proportional": 2.0, "integral": 3.0, "derivative": 4.0}
+    nmpc = load_parameters({"controller": {"law": "nmpc", **gains}}).controller
+    assert gains_of(NMPC, nmpc, {}, "here") == NmpcGains(1.0, 1)
+    assert gains_of(NMPC, nmpc, {"rolling_period": 2}, "here") == NmpcGains(2.0, 1)
+    pid = load_parameters({"controller": {"law": "pid", **gains}}).controller
+    assert gains_of(PID, pid, {"integral": 0.5}, "here") == PidGains(2.0, 0.5, 4.0)
     with pytest.raises(UnknownNameError, match=r"here: unknown gain of pid 'rolling_period'"):
-        gains_of(pid, {"rolling_period": 2.0}, "here")
+        gains_of(PID, pid, {"rolling_period": 2.0}, "here")
     with pytest.raises(
         UnknownNameError, match=r"unknown gain of nmpc 'roling_period' \(did you mean 'rolling"
     ):
-        gains_of(nmpc, {"roling_period": 2.0}, "here")
+        gains_of(NMPC, nmpc, {"roling_period": 2.0}, "here")
     with pytest.raises(
         ConfigurationError, match=r"here: parameter 'rolling_period' is 0 s, must be >= 0.001 s"
     ):
-        gains_of(nmpc, {"rolling_period": 0}, "here")
+        gains_of(NMPC, nmpc, {"rolling_period": 0}, "here")
     with pytest.raises(ConfigurationError, match=r"'control_order' is 4, must be >= 0 and <= 3"):
-        gains_of(nmpc, {"control_order": 4}, "here")
+        gains_of(NMPC, nmpc, {"control_order": 4}, "here")

@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sms_handover.control.pid import PidGains, PidLaw
+from sms_handover.control.pid import PidGains, PidLaw, linearised
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.integrators import TABLEAUS, LieGroupIntegrator
@@ -192,17 +192,19 @@ def test_new_gains_do_not_kick(robot: RobotModel) -> None:
     assert bench.integral_effort == 0.0  # without integral action there is nothing to carry on
 
 
-def test_reset_empties_the_integral(robot: RobotModel) -> None:
-    """After a reset the law is as new."""
-    bench = Bench(robot)
+def test_the_integral_is_all_that_is_remembered(robot: RobotModel) -> None:
+    """Restored, the law answers as it did; from an empty memory it is as new."""
+    bench, other = Bench(robot), Bench(robot)
     bench.step(0.3)
-    bench.law.reset()
+    other.law.restore(bench.law.memory)
+    assert other.integral_effort == bench.integral_effort != 0.0
+    bench.law.restore(np.zeros(0))
     assert bench.integral_effort == 0.0
 
 
-def test_linearised_gains_are_those_of_every_joint(robot: RobotModel) -> None:
+def test_linearised_gains_are_those_of_every_joint() -> None:
     """Three diagonal matrices, whatever the inertia."""
-    feedback = PidLaw(robot, _GAINS).linearised(np.ones((14, 14)))
+    feedback = linearised(_GAINS, np.ones((14, 14)))
     np.testing.assert_array_equal(feedback.position, 2.0 * np.eye(14))
     np.testing.assert_array_equal(feedback.velocity, 1.5 * np.eye(14))
     np.testing.assert_array_equal(feedback.integral, 1.0 * np.eye(14))

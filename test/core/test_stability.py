@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from sms_handover.control.base import ControlLaw, LinearFeedback
-from sms_handover.control.controller import Gains, check_stability, make_law
-from sms_handover.control.nmpc import NmpcGains
-from sms_handover.control.pid import PidGains
-from sms_handover.control.stability import loop_stability, sampled_loop
+from sms_handover.control import nmpc, pid
+from sms_handover.control.law import LinearFeedback
+from sms_handover.control.nmpc import NmpcGains, NmpcLaw
+from sms_handover.control.pid import PID, PidGains, PidLaw
+from sms_handover.control.stability import check_stability, loop_stability, sampled_loop
 from sms_handover.errors import UnstableLoopError
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import BASE_NQ, RobotModel
@@ -15,7 +15,7 @@ from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.wiring import make_controller
 from sms_handover.types import Array
 
-from .conftest import Draw, state_of
+from .conftest import Draw, Gains, law_of, state_of
 
 _EPS = np.finfo(float).eps
 _BENT = np.tile([0.2, -0.6, 0.1, -1.5, 0.3, -0.8, 0.4], 2)  # [rad]
@@ -35,7 +35,12 @@ def inertia(robot: RobotModel, q: Array) -> Array:
     return reduced_dynamics(robot, q, np.zeros(20)).inertia
 
 
-def _tick(robot: RobotModel, law: ControlLaw[Gains], inertia: Array, q: Array, x: Array, dt: float) -> Array:
+def linearised(gains: Gains, inertia: Array) -> LinearFeedback:
+    """Return the feedback at rest of the law of some gains."""
+    return nmpc.linearised(gains, inertia) if isinstance(gains, NmpcGains) else pid.linearised(gains, inertia)
+
+
+def _tick(robot: RobotModel, law: NmpcLaw | PidLaw, inertia: Array, q: Array, x: Array, dt: float) -> Array:
     """Return (e, e') after one tick of the law itself on the frozen robot, started at rest elsewhere."""
     n = robot.n_joints
     e, rate = x[:n], x[n : 2 * n]
@@ -47,7 +52,7 @@ def _tick(robot: RobotModel, law: ControlLaw[Gains], inertia: Array, q: Array, x
 
 def _growth(robot: RobotModel, gains: Gains, inertia: Array, q: Array, dt: float, start: Array) -> float:
     """Return the growth per tick of a motion simulated by brute force, once its fastest mode prevails."""
-    law, x = make_law(robot, gains), start * 1e-6
+    law, x = law_of(robot, gains), start * 1e-6
     logs = []
     for _ in range(4000):
         x = _tick(robot, law, inertia, q, x, dt)
@@ -65,10 +70,10 @@ def test_transition_is_what_one_tick_does(
     robot: RobotModel, inertia: Array, q: Array, gains: Gains, dt: float
 ) -> None:
     """Column by column, the matrix has what the law itself does to a unit error over one tick."""
-    matrix = sampled_loop(inertia, make_law(robot, gains).linearised(inertia), dt)
+    matrix = sampled_loop(inertia, linearised(gains, inertia), dt)
     assert matrix.shape == (28, 28)
     for column, unit in enumerate(1e-3 * np.eye(28)):
-        found = _tick(robot, make_law(robot, gains), inertia, q, unit, dt) / 1e-3
+        found = _tick(robot, law_of(robot, gains), inertia, q, unit, dt) / 1e-3
         # errors are differences of angles below 3 rad: eps over 1e-3, through gains over inertias
         scale = max(1.0, float(np.max(np.abs(matrix))))
         np.testing.assert_allclose(found, matrix[:, column], atol=1e3 * 3.0 * _EPS * scale * 14)
@@ -76,9 +81,9 @@ def test_transition_is_what_one_tick_does(
 
 def test_transition_with_integral_is_what_two_ticks_do(robot: RobotModel, inertia: Array, q: Array) -> None:
     """The integral acts from the next tick on, with the error of this one."""
-    matrix = sampled_loop(inertia, make_law(robot, _PID).linearised(inertia), 1e-3)
+    matrix = sampled_loop(inertia, pid.linearised(_PID, inertia), 1e-3)
     assert matrix.shape == (42, 42)
-    law, x = make_law(robot, _PID), np.zeros(42)
+    law, x = law_of(robot, _PID), np.zeros(42)
     x[3] = 1e-3
     expected = matrix @ (matrix @ x)
     for _ in range(2):
@@ -108,7 +113,7 @@ def test_verdict_agrees_with_brute_force(
 
     Where it grows, it does so at the rate of the spectral radius.
     """
-    feedback = make_law(robot, gains).linearised(inertia)
+    feedback = linearised(gains, inertia)
     found = loop_stability(inertia, feedback, dt, robot.joint_names)
     assert found.stable is stable
     growth = _growth(robot, gains, inertia, q, dt, draw.vector(28))
@@ -123,7 +128,7 @@ def test_longest_tick_of_nmpc_is_that_of_a_double_integrator(
 ) -> None:
     """A sampled double integrator with gains A1, A2 is stable for h < 2 / A2: 4 T / ((r+1)(r+5))."""
     gains = NmpcGains(1.5, order)
-    feedback = make_law(robot, gains).linearised(inertia)
+    feedback = linearised(gains, inertia)
     for share, stable in ((0.999, True), (1.001, False)):
         tick = share * longest * gains.rolling_period
         assert loop_stability(inertia, feedback, tick, robot.joint_names).stable is stable
@@ -133,7 +138,7 @@ def test_the_joint_that_diverges_is_named(robot: RobotModel) -> None:
     """With a diagonal inertia the lightest joint is the first to go."""
     moments = np.full(14, 0.5)
     moments[9] = 1e-3
-    feedback = make_law(robot, _PID).linearised(np.diag(moments))
+    feedback = pid.linearised(_PID, np.diag(moments))
     found = loop_stability(np.diag(moments), feedback, 2e-3, robot.joint_names)
     assert (found.stable, found.joint) == (False, robot.joint_names[9])
 
@@ -147,9 +152,9 @@ def test_a_loop_without_gains_is_not_stable(inertia: Array, robot: RobotModel) -
 def test_every_gain_set_is_checked(robot: RobotModel, q: Array) -> None:
     """One bad phase among good ones is enough; the message has gains, tick, radius and joint on one line."""
     good, bad = PidGains(2.0, 1.0, 1.5), PidGains(2.0, 1.0, 9.0)
-    assert [found.stable for found in check_stability(robot, [good, good], 1e-3, q)] == [True, True]
+    assert [found.stable for found in check_stability(PID, robot, [good, good], 1e-3, q)] == [True, True]
     with pytest.raises(UnstableLoopError) as caught:
-        check_stability(robot, [good, bad], 1e-3, q)
+        check_stability(PID, robot, [good, bad], 1e-3, q)
     text = str(caught.value)
     assert "derivative=9.0" in text and "0.001 s" in text and "joint_" in text and "\n" not in text
 

@@ -17,14 +17,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sms_handover.control.controller import JointController
+from sms_handover.control.protocol import Controller, Guidance
 from sms_handover.ik.levenberg_marquardt import solve_ik
 from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.plant.integrators import TABLEAUS, LieGroupIntegrator
 from sms_handover.simulation.scenario import Overrides, Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.simulation.wiring import make_controller, make_plant
-from sms_handover.types import Array, IkRequest, IkStatus, JointReference
+from sms_handover.types import Array, IkRequest, IkStatus, JointReference, TaskPhase
 
 from .conftest import Draw
 
@@ -53,18 +53,19 @@ def count_calls(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
     return calls
 
 
-class Loop:
+class TickBench:
     """Plant and controller of a scenario with a reference to track, as between two reference periods."""
 
     def __init__(self, scenario: Scenario) -> None:
         """Start with every joint a little away from its desired position."""
         parameters, robot, schedule = scenario.parameters, scenario.robot, scenario.schedule
         self.plant: FreeFloatingPlant = make_plant(robot, schedule, parameters.common, parameters.plant)
-        self.controller: JointController = make_controller(
+        self.controller: Controller = make_controller(
             robot, schedule, parameters.common, parameters.controller
         )
         joints = self.plant.state.joint_position
-        self.controller.track(JointReference(0, joints + 0.01, np.zeros_like(joints)))
+        reference = JointReference(0, joints + 0.01, np.zeros_like(joints))
+        self.controller.guide(Guidance(TaskPhase(0, 0, ""), reference, {}))
 
     def tick(self) -> None:
         """Answer a state and integrate."""
@@ -72,9 +73,9 @@ class Loop:
         plant.apply(self.controller.effort(plant.stamp_ns, plant.q, plant.v))
 
 
-def _loop(overrides: Overrides | None = None) -> Loop:
+def _loop(overrides: Overrides | None = None) -> TickBench:
     """Return the loop of the shipped scenario with overrides."""
-    return Loop(load_scenario(overrides))
+    return TickBench(load_scenario(overrides))
 
 
 @pytest.mark.parametrize(

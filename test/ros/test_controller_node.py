@@ -2,14 +2,17 @@
 
 from collections.abc import Mapping
 from itertools import permutations
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from sms_handover_interfaces.msg import RunState
 
-from sms_handover.control.controller import JointController
-from sms_handover.errors import UnstableLoopError
+from sms_handover.control.law import Need
+from sms_handover.control.protocol import Controller, Guidance
+from sms_handover.control.registry import law_named
+from sms_handover.errors import UnknownNameError, UnstableLoopError
 from sms_handover.frames import BASE, WORLD
 from sms_handover.graph.topics import (
     BASE_ODOMETRY,
@@ -22,16 +25,19 @@ from sms_handover.graph.topics import (
     RUN_STATE,
     TASK_PHASE,
     TRAJECTORY,
+    target_pose,
 )
 from sms_handover.messages.stamps import stamp_ns
+from sms_handover.model.poses import pose_row
 from sms_handover.nodes.controller import ControllerNode
 from sms_handover.ros.codecs.convert import phase_message
-from sms_handover.ros.codecs.loop_messages import JointStateCodec, StateCodec
+from sms_handover.ros.codecs.loop_messages import JointStateCodec, PoseCodec, StateCodec
 from sms_handover.ros.node.endpoints import CountedPublisher, Endpoints
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.wiring import initial_joints, make_controller
-from sms_handover.types import Array, JointReference, RobotState, TaskPhase
+from sms_handover.types import Array, JointReference, Pose, RobotState, TaskPhase
 
+from ..core.laws import offer
 from .bench import Bench
 from .graph import TOPICS
 from .short_handover import short_handover
@@ -57,7 +63,7 @@ class Rest:
         self.node = bench.add(ControllerNode)
         endpoints = Endpoints(bench.plain(PLANT), TOPICS, (PLANT, CONTROLLER))
         self._publish: dict[str, CountedPublisher] = {
-            name: endpoints.publisher(name) for name in (*INPUTS, RUN_STATE)
+            name: endpoints.publisher(name) for name in (*INPUTS, *self._targets(), RUN_STATE)
         }
         self.commands: list[bytes] = []
         endpoints.subscribe(JOINT_COMMAND, self.commands.append, raw=True)
@@ -68,6 +74,11 @@ class Rest:
         self._state_codec = StateCodec(names, WORLD, BASE)
         self._reference_codec = JointStateCodec(names, ("position", "velocity"))
         self._command_codec = JointStateCodec(names, ("effort",))
+
+    def _targets(self) -> list[str]:
+        """Return the topics of the targets of the tools, if the law follows them."""
+        follows = Need.TOOL_TARGETS in law_named(self.scenario.parameters.controller.law).needs
+        return [target_pose(arm) for arm in self.scenario.robot.arms] if follows else []
 
     def messages(self, state: RobotState, reference: JointReference, phase: TaskPhase) -> dict[str, Any]:
         """Return the messages of one stamp by topic."""
@@ -98,7 +109,7 @@ class Rest:
         """Return the commands so far."""
         return [self._command_codec.read(data)["effort"] for data in self.commands]
 
-    def by_hand(self) -> JointController:
+    def by_hand(self) -> Controller:
         """Return the controller of the core."""
         s = self.scenario
         return make_controller(s.robot, s.schedule, s.parameters.common, s.parameters.controller)
@@ -116,14 +127,18 @@ def inputs(rest: Rest, stamp: int, seed: int) -> tuple[RobotState, JointReferenc
     return state, reference, TaskPhase(stamp, index, rest.scenario.schedule.phases[index].name)
 
 
-def answered_as(rest: Rest, expected: JointController, number: int, *order: str) -> RobotState:
+def effort_of(controller: Controller, state: RobotState) -> Array:
+    """Return what a controller answers a state."""
+    return controller.effort(state.stamp_ns, state.q, state.v)
+
+
+def answered_as(rest: Rest, expected: Controller, number: int, *order: str) -> RobotState:
     """Send all inputs of a stamp; the command is what a controller called by hand gives, bit for bit."""
     state, reference, phase = inputs(rest, number * REFERENCE_NS, number)
     rest.send(rest.messages(state, reference, phase), *order)
     rest.wait_for(number + 1)
-    expected.enter(phase)
-    expected.track(reference)
-    assert rest.efforts()[-1].tobytes() == expected.step(state).effort.tobytes()
+    expected.guide(Guidance(phase, reference, {}))
+    assert rest.efforts()[-1].tobytes() == effort_of(expected, state).tobytes()
     return state
 
 
@@ -163,14 +178,13 @@ def test_between_references_the_state_is_enough(bench: Bench) -> None:
     expected = rest.by_hand()
     first = inputs(rest, 0, 0)
     rest.send(rest.messages(*first), *INPUTS)
-    expected.enter(first[2])
-    expected.track(first[1])
-    expected.step(first[0])
+    expected.guide(Guidance(first[2], first[1], {}))
+    effort_of(expected, first[0])
     for tick, order in ((1, INPUTS[:2]), (2, INPUTS[1::-1]), (3, INPUTS[:2])):
         state, reference, phase = inputs(rest, tick * 1_000_000, tick)
         rest.send(rest.messages(state, reference, phase), *order)
         rest.wait_for(tick + 1)
-        assert rest.efforts()[-1].tobytes() == expected.step(state).effort.tobytes()
+        assert rest.efforts()[-1].tobytes() == effort_of(expected, state).tobytes()
 
 
 def test_an_answered_stamp_is_not_answered_again(bench: Bench) -> None:
@@ -185,9 +199,8 @@ def test_an_answered_stamp_is_not_answered_again(bench: Bench) -> None:
     assert rest.commands[1] == rest.commands[2]
     for stamp in sorted(set(stamps)):
         state, reference, phase = inputs(rest, stamp, stamp)
-        expected.enter(phase)
-        expected.track(reference)
-        wanted = expected.step(state).effort
+        expected.guide(Guidance(phase, reference, {}))
+        wanted = effort_of(expected, state)
     assert rest.efforts()[-1].tobytes() == wanted.tobytes()
     assert rest.node.report().values["late"] == 4
 
@@ -220,15 +233,14 @@ def test_in_real_time_the_last_reference_holds(bench: Bench) -> None:
     rest.send(rest.messages(state, reference, phase), *INPUTS[:2])
     rest.wait_for(1)
     assert not np.any(rest.efforts()[0])
-    expected.step(state)
+    effort_of(expected, state)
     rest.send(rest.messages(state, reference, phase), TASK_PHASE, JOINT_REFERENCE)
-    expected.enter(phase)
-    expected.track(reference)
+    expected.guide(Guidance(phase, reference, {}))
     for number in (1, 2, 3):
         state, reference, phase = inputs(rest, number * REFERENCE_NS, number)
         rest.send(rest.messages(state, reference, phase), *INPUTS[:2])
         rest.wait_for(number + 1)
-        assert rest.efforts()[-1].tobytes() == expected.step(state).effort.tobytes()
+        assert rest.efforts()[-1].tobytes() == effort_of(expected, state).tobytes()
 
 
 def test_gains_that_cannot_work_are_refused_at_the_start(bench: Bench) -> None:
@@ -244,3 +256,31 @@ def test_peers_of_the_controller_are_what_it_waits_for(bench: Bench) -> None:
     assert "0 of 1 subscriptions of joint_command" in missing
     assert "0 of 1 publishers of joint_states" in missing
     assert "0 of 1 publishers of task/phase" in missing
+
+
+def test_an_unknown_law_is_refused_at_the_start(bench: Bench) -> None:
+    bench.start({CONTROLLER: {"law": "pdi"}})
+    with pytest.raises(UnknownNameError, match=r"controller: parameter 'law': .*did you mean 'pid'"):
+        bench.add(ControllerNode)
+
+
+def test_a_law_of_another_package_answers_as_in_one_process(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By its name, with parameters of its own, and guided to the targets of the tools."""
+    laws = {"task_space_pd": "my_controller.law:LAW"}
+    monkeypatch.syspath_prepend(offer(tmp_path, "my_controller", **laws))
+    rest = Rest(bench, law="task_space_pd", stiffness=3.0)
+    expected = rest.by_hand()
+    for number in range(3):
+        state, reference, phase = inputs(rest, number * REFERENCE_NS, number)
+        targets = rest.scenario.robot.tools_at(state.q)
+        targets = {arm: Pose(pose.position + 0.01, pose.quaternion_xyzw) for arm, pose in targets.items()}
+        messages = rest.messages(state, reference, phase)
+        codec = PoseCodec(WORLD)
+        messages.update({target_pose(a): codec.pack(state.stamp_ns, pose_row(p)) for a, p in targets.items()})
+        rest.send(messages, *INPUTS, *map(target_pose, targets))
+        rest.wait_for(number + 1)
+        expected.guide(Guidance(phase, reference, targets))
+        assert rest.efforts()[-1].tobytes() == effort_of(expected, state).tobytes()
+        assert np.any(rest.efforts()[-1])

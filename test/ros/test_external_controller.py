@@ -7,75 +7,34 @@ import pytest
 from my_controller.node import main
 from my_controller.task_space_pd import TaskSpaceGains, TaskSpacePd
 
-from sms_handover.control.protocol import Guidance
 from sms_handover.errors import UnknownNameError
-from sms_handover.external.controller import GuidedController, OwnControllerNode
-from sms_handover.graph.topics import CONTROLLER, JOINT_COMMAND, PLANT
-from sms_handover.simulation.scenario import Scenario, load_scenario
-from sms_handover.types import Array, JointReference, Pose, RobotState, TaskPhase
+from sms_handover.external.controller import OwnControllerNode
+from sms_handover.graph.topics import CONTROLLER, JOINT_COMMAND, JOINT_REFERENCE, PLANT, TASK_PHASE
+from sms_handover.nodes.parts.guidance_parts import GuidanceParts
+from sms_handover.types import Pose, TaskPhase
 
 from .bench import Bench
 
 pytestmark = pytest.mark.ros
 
 _HERE = Pose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
-_STATE = RobotState(0, np.zeros(21), np.zeros(20), np.zeros(14))
 
 
-class Kept:
-    """A controller that keeps its guidance."""
-
-    def __init__(self) -> None:
-        """Begin with nothing."""
-        self.guidance: list[Guidance] = []
-
-    def reset(self) -> None:
-        """Forget it."""
-        self.guidance.clear()
-
-    def guide(self, guidance: Guidance) -> None:
-        """Keep it."""
-        self.guidance.append(guidance)
-
-    def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
-        """Answer with how often it was guided."""
-        return np.full(14, float(len(self.guidance)))
-
-
-@pytest.fixture(scope="module")
-def scenario() -> Scenario:
-    return load_scenario()
-
-
-def parts(guided: GuidedController, stamp: int) -> list[object]:
-    """Return what gives each of the four parts of one instant."""
-    reference = JointReference(stamp, np.full(14, float(stamp)), np.zeros(14))
-    return [
-        lambda: guided.enter(TaskPhase(stamp, 0, "approach")),
-        lambda: guided.track(reference),
-        lambda: guided.aim(stamp, "arm_a", _HERE),
-        lambda: guided.aim(stamp, "arm_b", _HERE),
-    ]
-
-
-def test_guidance_is_given_once_when_all_of_one_instant_is_there(scenario: Scenario) -> None:
-    """In each of the 24 orders, and never of two instants together."""
-    kept = Kept()
-    guided = GuidedController(kept, scenario.robot)
-    assert not np.any(guided.effort(0, _STATE.q, _STATE.v))
-    for number, order in enumerate(permutations(range(4))):
-        for place, part in enumerate(order):
-            assert len(kept.guidance) == number, place
-            give = parts(guided, number)[part]
-            assert callable(give)
-            give()
-        last = kept.guidance[-1]
-        assert len(kept.guidance) == number + 1
-        assert (last.phase.stamp_ns, last.reference.stamp_ns) == (number, number)
-        assert list(last.tool_in_world) == ["arm_a", "arm_b"]
-    assert guided.effort(0, _STATE.q, _STATE.v).tolist() == [24.0] * 14
-    guided.reset()
-    assert kept.guidance == [] and not np.any(guided.effort(0, _STATE.q, _STATE.v))
+@pytest.mark.parametrize("arms", [(), ("arm_a", "arm_b")])
+def test_guidance_is_given_once_when_all_of_one_instant_is_there(arms: tuple[str, ...]) -> None:
+    """In each order of its parts, and never of two instants together."""
+    parts = GuidanceParts(arms)
+    for stamp, order in enumerate(permutations(parts.topics), start=1):
+        contents: dict[str, object] = dict.fromkeys(order, _HERE)
+        contents[TASK_PHASE] = TaskPhase(stamp, 0, "approach")
+        contents[JOINT_REFERENCE] = (np.full(14, float(stamp)), np.zeros(14))
+        *missing, last = (parts.add(topic, stamp, contents[topic]) for topic in order)
+        assert missing == [None] * (len(order) - 1)
+        assert last is not None and list(last.tool_in_world) == list(arms)
+        assert (last.phase.stamp_ns, last.reference.stamp_ns, parts.reference_ns) == (stamp, stamp, stamp)
+    assert parts.complete
+    parts.reset()
+    assert not parts.complete
 
 
 def test_its_parameters_are_ros_parameters_with_unit_and_range(bench: Bench) -> None:

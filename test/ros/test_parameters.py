@@ -93,7 +93,6 @@ REFUSED: dict[str, tuple[dict[str, object], str]] = {
         "'control_order' is 1.5, must be a whole number",
     ),
     "number for a text": ({"law": 3}, "'law' is 3, must be text"),
-    "unknown choice": ({"law": "pdi"}, "unknown value 'pdi' (did you mean 'pid'?): known are 'nmpc', 'pid'"),
     "list for a number": ({"proportional": [1.0, 2.0]}, "'proportional' is"),
     "too small": ({"rolling_period": 0.0}, "'rolling_period' is 0.0 s, must be >= 0.001 s"),
 }
@@ -134,7 +133,7 @@ def test_bad_common_values_are_refused(bench: Bench, values: dict[str, object]) 
 def test_values_that_do_not_fit_each_other_are_refused(bench: Bench) -> None:
     bench.start({"common": {"tick": 0.003}})
     with pytest.raises(
-        ConfigurationError, match=r"reference_period is 0.02 s, allowed is a multiple of the tick"
+        ConfigurationError, match=r"reference_period is 0.02 s, must be a multiple of the tick"
     ):
         declare(node_of(bench), CommonParameters, "common.yaml", EVERY_NODE)
 

@@ -18,6 +18,7 @@ from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.types import GraspStatus
 
+from ..core.laws import offer
 from .conftest import TICKS, Command
 from .runs import DEADLINE_S, Ended, running, sms_handover
 
@@ -29,10 +30,13 @@ _ROUNDING = 1e-9  # [rad, N m] of the same law in other operations, within a sec
 
 
 @pytest.fixture(scope="module", autouse=True)
-def example_on_path() -> None:
-    """Let processes import the example, as if it were installed."""
-    example = Path(task_space_pd.__file__).parent.parent
-    os.environ["PYTHONPATH"] = os.pathsep.join([str(example), os.environ.get("PYTHONPATH", "")])
+def example_on_path(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Let processes import the example and find its law, as if it were installed."""
+    example = str(Path(task_space_pd.__file__).parent.parent)
+    entry_points = offer(
+        tmp_path_factory.mktemp("site"), "my_controller", task_space_pd="my_controller.law:LAW"
+    )
+    os.environ["PYTHONPATH"] = os.pathsep.join([example, str(entry_points), os.environ.get("PYTHONPATH", "")])
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +69,18 @@ def test_the_same_object_gives_the_same_bits_over_dds(
     recorded = read_run(own["helped"][0] / "bag")
     assert recorded.tick_ns.size == TICKS
     assert compare_runs(recorded, in_one_process) == ()
+
+
+def test_by_its_name_it_runs_in_our_node_and_is_reproduced(
+    schedule: Path, in_one_process: RunData, tmp_path: Path
+) -> None:
+    """As any law of ours: found, run, recorded, made again from the bag."""
+    law = ("--controller", "task_space_pd")
+    ended = sms_handover("run", *law, "--schedule", schedule, "-o", "named", cwd=tmp_path)
+    assert ended.code == 0, ended
+    assert compare_runs(read_run(tmp_path / "named" / "bag"), in_one_process) == ()
+    assert read_info(tmp_path / "named" / "bag").parameters["controller"]["stiffness"] == 5.0
+    assert sms_handover("reproduce", "named", cwd=tmp_path).code == 0
 
 
 def test_a_bare_node_does_the_same(own: dict[str, tuple[Path, Ended]], in_one_process: RunData) -> None:

@@ -37,7 +37,7 @@ def files() -> dict[str, str]:
 
 
 WRONG = {
-    "controller": (["--controller", "pdi"], "invalid choice: 'pdi'"),
+    "controller": (["--controller", "pdi"], "unknown control law 'pdi' (did you mean 'pid'?)"),
     "own controller beside ours": (["--controller", "pid", "--own-controller", "true"], "give one"),
     "own controller that is not there": (["--own-controller", "no_such x"], "no program 'no_such'"),
     "own controller that is empty": (["--own-controller", " "], "is empty"),

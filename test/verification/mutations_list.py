@@ -130,7 +130,7 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "reaction of the base left out of the efforts",
         "model/reduced",
-        "forces[BASE_NV:] - inertia[BASE_NV:, :BASE_NV].dot(yielding)",
+        "forces[BASE_NV:] - np.add.reduce(coupled)",
         "forces[BASE_NV:]",
         "nmpc",
     ),
@@ -144,8 +144,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "block of the mass matrix transposed",
         "model/reduced",
-        "inertia[BASE_NV:, :BASE_NV].dot(yielding)",
-        "inertia[BASE_NV:, :BASE_NV].T.reshape(-1, BASE_NV).dot(yielding)",
+        "inertia[BASE_NV:, :BASE_NV].T * yielding[:, np.newaxis]",
+        "inertia[BASE_NV:, :BASE_NV].reshape(BASE_NV, -1) * yielding[:, np.newaxis]",
         "nmpc",
     ),
     _core(
@@ -244,15 +244,15 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "work counted against the motion",
         "plant/free_floating",
-        "self._work += float(effort.dot",
-        "self._work -= float(effort.dot",
+        "self._work += part",
+        "self._work -= part",
         "plant",
     ),
     _core(
         "stamp of a state off by one tick",
         "plant/free_floating",
-        "return self._tick * self._tick_ns",
-        "return (self._tick + 1) * self._tick_ns",
+        "return self.tick * self._tick_ns",
+        "return (self.tick + 1) * self._tick_ns",
         "plant",
     ),
     _core(
@@ -279,8 +279,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "the two motions of a step in the wrong order",
         "plant/integrators",
-        "for motion in self._motions:",
-        "for motion in reversed(self._motions):",
+        "for motion in self._ends:",
+        "for motion in reversed(self._ends):",
         "integrators",
     ),
     _core(
@@ -293,8 +293,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "forward dynamics worked out once more than a step needs",
         "plant/integrators",
-        "rows[1] = acceleration(start, v)",
-        "rows[1] = 0.5 * (acceleration(start, v) + acceleration(start, v))",
+        "row[:] = acceleration(start, v)",
+        "row[:] = 0.5 * (acceleration(start, v) + acceleration(start, v))",
         "work_counts",
     ),
     _core(
@@ -371,8 +371,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "desired acceleration left out",
         "control/computed_torque",
-        "wanted = desired[2] - feedback",
-        "wanted = 0.0 * desired[2] - feedback",
+        "wanted = desired[2] - self._error",
+        "wanted = 0.0 * desired[2] - self._error",
         "nmpc",
     ),
     _core(
@@ -413,15 +413,15 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "half of the acceleration term of the reference missing",
         "control/reference_track",
-        "forward[0, 2] = 0.5 * s * s",
-        "forward[0, 2] = 0.25 * s * s",
+        "+ 0.5 * s * s * self._second",
+        "+ 0.25 * s * s * self._second",
         "reference_track",
     ),
     _core(
         "gains of a phase never taken over",
         "control/controller",
-        "self._law.use(self._gains_by_phase[phase.index])",
-        "self._law.use(self._gains_by_phase[0])",
+        "self._law.use(self._gains[phase.index])",
+        "self._law.use(self._gains[0])",
         "controller",
     ),
     _core(
@@ -584,8 +584,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "command recorded as the effort that acted",
         "simulation/recorder",
-        "self._effort[k] = effort",
-        "self._effort[k] = command",
+        "effort[k] = tick.joint_effort",
+        "effort[k] = tick.effort",
         "analysis_runs",
     ),
 )

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from sms_handover.control.base import LinearFeedback
+from sms_handover.control.law import LinearFeedback
 from sms_handover.control.nmpc import NmpcGains
-from sms_handover.control.pid import PidGains, PidLaw
+from sms_handover.control.pid import PidGains, linearised
 from sms_handover.control.stability import loop_stability
 from sms_handover.model.assembly import RobotDescription
 from sms_handover.model.reduced import reduced_dynamics
@@ -92,7 +92,7 @@ def test_signs_of_the_laws(robot: RobotModel, record: Record) -> None:
     """With e = q - q_d both laws have to push against the error."""
     q = robot.configuration(Draw(robot, seed=7).pose(), np.tile([0.2, -0.6, 0.1, -1.5, 0.3, -0.8, 0.4], 2))
     inertia = reduced_dynamics(robot, q, np.zeros(20)).inertia
-    feedback = PidLaw(robot, PidGains(2.0, 1.0, 1.5)).linearised(inertia)
+    feedback = linearised(PidGains(2.0, 1.0, 1.5), inertia)
     radius = loop_stability(inertia, feedback, 1e-3, robot.joint_names).spectral_radius
     claim = "(17): spectral radius of the sampled loop under u = -(K_P e + ...), less 1"
     record(claim, radius - 1.0, -1e-9, against="stability of a linear loop")

@@ -11,7 +11,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sms_handover.control.base import ControlLaw
 from sms_handover.control.nmpc import MAX_CONTROL_ORDER, NmpcGains, NmpcLaw
 from sms_handover.control.pid import PidGains, PidLaw
 from sms_handover.model.reduced import reduced_dynamics
@@ -19,7 +18,7 @@ from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
 from sms_handover.plant.integrators import TABLEAUS, LieGroupIntegrator
 from sms_handover.simulation.scenario import load_parameters
-from sms_handover.types import Array, JointCommand, Pose
+from sms_handover.types import Array, Pose
 from test.core.conftest import Draw, slope
 from test.core.test_pid import Bench, _linear
 from test.verification.conftest import Record, Table
@@ -32,7 +31,7 @@ _PERIODS = (0.5, 1.0, 2.0)  # [s] rolling periods
 _ORDERS = range(MAX_CONTROL_ORDER + 1)
 _PID = PidGains(2.0, 1.0, 1.5)  # the paper's
 
-Law = ControlLaw[NmpcGains] | ControlLaw[PidGains]
+Law = NmpcLaw | PidLaw
 
 
 @pytest.fixture(scope="module")
@@ -183,7 +182,7 @@ def test_static_error(robot: RobotModel, draw: Draw, period: float, record: Reco
     # Modes decay as exp(-1.25 t / T_r) but for H*^-1 d changing with q, which costs up to half.
     for _ in range(round(2.0 * decays * period / 1.25 / _TICK)):
         effort = law.effort(plant.q, plant.v, desired, _TICK) + disturbance
-        plant.step(JointCommand(plant.stamp_ns, effort))
+        plant.apply(effort)
     state = plant.state
     assert not any(plant.saturated_ticks.values())
     inertia = reduced_dynamics(robot, state.q, np.zeros(20)).inertia

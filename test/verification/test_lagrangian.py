@@ -194,7 +194,7 @@ def test_compiled_dynamics(
         expected = np.asarray(np.linalg.solve(motion.inertia, right), dtype=np.float64)
         found = (stepper.step(q_pin, v, torque)[1] - v) / h
         desired = np.array([q_pin[BASE_NQ:], v[BASE_NV:], expected[BASE_NV:]])  # no error of tracking
-        effort = efforts(q_pin, v, desired, np.ones(2))
+        effort = efforts(q_pin, v, desired, np.ones_like(desired[:2]))
         worst_cond = max(worst_cond, _cond(motion.inertia))
         return _relative(found / weights, expected / weights), _relative(effort, torque)
 

@@ -19,7 +19,7 @@ from sms_handover.run_data import RunData
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.simulation.wiring import make_plant
-from sms_handover.types import Array, JointCommand
+from sms_handover.types import Array
 from sms_handover.units import ns_to_seconds
 from test.verification.conftest import Record, Table
 
@@ -69,7 +69,7 @@ def _our_plant(scenario: Scenario, hold: int, step: int) -> Callable[[Array], St
 
     def apply(effort: Array) -> State:
         for _ in range(hold // step):
-            plant.step(JointCommand(plant.stamp_ns, effort))
+            plant.apply(effort)
         state = plant.state
         return state.q, state.v
 

@@ -38,8 +38,11 @@ class TaskSpacePd:
     """
 
     def __init__(self, robot: RobotModel, gains: TaskSpaceGains | None = None) -> None:
-        gains = gains or TaskSpaceGains()
         self._robot = robot
+        self.use(gains or TaskSpaceGains())
+
+    def use(self, gains: TaskSpaceGains) -> None:
+        """Switch to other gains."""
         self._stiffness = np.repeat([gains.stiffness, gains.angular_stiffness], 3)
         self._damping = np.repeat([gains.damping, gains.angular_damping], 3)
         self._joint_damping = gains.joint_damping

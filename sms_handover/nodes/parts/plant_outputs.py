@@ -70,12 +70,12 @@ class PlantOutputs:
         """Publish what nobody in the loop waits for: tools, momenta, energy, the clock."""
         now_ns, publish = plant.stamp_ns, self._publish
         if with_reference:
-            receipt = plant.receipt
+            conserved = plant.conserved
             for arm, pose in plant.tools_in_world.items():
                 publish[tool_pose(arm)](self._pose_codec.pack(now_ns, pose_row(pose)))
-            energy = np.array([receipt.kinetic_energy, plant.work])
-            publish[LINEAR_MOMENTUM](self._vector_codec.pack(now_ns, receipt.linear_momentum))
-            publish[ANGULAR_MOMENTUM](self._vector_codec.pack(now_ns, receipt.angular_momentum))
+            energy = np.array([conserved.kinetic_energy, plant.work])
+            publish[LINEAR_MOMENTUM](self._vector_codec.pack(now_ns, conserved.linear_momentum))
+            publish[ANGULAR_MOMENTUM](self._vector_codec.pack(now_ns, conserved.angular_momentum))
             publish[ENERGY](self._energy_codec.pack(now_ns, energy))
         if now_ns % CLOCK_PERIOD_NS == 0:
             publish[CLOCK](head(now_ns))

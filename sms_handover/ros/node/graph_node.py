@@ -46,6 +46,7 @@ class GraphNode(LifecycleNode, Generic[P]):
         transport = EXECUTOR
         try:
             self.common: CommonParameters = declare(self, CommonParameters, "common.yaml", EVERY_NODE)
+            group = self.parameter_group(group)
             self.parameters: P = declare(self, group, f"{name}.yaml" if shipped else None, name)
             reject_unknown(self, CommonParameters, group)
             transport = self.common.transport
@@ -61,6 +62,10 @@ class GraphNode(LifecycleNode, Generic[P]):
         )
 
     # Hooks
+
+    def parameter_group(self, group: type[P]) -> type[P]:
+        """Return the parameters to declare, which may depend on those given; raises ConfigurationError."""
+        return group
 
     def prepare(self) -> None:
         """Make what the node needs beyond its part in the run; raises SmsHandoverError."""

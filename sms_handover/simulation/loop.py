@@ -1,0 +1,218 @@
+"""The loop as an object: plant, trajectory, inverse kinematics and controller of a scenario, tick by tick."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from sms_handover.control.law import Need
+from sms_handover.control.protocol import CheckedController, Controller, Guidance
+from sms_handover.control.registry import law_named
+from sms_handover.errors import ConfigurationError
+from sms_handover.graph.events import RunEvent
+from sms_handover.graph.topics import CONTROLLER
+from sms_handover.ik.levenberg_marquardt import find_joints
+from sms_handover.model.conserved import ConservedQuantities
+from sms_handover.simulation.scenario import Scenario, load_scenario
+from sms_handover.simulation.snapshot import Snapshot, controller_data, restore_controller
+from sms_handover.simulation.wiring import make_controller, make_plant
+from sms_handover.trajectory.generator import TrajectoryGenerator
+from sms_handover.types import (
+    Array,
+    DeputyState,
+    GraspEvent,
+    IkStatus,
+    JointReference,
+    Pose,
+    RobotState,
+    TaskPhase,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Period:
+    """What is worked out once per reference period, at the instant at which it begins.
+
+    Tool poses and targets are in ``world``; ``work`` J is that of the joint efforts since the start;
+    ``ik_status`` is None where no tool had a target. ``events`` has what came of grasp commands,
+    ``decisions`` what was decided about the task.
+    """
+
+    phase: TaskPhase
+    reference: JointReference
+    targets_in_world: Mapping[str, Pose]
+    tools_in_world: Mapping[str, Pose]
+    deputy: DeputyState
+    conserved: ConservedQuantities
+    work: float
+    ik_status: IkStatus | None
+    events: tuple[GraspEvent, ...]
+    decisions: tuple[RunEvent, ...]
+
+
+class Observation(NamedTuple):
+    """One tick: the state at ``stamp_ns``, and the efforts (n,) N m that answer it.
+
+    ``q`` (7 + n,), ``v`` (6 + n,) and ``joint_effort`` (n,) are those of :attr:`state`. ``period`` is there
+    at the instants at which a reference period begins.
+    """
+
+    stamp_ns: int
+    q: Array
+    v: Array
+    joint_effort: Array
+    effort: Array
+    guidance: Guidance
+    period: Period | None
+
+    @property
+    def phase(self) -> TaskPhase:
+        """The phase in force."""
+        return self.guidance.phase
+
+    @property
+    def reference(self) -> JointReference:
+        """The joint reference in force."""
+        return self.guidance.reference
+
+    @property
+    def state(self) -> RobotState:
+        """The state that was answered."""
+        return RobotState(self.stamp_ns, self.q, self.v, self.joint_effort)
+
+    @property
+    def events(self) -> tuple[GraspEvent, ...]:
+        """What came of the grasp commands of this tick."""
+        return self.period.events if self.period else ()
+
+
+class Loop:
+    """A run that is advanced tick by tick, observed, and branched by snapshots.
+
+    A tick: the state is there; each reference period the trajectory gives phase, targets and, by inverse
+    kinematics, the joint reference, and the plant executes grasp commands; the controller answers; the plant
+    integrates. The last state is answered, but not integrated. Results of grasps and inverse kinematics
+    reach the trajectory in the next period. The run integrates ``last_tick`` ticks, other than at first after
+    a retry or failure of the task; it is ``finished`` once the last state has been answered.
+    """
+
+    def __init__(self, scenario: Scenario | None = None, controller: Controller | None = None) -> None:
+        """Make the loop of a scenario, by default the shipped one; ``controller`` replaces that of its law.
+
+        Raises ConfigurationError where the scenario cannot be run, and where its controller is external and
+        none is given.
+        """
+        self.scenario = scenario or load_scenario()
+        parameters, robot, schedule = self.scenario.parameters, self.scenario.robot, self.scenario.schedule
+        self._common = parameters.common
+        self._plant = make_plant(robot, schedule, self._common, parameters.plant)
+        self._generator = TrajectoryGenerator(robot, schedule, parameters.trajectory)
+        self._per_reference = self._common.ticks_per_reference
+        self._controller: Controller
+        if controller is not None:
+            self.law, self._aims = type(controller).__qualname__, True
+            self._controller = CheckedController(controller, robot.joint_names)
+        elif CONTROLLER in self._common.external:
+            raise ConfigurationError(
+                "the controller is external: give simulate() a controller, "
+                "or check a recording with 'sms-handover play --closed-loop'"
+            )
+        else:
+            self.law = parameters.controller.law
+            self._aims = Need.TOOL_TARGETS in law_named(self.law).needs
+            self._controller = make_controller(robot, schedule, self._common, parameters.controller)
+        self.reset()
+
+    def reset(self, seed: int = 0) -> None:
+        """Go back to the start; ``seed`` is that of every random stream and is kept by snapshots."""
+        self.seed = seed
+        self._plant.reset()
+        self._generator.reset()
+        self._controller.reset()
+        schedule, rest = self.scenario.schedule, self._plant.state
+        phase = TaskPhase(0, 0, schedule.phases[0].name, end_ns=schedule.end_ns)
+        reference = JointReference(0, rest.joint_position, rest.joint_velocity)
+        self._guidance = Guidance(phase, reference, {})  # until the first one comes
+        self.last_tick = self._common.last_tick(schedule.end_ns)
+        self.finished = False
+
+    @property
+    def state(self) -> RobotState:
+        """The state that the next tick begins with."""
+        return self._plant.state
+
+    @property
+    def deputy(self) -> DeputyState:
+        """The deputy at the same instant."""
+        return self._plant.deputy
+
+    def advance(self) -> Observation:
+        """Carry out one tick; raises ConfigurationError after the last one.
+
+        Raises ControllerError unless the efforts of a user's controller are finite.
+        """
+        plant = self._plant
+        if self.finished:
+            raise ConfigurationError(f"the run ended at {plant.stamp_ns} ns: reset or restore the loop first")
+        tick, stamp_ns, q, v, acted = plant.tick, plant.stamp_ns, plant.q, plant.v, plant.joint_effort
+        period = None if tick % self._per_reference else self._begin_period()
+        effort = self._controller.effort(stamp_ns, q, v)
+        if tick < self.last_tick:
+            plant.apply(effort)
+        else:
+            self.finished = True
+        return Observation(stamp_ns, q, v, acted, effort, self._guidance, period)
+
+    def advance_period(self) -> tuple[Observation, ...]:
+        """Carry out the ticks up to the next reference period, or to the end of the run."""
+        ticks = [self.advance()]
+        while not self.finished and self._plant.tick % self._per_reference:
+            ticks.append(self.advance())
+        return tuple(ticks)
+
+    def snapshot(self) -> Snapshot:
+        """Return all that the rest of the run depends on besides the scenario.
+
+        Raises ControllerError if the controller does not tell its state.
+        """
+        controller = controller_data(self._controller, self.law)
+        plant, trajectory = self._plant.snapshot(), self._generator.snapshot()
+        return Snapshot(self.seed, plant, trajectory, self.law, controller, self._guidance, self.finished)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot: the rest of the run is the same bit for bit.
+
+        Under another law than that of the snapshot the controller begins here, with the guidance in force.
+        Raises ConfigurationError if the snapshot is of another robot or schedule.
+        """
+        self._plant.restore(snapshot.plant)
+        self._generator.restore(snapshot.trajectory)
+        self._guidance, phase = snapshot.guidance, snapshot.guidance.phase
+        self.last_tick = self._common.last_tick(phase.end_ns, failed=phase.failed)
+        self.seed, self.finished = snapshot.seed, snapshot.finished
+        self._controller.reset()
+        if snapshot.law == self.law:
+            restore_controller(self._controller, snapshot.controller)
+        elif snapshot.plant.tick:
+            self._controller.guide(self._guidance)
+
+    def _begin_period(self) -> Period:
+        """Guide the controller and execute the grasp commands of this instant."""
+        plant, generator, robot = self._plant, self._generator, self.scenario.robot
+        state, deputy = plant.state, plant.deputy
+        tools, conserved = plant.tools_in_world, plant.conserved
+        phase, targets = generator.targets(state, deputy.deputy_in_world)
+        request = generator.ik_request(state, targets)
+        asked = bool(request.tool_in_world)
+        solution = find_joints(robot, request, self.scenario.parameters.ik) if asked else None
+        joints = solution.joint_position if solution else targets.joint_position
+        reference, aims = generator.reference(state, targets, joints)
+        self._guidance = Guidance(phase, reference, aims if self._aims else {})
+        self._controller.guide(self._guidance)
+        events = plant.execute(phase.commands)
+        generator.grasped(events)
+        status = solution.status if solution else None
+        if status:
+            generator.solved(converged=status is IkStatus.CONVERGED)
+        self.last_tick = self._common.last_tick(phase.end_ns, failed=phase.failed)
+        decisions = generator.take_decisions()
+        return Period(phase, reference, aims, tools, deputy, conserved, plant.work, status, events, decisions)
