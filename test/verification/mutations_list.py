@@ -144,7 +144,7 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "block of the mass matrix transposed",
         "model/reduced",
-        "inertia[BASE_NV:, :BASE_NV].T * yielding[:, np.newaxis]",
+        "inertia[:BASE_NV, BASE_NV:] * yielding[:, np.newaxis]",
         "inertia[BASE_NV:, :BASE_NV].reshape(BASE_NV, -1) * yielding[:, np.newaxis]",
         "nmpc",
     ),
