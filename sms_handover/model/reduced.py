@@ -50,7 +50,7 @@ def reduced_inverse_dynamics(robot: RobotModel, q: Array, v: Array, joint_accele
     inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.LOCAL)
     solver = robot.base_solver.compute(inertia[:BASE_NV, :BASE_NV])
     yielding = solver.solve(forces[:BASE_NV])  # -a_b
-    coupled = inertia[BASE_NV:, :BASE_NV].T * yielding[:, np.newaxis]  # (6, n), summed row by row
+    coupled = inertia[:BASE_NV, BASE_NV:] * yielding[:, np.newaxis]  # (6, n), summed row by row
     efforts: Array = forces[BASE_NV:] - np.add.reduce(coupled)
     return efforts
 

@@ -77,20 +77,21 @@ class LieGroupIntegrator:
         the base position, and rounding is smallest there.
         """
         model, sums, term, row = self._model, self._sums, self._term, self._row
+        multiply, add = np.multiply, np.add
         start = q.copy()
         start[:3] = 0.0  # m
         configurations = [start]
         row[:] = v
-        np.multiply(self._weights[0], row, sums)
+        multiply(self._weights[0], row, sums)
         row[:] = acceleration(start, v)
-        np.multiply(self._weights[1], row, term)
-        np.add(sums, term, sums)
+        multiply(self._weights[1], row, term)
+        add(sums, term, sums)
         for origin, motion, velocity, weights in self._stages:
             q_stage = pin.integrate(model, configurations[origin], motion)
             configurations.append(q_stage)
             row[:] = acceleration(q_stage, velocity)
-            np.multiply(weights, row, term)
-            np.add(sums, term, sums)
+            multiply(weights, row, term)
+            add(sums, term, sums)
         for motion in self._ends:
             q = pin.integrate(model, q, motion)
         return frozen(q), frozen(self._end_velocity.copy())

@@ -144,7 +144,7 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "block of the mass matrix transposed",
         "model/reduced",
-        "inertia[BASE_NV:, :BASE_NV].T * yielding[:, np.newaxis]",
+        "inertia[:BASE_NV, BASE_NV:] * yielding[:, np.newaxis]",
         "inertia[BASE_NV:, :BASE_NV].reshape(BASE_NV, -1) * yielding[:, np.newaxis]",
         "nmpc",
     ),
@@ -437,6 +437,28 @@ BREAKS: tuple[Break, ...] = (
         "self._track.restart()",
         "self._track.restart",
         "controller",
+    ),
+    # the loop and its snapshots
+    _core(
+        "a snapshot restored without the integral",
+        "control/controller",
+        "self._law.restore(state.memory)",
+        "self._law.restore(0.0 * state.memory)",
+        "loop",
+    ),
+    _core(
+        "a snapshot restored without the grasps that are not answered yet",
+        "trajectory/task_progress",
+        "for index, commands, answers in state.issues",
+        "for index, commands, answers in state.issues[:0]",
+        "loop",
+    ),
+    _core(
+        "gains that a schedule gives to a law of another package not taken over",
+        "simulation/wiring",
+        "phase.gains.get(law.name, {})",
+        "phase.gains.get(law.name, {}) if law.name in SHIPPED else {}",
+        "registry",
     ),
     # inverse kinematics
     _core(
