@@ -55,7 +55,7 @@ coal through Pinocchio, and agree with closed forms (`test/core/test_clearance.p
 ## Least distance in the shipped handover
 
 Signed distance in mm and when it was; **bold** is a collision: less than zero, or less than -1 mm where
-contact of gripper and deputy is declared. The columns are control law and time law.
+contact of gripper and deputy is declared: "contact". The columns are control law and time law.
 
 {table(["Bodies", *runs], distances)}
 

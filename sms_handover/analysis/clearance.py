@@ -140,14 +140,14 @@ class _Course:
         held_before = np.logical_or.accumulate(holding)
         declared = self._declared(arm, holding, distances)
         stages = {
-            "before its grasp": ~held_before,
+            "before grasp": ~held_before,
             "held": holding,
-            "after it let go": held_before & ~holding,
+            "after release": held_before & ~holding,
         }
         for stage, rows in stages.items():
             name = f"gripper {arm} - deputy, {stage}"
             yield name, False, rows & ~declared
-            yield f"{name}, contact declared", True, rows & declared
+            yield f"{name} (contact)", True, rows & declared
 
     def refined(self, pair: int, rows: Rows, distances: Array) -> tuple[float, int]:
         """Return the least distance m of a pair while ``rows`` hold, to the tick, and its stamp in ns."""

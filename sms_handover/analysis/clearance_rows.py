@@ -37,7 +37,7 @@ def _distance_rows(found: Sequence[RunClearance | None]) -> tuple[Row, ...]:
 
 
 def _label(group: GroupClearance) -> str:
-    return f"{group.group}, allowed {group.allowed * MM_PER_M:g}" if group.allowed else group.group
+    return f"{group.group} > {group.allowed * MM_PER_M:g}" if group.allowed else group.group
 
 
 def _distance(group: GroupClearance | None) -> str:

@@ -204,7 +204,7 @@ def _earlier_run_aside(folder: Path) -> Iterator[None]:
     place = folder.resolve()
     aside = place.with_name(f".{place.name}_before_{os.getpid()}")
     try:
-        with locked_logs(place):
+        with locked_logs(folder):
             place.rename(aside)
     except OSError as error:
         raise ConfigurationError(f"output folder {folder} cannot be replaced: {error.strerror}") from error

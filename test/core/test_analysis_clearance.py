@@ -14,7 +14,7 @@ from sms_handover.simulation.scenario import Scenario
 from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus
 from sms_handover.units import MM_PER_M, ns_to_seconds
 
-BEFORE, AFTER = "before its grasp", "after it let go"
+BEFORE, AFTER = "before grasp", "after release"
 
 
 def clearance(run: RunData, scenario: Scenario, schedule: str = "") -> RunClearance:
@@ -34,13 +34,13 @@ MEASURED: dict[str, list[tuple[tuple[str, ...], float, float]]] = {
         (("gripper arm_a - gripper arm_b",), 111.9, 24.72),
         (("gripper arm_a - deputy", BEFORE), -6.8, 2.38),
         (("gripper arm_b - deputy", BEFORE), -6.0, 24.68),
-        (("gripper arm_a - deputy", AFTER, "declared"), -10.0, 41.08),
+        (("gripper arm_a - deputy", AFTER, "contact"), -10.0, 41.08),
     ],
     "pid": [
         (("gripper arm_a - gripper arm_b",), -55.4, 22.06),
         (("gripper arm_a - deputy", BEFORE), -30.4, 3.64),
         (("gripper arm_b - deputy", BEFORE), -60.0, 21.78),
-        (("gripper arm_a - deputy", AFTER, "declared"), -44.6, 40.54),
+        (("gripper arm_a - deputy", AFTER, "contact"), -44.6, 40.54),
         (("arm_a itself",), 32.7, 29.24),
     ],
 }
@@ -102,7 +102,7 @@ def test_contact_is_declared_from_the_phase_on_that_leads_to_a_grasp_frame(
     """The same motion, with a target in the world in the place of the grasp frame, may not touch at all."""
     run = short(nmpc_run, 150)
     declared = group(clearance(run, scenario), "gripper arm_a - deputy")
-    assert "declared" in declared.group and declared.allowed == -0.001
+    assert "contact" in declared.group and declared.allowed == -0.001
     elsewhere = scenario.schedule.text.replace("arm_a: {grasp_frame: end_a}", "arm_a: hold")
     counted = group(clearance(run, scenario, schedule=elsewhere), "gripper arm_a - deputy")
     assert (counted.least, counted.allowed) == (declared.least, 0.0)

@@ -106,7 +106,7 @@ def test_keys_know_their_lines_and_come_back_as_yaml() -> None:
 
 
 PARAMETERS = {
-    "a wrong type": ("controller:\n  ros__parameters:\n    law: 3\n", r"p.yaml:3: parameter 'law' is 3"),
+    "a wrong type": ("controller:\n  ros__parameters:\n    law: 3\n", r"p.yaml:3: parameter 'law': unknown"),
     "out of range": ("plant:\n  ros__parameters:\n    resend_after: -1.0\n", r"p.yaml:3: parameter 'resend_"),
     "an unknown one": (
         "controller:\n  ros__parameters:\n    lwa: pid\n",

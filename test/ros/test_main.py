@@ -92,7 +92,7 @@ def test_an_error_of_the_making_is_one_line(capfd: pytest.CaptureFixture[str]) -
 
 def test_the_name_of_the_node_is_told_once(capfd: pytest.CaptureFixture[str]) -> None:
     assert MAINS["controller"](["controller", "--ros-args", "-p", "law:=fast"]) == EXIT_USAGE
-    assert capfd.readouterr().err.startswith("controller: error: parameter 'law': unknown value 'fast'")
+    assert capfd.readouterr().err.startswith("controller: error: parameter 'law': unknown control law 'fast'")
 
 
 def test_a_bug_is_not_hidden() -> None:
@@ -142,7 +142,7 @@ def test_a_node_ends_when_its_launcher_has_ended(monkeypatch: pytest.MonkeyPatch
 
 
 BAD: dict[str, tuple[str, ...]] = {
-    "controller": ("law:=fast", "unknown value 'fast'"),
+    "controller": ("law:=fast", "unknown control law 'fast'"),
     "plant": ("grasp_position_tolerance:=-0.01", "-0.01 m, must be >= 0 m"),
     "trajectory": ("time_law:=cubic", "unknown value 'cubic'"),
     "ik": ("max_iterations:=0", "is 0, must be >= 1"),
