@@ -55,6 +55,7 @@ def test_the_first_edition_s_handover_collides_as_measured(
         item = group(found, *words)
         assert least_mm - 0.25 <= item.least * MM_PER_M <= least_mm + 0.05
         assert ns_to_seconds(item.stamp_ns) == pytest.approx(time_s, abs=0.02)
+    assert any(AFTER in item.group and "contact" not in item.group for item in found.groups)
     assert len(found.collisions) == {"nmpc": 3, "pid": 5}[law]
     assert [item.collides for item in found.groups] == sorted(
         [item.collides for item in found.groups], reverse=True

@@ -610,4 +610,33 @@ BREAKS: tuple[Break, ...] = (
         "effort[k] = tick.effort",
         "analysis_runs",
     ),
+    # clearance
+    _core(
+        "distances told of other pairs",
+        "clearance/distances",
+        "for a, b in pairs)",
+        "for a, b in reversed(pairs))",
+        "clearance",
+    ),
+    _core(
+        "shapes left where the robot stood at zero",
+        "clearance/distances",
+        "self._geometry, self._results, q)",
+        "self._geometry, self._results, pin.neutral(self._model))",
+        "clearance",
+    ),
+    _core(
+        "a held deputy left behind by its tool",
+        "analysis/clearance",
+        "return pose_of(self._tool(holder, q) * tool_then.actInv(begin))",
+        "return pose_of(begin)",
+        "analysis_clearance",
+    ),
+    _core(
+        "contact declared for ever after a release",
+        "analysis/clearance",
+        "(declared[row - 1] and distances[row] <= 0.0)",
+        "declared[row - 1]",
+        "analysis_clearance",
+    ),
 )
