@@ -78,7 +78,7 @@ def test_a_check_and_a_report_take_one_line_of_any_terminal(columns: int, tmp_pa
         shown = lines_of(terminal)
     (line,) = [line for line in shown if line.startswith("checking  ")]
     assert ", 100 %" in line and len(line) <= columns
-    assert "is complete:" in "".join(shown)
+    assert "iscomplete:" in "".join(shown).replace(" ", "")  # wrapped where the path of the bag is long
     arguments = ["report", str(BAG), "-o", "p.html"]
     program = f"import os\nos.chdir({str(tmp_path)!r})\n" + COMMAND.format(arguments=arguments)
     with Terminal(program, columns, TERM="xterm") as terminal:
