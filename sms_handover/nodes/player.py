@@ -90,6 +90,8 @@ class PlayerNode(RunnableNode):
             missing = self._unacknowledged(stop)
         if missing:
             print(f"not acknowledged by a subscriber of: {', '.join(missing)}", file=sys.stderr)
+        for text in self._info.missing:
+            print(f"not played: {text}", file=sys.stderr)
         if self._left_out:
             print(f"{self._left_out} messages of the bag were not played, see above", file=sys.stderr)
         if stop.asked:
@@ -110,8 +112,6 @@ class PlayerNode(RunnableNode):
         overrides = read_overrides(Path(options.qos_overrides)) if options.qos_overrides else {}
         renamed = {absolute(old): new for old, new in (rule.split(":=") for rule in options.rename)}
         publishers, skipped = make_publishers(self, chosen, overrides, renamed)
-        for text in info.missing:
-            print(f"not played: {text}", file=sys.stderr)
         for (topic, _), reason in skipped.items():
             _report_left_out(topic, reason)
         self._left_out = sum(item.message_count for item in chosen if (item.name, item.type) in skipped)
