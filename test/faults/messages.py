@@ -237,7 +237,11 @@ FAULTS = (
         "did you mean 'duration'?",
     ),
     _file(
-        "schedule-bomb", "a schedule of aliases of aliases", _bomb, _SCHEDULE, "too large with its aliases expanded"
+        "schedule-bomb",
+        "a schedule of aliases of aliases",
+        _bomb,
+        _SCHEDULE,
+        "its aliases expanded",
     ),
     _file("schedule-huge", "a schedule of 10 MB", lambda: "#" * 10**7, _SCHEDULE, "more than"),
     _file(
