@@ -33,7 +33,7 @@ class RecordedRun:
         """Return the wall-clock record of the run, read from the bag on first use."""
         return read_loop(self.info.path)
 
-    @property
+    @cached_property
     def texts(self) -> TaskTexts | None:
         """What the run was made with, None if the bag does not carry it or carries something else."""
         urdf, schedule = self.info.urdf_text, self.info.schedule_text

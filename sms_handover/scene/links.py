@@ -3,8 +3,8 @@
 import numpy as np
 import pinocchio as pin
 
-from sms_handover.errors import RobotDescriptionError, UnknownNameError
 from sms_handover.frames import tool_frame
+from sms_handover.model.floating_model import floating_model, joint_columns
 from sms_handover.model.poses import pose_of, pose_row
 from sms_handover.model.robot_model import BASE_NQ
 from sms_handover.types import Array
@@ -15,10 +15,7 @@ class DescribedRobot:
 
     def __init__(self, urdf: str) -> None:
         """Parse the text; raises RobotDescriptionError if it describes no robot."""
-        try:
-            self.pin = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
-        except (ValueError, RuntimeError) as error:
-            raise RobotDescriptionError(f"the robot description cannot be read: {error}") from error
+        self.pin = floating_model(urdf)
         self._frames = [i for i, f in enumerate(self.pin.frames) if f.type == pin.FrameType.BODY]
         self.links: tuple[str, ...] = tuple(self.pin.frames[index].name for index in self._frames)
 
@@ -39,7 +36,7 @@ class DescribedRobot:
         ``base_in_world`` is (T, 7) and ``joint_position`` (T, n) rad in the order of ``joint_names``.
         Raises UnknownNameError if the description lacks one of them.
         """
-        columns = [self._configuration_index(name) for name in joint_names]
+        columns = joint_columns(self.pin, joint_names)
         q = pin.neutral(self.pin)
         data = self.pin.createData()
         poses = np.empty((len(base_in_world), len(self._frames), 7))
@@ -50,9 +47,3 @@ class DescribedRobot:
             for place, index in enumerate(self._frames):
                 poses[row, place] = pose_row(pose_of(data.oMf[index]))
         return poses
-
-    def _configuration_index(self, joint: str) -> int:
-        """Return the index of a joint's angle in the configuration."""
-        if joint not in self.joint_names:
-            raise UnknownNameError("joint", joint, self.joint_names, "robot description")
-        return int(self.pin.joints[self.pin.getJointId(joint)].idx_q)
