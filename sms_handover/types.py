@@ -131,6 +131,23 @@ class JointCommand:
         freeze(self, "effort")
 
 
+@dataclass(frozen=True, eq=False)
+class TickRows:
+    """Ticks as arrays, a row each: stamps (k,) ns, q (k, 7 + n), v (k, 6 + n), and efforts (k, n) N m.
+
+    ``joint_effort`` acted up to the state, ``effort`` answers it.
+    """
+
+    stamp_ns: npt.NDArray[np.int64]
+    q: Array
+    v: Array
+    joint_effort: Array
+    effort: Array
+
+    def __len__(self) -> int:
+        return len(self.stamp_ns)
+
+
 class IkStatus(Enum):
     """How an inverse-kinematics solve ended; the value is what a user reads."""
 

@@ -1,5 +1,6 @@
 """Compiler: builds shared libraries from C code and caches them."""
 
+import fcntl
 import hashlib
 import logging
 import os
@@ -9,7 +10,8 @@ import shutil
 import stat
 import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from sms_handover.errors import ConfigurationError
@@ -36,9 +38,27 @@ def library_of(what: str, identity: bytes, source: Callable[[], str]) -> Path:
     key = hashlib.sha256(b"\0".join([identity, *(part.encode() for part in parts)]))
     library = folder / f"{what}-{key.hexdigest()[:32]}.so"
     if not library.exists():
-        _LOG.warning("compiling the %s of this robot: some seconds, once", what.replace("_", " "))
-        _compile(command, source(), library)
+        with _alone(folder):
+            if not library.exists():  # nobody else has made it meanwhile
+                named = what.replace("_", " ")
+                _LOG.warning("compiling the %s of robots of this kind: some seconds, once", named)
+                _compile(command, source(), library)
     return library
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Keep other processes from compiling into a folder at the same time.
+
+    A file system without locks only costs work: a library is moved into its place as a whole.
+    """
+    held = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):
+            fcntl.flock(held, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(held)
 
 
 def _compiler() -> list[str]:

@@ -1,25 +1,21 @@
 """Compiled dynamics: what plant and controller use in place of Pinocchio's algorithms."""
 
-import hashlib
-from importlib import import_module
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from sms_handover.compiled.c_function import CFunction
-from sms_handover.compiled.compiler import library_of
-from sms_handover.compiled.tree import Body, body_tree
+from sms_handover.compiled.library import dynamics_library
+from sms_handover.compiled.names import COMPUTED_TORQUE, step_name
+from sms_handover.compiled.tree import body_tree, inertial_parameters
 from sms_handover.control.computed_torque import ComputedTorque
-from sms_handover.errors import ConfigurationError, MissingDependencyError
+from sms_handover.errors import ConfigurationError
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
-from sms_handover.plant.integrators import Tableau
+from sms_handover.plant.integrators import TABLEAUS, Tableau
 from sms_handover.plant.stepper import PinocchioStepper
 from sms_handover.types import Array, frozen
 
-_STEP, _COMPUTED_TORQUE = "step", "computed_torque"  # names of the C functions
 _TOLERANCE = 1e-9  # [-] of the largest value; rounding leaves 1e-14
 _SEED = 0
 _EXAMPLE_S = 1e-3  # [s] short, so that rounding is not amplified by a light wrist
@@ -30,13 +26,16 @@ class CompiledStepper:
 
     def __init__(self, robot: RobotModel, tableau: Tableau, h: float) -> None:
         """Compile the step unless cached, and compare it with Pinocchio; raises ConfigurationError."""
-        library = _library(_STEP, robot, tableau)
+        scheme = next((name for name, known in TABLEAUS.items() if known == tableau), "")
+        library = dynamics_library(robot) if scheme else dynamics_library(robot, {scheme: tableau})
         size = robot.n_joints
-        self._q, self._v, self._u = np.zeros(BASE_NQ + size), np.zeros(BASE_NV + size), np.zeros(size)
+        self._q, self._v = np.zeros(BASE_NQ + size), np.zeros(BASE_NV + size)
+        self._force = np.zeros(BASE_NV + size)  # no wrench on the base
         self._q_next, self._v_next = np.zeros_like(self._q), np.zeros_like(self._v)
         duration = np.array([_EXAMPLE_S])
-        arguments = (self._q, self._v, self._u, duration)
-        self._function = CFunction(library, _STEP, arguments, (self._q_next, self._v_next))
+        parameters = inertial_parameters(body_tree(robot))
+        arguments = (self._q, self._v, self._force, parameters, duration)
+        self._function = CFunction(library, step_name(scheme), arguments, (self._q_next, self._v_next))
         example = _example(robot)
         theirs = PinocchioStepper(robot, tableau, _EXAMPLE_S).step(*example)
         _require_equal(library, [*zip(self.step(*example), theirs, strict=True)])
@@ -46,7 +45,7 @@ class CompiledStepper:
         """Return configuration (7 + n,) and velocity (6 + n,) after one step, as read-only arrays."""
         self._q[:] = q
         self._v[:] = v
-        self._u[:] = effort
+        self._force[BASE_NV:] = effort
         self._function()
         return frozen(self._q_next.copy()), frozen(self._v_next.copy())
 
@@ -56,13 +55,14 @@ class CompiledComputedTorque:
 
     def __init__(self, robot: RobotModel) -> None:
         """Compile it unless cached, and compare it with Pinocchio; raises ConfigurationError."""
-        library = _library(_COMPUTED_TORQUE, robot)
+        library = dynamics_library(robot)
         size = robot.n_joints
         self._q, self._v = np.zeros(BASE_NQ + size), np.zeros(BASE_NV + size)
         self._desired, self._feedback = np.zeros((3, size)), np.zeros(2)
         self._efforts = np.zeros(size)
-        arguments = (self._q, self._v, self._desired, self._feedback)
-        self._function = CFunction(library, _COMPUTED_TORQUE, arguments, (self._efforts,))
+        parameters = inertial_parameters(body_tree(robot))
+        arguments = (self._q, self._v, self._desired, self._feedback, parameters)
+        self._function = CFunction(library, COMPUTED_TORQUE, arguments, (self._efforts,))
         q, v, wanted = _example(robot)
         desired = np.array([0.9 * q[BASE_NQ:], 0.9 * v[BASE_NV:], wanted])
         example = (q, v, desired, np.array([[2.0], [3.0]]))
@@ -77,43 +77,6 @@ class CompiledComputedTorque:
         self._function()
         efforts: Array = self._efforts.copy()
         return efforts
-
-
-def _library(name: str, robot: RobotModel, *scheme: Tableau) -> Path:
-    """Return the library of a C function for a robot, and for a scheme if it needs one."""
-    bodies = body_tree(robot)
-    identity = _identity(bodies, "".join(map(repr, scheme)))
-    return library_of(name, identity, lambda: getattr(_writer(), f"{name}_source")(name, bodies, *scheme))
-
-
-def _identity(bodies: tuple[Body, ...], scheme: str) -> bytes:
-    """Return a digest of all that the C code depends on: robot, scheme and code generator."""
-    digest = hashlib.sha256(f"{scheme} casadi {_casadi_version()}".encode())
-    for source in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(source.read_bytes())
-    for body in bodies:
-        for numbers in (body.rotation, body.place, body.axis, body.first_moment, body.inertia):
-            digest.update(np.ascontiguousarray(numbers).tobytes())
-        digest.update(np.array([body.parent, body.mass, body.rotor]).tobytes())
-    return digest.digest()
-
-
-def _writer() -> Any:
-    """Return the C code generator; CasADi is imported only where code must be generated."""
-    try:
-        return import_module("sms_handover.compiled.source")
-    except ModuleNotFoundError as error:
-        if error.name != "casadi":
-            raise
-        raise MissingDependencyError("compiled dynamics", "casadi", "compiled") from error
-
-
-def _casadi_version() -> str:
-    """Return the version of CasADi, '' without it: cached libraries do not need it."""
-    try:
-        return version("casadi")
-    except PackageNotFoundError:
-        return ""
 
 
 def _example(robot: RobotModel) -> tuple[Array, Array, Array]:

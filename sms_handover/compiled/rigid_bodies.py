@@ -66,15 +66,14 @@ class RigidBodies:
             efforts.append(ca.dot(ca.SX(body.axis), wrenches[index][1] + moment) + rotor)
         return ca.vertcat(*efforts)
 
-    def acceleration(self, efforts: Expression) -> Expression:
-        """Return v' (6 + n,) under joint efforts (n,), from H v' = (0, u) - c."""
+    def acceleration(self, force: Expression) -> Expression:
+        """Return v' (6 + n,) under a wrench on the base and joint efforts (6 + n,), from H v' = f - c."""
         wrenches = self._wrenches([0.0] * len(self._rates))
         bias = [
             ca.dot(ca.SX(body.axis), moment)
             for body, (_, moment) in zip(self._bodies[1:], wrenches[1:], strict=True)
         ]
-        right = ca.vertcat(-ca.vertcat(*wrenches[0]), efforts - ca.vertcat(*bias))
-        return _solved(self._inertia_matrix(), right)
+        return _solved(self._inertia_matrix(), force - ca.vertcat(*wrenches[0], *bias))
 
     def _carried(self, index: int, linear: Expression, angular: Expression) -> tuple[Expression, Expression]:
         """Return a twist or acceleration of the parent in the frame of a body."""

@@ -4,6 +4,7 @@ from typing import Any
 
 import casadi as ca
 
+from sms_handover.compiled.tree import PER_BODY
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV
 from sms_handover.plant.integrators import Tableau
 
@@ -11,19 +12,21 @@ _SMALL = 1e-3  # [rad^2] below, five terms of a series leave less than rounding
 
 
 def step_function(name: str, acceleration: Any, tableau: Tableau, joints: int) -> Any:
-    """Return (q, v, u, h) -> (q, v) after a step of ``h`` s; ``acceleration`` maps angles, v and u to v'.
+    """Return (q, v, f, p, h) -> (q, v) after a step of ``h`` s under a force f (6 + n,).
 
-    The sums are those of :class:`~sms_handover.plant.integrators.LieGroupIntegrator`. As accelerations do
-    not depend on the base pose, the base moves at the end of the step only.
+    ``acceleration`` maps angles, v, f and the inertial parameters p to v'. The sums are those of
+    :class:`~sms_handover.plant.integrators.LieGroupIntegrator`. As accelerations do not depend on the base
+    pose, the base moves at the end of the step only.
     """
     q, v = ca.MX.sym("q", BASE_NQ + joints), ca.MX.sym("v", BASE_NV + joints)
-    u, h = ca.MX.sym("u", joints), ca.MX.sym("h")
+    force, h = ca.MX.sym("f", BASE_NV + joints), ca.MX.sym("h")
+    parameters = ca.MX.sym("p", PER_BODY * (joints + 1))
     velocities: list[Any] = []
     accelerations: list[Any] = []
     for row in tableau.a:
         at = q[BASE_NQ:] + h * _sum(row, [velocity[BASE_NV:] for velocity in velocities])
         velocity = v + h * _sum(row, accelerations)
-        accelerations.append(acceleration(at, velocity, u))
+        accelerations.append(acceleration(at, velocity, force, parameters))
         velocities.append(velocity)
     pose, angles = q[:BASE_NQ], q[BASE_NQ:]
     move = _move()
@@ -31,7 +34,8 @@ def step_function(name: str, acceleration: Any, tableau: Tableau, joints: int) -
         motion = h * _sum(row, velocities)
         pose, angles = move(pose, motion[:BASE_NV]), angles + motion[BASE_NV:]
     total = [sum(weights) for weights in zip(*tableau.b, strict=True)]
-    return ca.Function(name, [q, v, u, h], [ca.vertcat(pose, angles), v + h * _sum(total, accelerations)])
+    given = [q, v, force, parameters, h]
+    return ca.Function(name, given, [ca.vertcat(pose, angles), v + h * _sum(total, accelerations)])
 
 
 def _sum(weights: Any, values: list[Any]) -> Any:

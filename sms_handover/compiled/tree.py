@@ -1,5 +1,6 @@
 """Body tree: the inertial and geometric data of a robot, read from its Pinocchio model."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,19 @@ class Body:
     first_moment: Array
     inertia: Array
     rotor: float
+
+
+PER_BODY = 11  # mass, first moment (3), inertia (6: xx xy xz yy yz zz), rotor
+
+
+def inertial_parameters(bodies: Sequence[Body]) -> Array:
+    """Return the inertial parameters (11 N,) of bodies, the argument of the compiled functions.
+
+    Of each: mass kg, first moment (3) kg m, inertia xx xy xz yy yz zz kg m^2 and rotor kg m^2, as in Body.
+    """
+    upper = np.triu_indices(3)
+    rows = [(body.mass, *body.first_moment, *body.inertia[upper], body.rotor) for body in bodies]
+    return read_only(np.array(rows).ravel())
 
 
 def body_tree(robot: RobotModel) -> tuple[Body, ...]:

@@ -57,6 +57,16 @@ class JointController(Generic[G]):
         return frozen(self._law.effort(q, v, self._track.at(stamp_ns), self._dt))
 
     @property
+    def law(self) -> JointLaw[G]:
+        """The law."""
+        return self._law
+
+    @property
+    def track(self) -> ReferenceTrack:
+        """The reference that is tracked."""
+        return self._track
+
+    @property
     def state(self) -> JointControllerState:
         """Everything that later efforts depend on."""
         return JointControllerState(self._entry, self._law.memory, self._track.state)

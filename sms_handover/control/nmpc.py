@@ -49,6 +49,11 @@ class NmpcLaw(JointLaw[NmpcGains]):
         self._efforts = efforts or ComputedTorque(robot)
         self.use(gains)
 
+    @property
+    def feedback(self) -> Array:
+        """The gains A_1 and A_2 of each joint, (2, n)."""
+        return self._feedback
+
     def use(self, gains: NmpcGains) -> None:
         """Switch to other gains."""
         pair = np.array([[gains.position_gain], [gains.velocity_gain]])

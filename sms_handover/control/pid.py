@@ -33,6 +33,11 @@ class PidLaw(JointLaw[PidGains]):
         self._integral = np.zeros(robot.n_joints)  # [rad s]
 
     @property
+    def gains(self) -> PidGains:
+        """The gains in use."""
+        return self._gains
+
+    @property
     def memory(self) -> Array:
         """The integral (n,) rad s."""
         return read_only(self._integral)

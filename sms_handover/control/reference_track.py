@@ -36,6 +36,21 @@ class ReferenceTrack:
         self._broken = False
 
     @property
+    def longest_ns(self) -> int | None:
+        """The age in ns up to which a reference is extrapolated, None without a bound."""
+        return self._longest_ns
+
+    @property
+    def motion(self) -> Array:
+        """The rows q_d, q_d', q_d'' (3, n) at the last reference, read-only."""
+        return self._motion
+
+    @property
+    def stamp_ns(self) -> int:
+        """The time of the last reference; raises RuntimeError if none has come."""
+        return self._latest.stamp_ns
+
+    @property
     def ready(self) -> bool:
         """Whether there is a reference."""
         return self._last is not None
@@ -71,14 +86,18 @@ class ReferenceTrack:
 
     def at(self, stamp_ns: int) -> Array:
         """Return q_d, q_d' and q_d'', the rows of (3, n), at a time not before the last reference."""
-        if self._last is None:
-            raise RuntimeError("no reference has come yet")
-        age_ns, longest_ns = stamp_ns - self._last.stamp_ns, self._longest_ns
+        age_ns, longest_ns = stamp_ns - self._latest.stamp_ns, self._longest_ns
         if longest_ns is not None and age_ns > longest_ns:
             stand = np.zeros_like(self._motion)
             stand[0] = self._carried(longest_ns)[0]
             return stand
         return self._carried(age_ns)
+
+    @property
+    def _latest(self) -> JointReference:
+        if self._last is None:
+            raise RuntimeError("no reference has come yet")
+        return self._last
 
     def _set(self, motion: Array) -> None:
         """Take over the rows q_d, q_d', q_d'' (3, n) at the last reference, and keep their derivatives."""

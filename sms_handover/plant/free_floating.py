@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from sms_handover.errors import ConfigurationError
 from sms_handover.model.conserved import ConservedQuantities, conserved_quantities
@@ -24,6 +25,8 @@ from sms_handover.types import (
     read_only,
 )
 from sms_handover.units import ns_to_seconds
+
+Counts = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +106,11 @@ class FreeFloatingPlant:
         self._deputy.restore(state.deputy)
 
     @property
+    def robot(self) -> RobotModel:
+        """The robot as it is."""
+        return self._robot
+
+    @property
     def stamp_ns(self) -> int:
         """Simulation time in ns."""
         return self.tick * self._tick_ns
@@ -165,6 +173,20 @@ class FreeFloatingPlant:
         self.tick += 1
         if not self._deputy.holder:
             self._deputy.drift(self._tick_s)
+
+    def adopt(
+        self, steps: int, q: Array, v: Array, joint_effort: Array, work: float, saturated: Counts
+    ) -> None:
+        """Take over the state that ``steps`` ticks have led to elsewhere, with the work since the start.
+
+        The arrays are read-only; ``saturated`` (n,) has the ticks of each joint at its effort limit.
+        """
+        self.tick += steps
+        self.q, self.v, self.joint_effort, self._work = q, v, joint_effort, work
+        self._saturated_ticks += saturated
+        if not self._deputy.holder:
+            for _ in range(steps):  # a sum of ticks, as one after the other makes it
+                self._deputy.drift(self._tick_s)
 
     def _limited(self, asked: Array) -> Array:
         """Return the efforts that act, and count those at their limit or beyond."""

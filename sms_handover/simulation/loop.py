@@ -14,7 +14,7 @@ from sms_handover.ik.levenberg_marquardt import find_joints
 from sms_handover.model.conserved import ConservedQuantities
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.snapshot import Snapshot, controller_data, restore_controller
-from sms_handover.simulation.wiring import make_controller, make_plant
+from sms_handover.simulation.wiring import make_controller, make_plant, make_runner
 from sms_handover.trajectory.generator import TrajectoryGenerator
 from sms_handover.types import (
     Array,
@@ -25,6 +25,7 @@ from sms_handover.types import (
     Pose,
     RobotState,
     TaskPhase,
+    TickRows,
 )
 
 
@@ -85,6 +86,23 @@ class Observation(NamedTuple):
         return self.period.events if self.period else ()
 
 
+@dataclass(frozen=True, eq=False)
+class Ticks:
+    """Ticks under one guidance, as arrays; ``period`` is there if a reference period begins with them."""
+
+    rows: TickRows
+    guidance: Guidance
+    period: Period | None
+
+    @property
+    def observations(self) -> tuple[Observation, ...]:
+        """The ticks one by one."""
+        rows = self.rows
+        columns = zip(rows.stamp_ns.tolist(), rows.q, rows.v, rows.joint_effort, rows.effort, strict=True)
+        ticks = [Observation(*column, self.guidance, None) for column in columns]
+        return (ticks[0]._replace(period=self.period), *ticks[1:])
+
+
 class Loop:
     """A run that is advanced tick by tick, observed, and branched by snapshots.
 
@@ -121,6 +139,7 @@ class Loop:
             self.law = parameters.controller.law
             self._aims = Need.TOOL_TARGETS in law_named(self.law).needs
             self._controller = make_controller(robot, schedule, self._common, parameters.controller)
+        self._runner = make_runner(self._plant, self._controller, robot, self._common, parameters.plant)
         self.reset()
 
     def reset(self, seed: int | None = None) -> None:
@@ -154,24 +173,25 @@ class Loop:
 
         Raises ControllerError unless the efforts of a user's controller are finite.
         """
+        (tick,) = self._advance(1).observations
+        return tick
+
+    def advance_period(self) -> Ticks:
+        """Carry out the ticks up to the next reference period, or to the end of the run."""
+        return self._advance(self._per_reference)
+
+    def _advance(self, most: int) -> Ticks:
+        """Carry out at most so many ticks, and none beyond the next reference period."""
         plant = self._plant
         if self.finished:
             raise ConfigurationError(f"the run ended at {plant.stamp_ns} ns: reset or restore the loop first")
-        tick, stamp_ns, q, v, acted = plant.tick, plant.stamp_ns, plant.q, plant.v, plant.joint_effort
-        period = None if tick % self._per_reference else self._begin_period()
-        effort = self._controller.effort(stamp_ns, q, v)
-        if tick < self.last_tick:
-            plant.apply(effort)
-        else:
-            self.finished = True
-        return Observation(stamp_ns, q, v, acted, effort, self._guidance, period)
-
-    def advance_period(self) -> tuple[Observation, ...]:
-        """Carry out the ticks up to the next reference period, or to the end of the run."""
-        ticks = [self.advance()]
-        while not self.finished and self._plant.tick % self._per_reference:
-            ticks.append(self.advance())
-        return tuple(ticks)
+        since = plant.tick % self._per_reference
+        period = None if since else self._begin_period()
+        left = self.last_tick - plant.tick
+        ticks = min(most, self._per_reference - since, left + 1)
+        rows = self._runner.run(ticks, min(ticks, left))
+        self.finished = ticks > left
+        return Ticks(rows, self._guidance, period)
 
     def snapshot(self) -> Snapshot:
         """Return all that the rest of the run depends on besides the scenario.

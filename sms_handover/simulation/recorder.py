@@ -9,7 +9,7 @@ from sms_handover.graph.events import RunEvent
 from sms_handover.graph.message_constants import CONSTANTS
 from sms_handover.model.poses import pose_row
 from sms_handover.run_data import RunData
-from sms_handover.simulation.loop import Observation, Period
+from sms_handover.simulation.loop import Period, Ticks
 from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, TaskPhase
 
 _NOT_ASKED = -1  # in place of a status where inverse kinematics was not asked
@@ -35,20 +35,18 @@ class RunRecorder:
         self._events: list[GraspEvent] = []
         self._decisions: list[RunEvent] = []
 
-    def add(self, tick: Observation) -> None:
-        """Add one tick."""
-        k = self._count
-        if k == len(self._rows[0]):
-            self._rows = [np.concatenate([rows, np.zeros_like(rows)]) for rows in self._rows]
-        stamps, q, v, effort, command = self._rows
-        stamps[k] = tick.stamp_ns
-        q[k] = tick.q
-        v[k] = tick.v
-        effort[k] = tick.joint_effort
-        command[k] = tick.effort
-        self._count += 1
-        if tick.period:
-            self._add_period(tick.period)
+    def add(self, ticks: Ticks) -> None:
+        """Add some ticks, and the reference period if one begins with them."""
+        rows, k = ticks.rows, self._count
+        self._count += len(rows)
+        while self._count > len(self._rows[0]):
+            self._rows = [np.concatenate([kept, np.zeros_like(kept)]) for kept in self._rows]
+        for kept, new in zip(
+            self._rows, (rows.stamp_ns, rows.q, rows.v, rows.joint_effort, rows.effort), strict=True
+        ):
+            kept[k : self._count] = new
+        if ticks.period:
+            self._add_period(ticks.period)
 
     def _add_period(self, period: Period) -> None:
         """Add what a reference period begins with."""

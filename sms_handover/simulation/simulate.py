@@ -27,8 +27,8 @@ def simulate(
     robot = loop.scenario.model.robot
     recorder = RunRecorder(robot.joint_names, robot.arms, loop.last_tick + 1)
     while not loop.finished:
-        tick = loop.advance()
-        recorder.add(tick)
-        if progress and tick.period:
-            progress(tick.stamp_ns, tick.phase)
+        ticks = loop.advance_period()
+        recorder.add(ticks)
+        if progress and ticks.period:
+            progress(ticks.period.phase.stamp_ns, ticks.period.phase)
     return recorder.data()

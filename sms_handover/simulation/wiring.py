@@ -1,10 +1,12 @@
 """Wiring: makes plant and controller of a scenario, for nodes and for one process alike."""
 
+import logging
 from typing import Any
 
 import numpy as np
 
 from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
+from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.control.computed_torque import ComputedTorque
 from sms_handover.control.law import LawSetup, Need
 from sms_handover.control.parameters import ControllerParameters, gains_of
@@ -18,9 +20,12 @@ from sms_handover.plant.integrators import TABLEAUS, Tableau
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.plant.stepper import PinocchioStepper, Stepper
 from sms_handover.simulation.parameters import COMPILED, CommonParameters
+from sms_handover.simulation.period_runner import PeriodRunner, PythonRunner
 from sms_handover.trajectory.schedule import Schedule
 from sms_handover.types import Array
 from sms_handover.units import ns_to_seconds, seconds_to_ns
+
+_LOG = logging.getLogger(__name__)
 
 
 def initial_joints(robot: RobotModel, schedule: Schedule) -> Array:
@@ -80,6 +85,27 @@ def make_controller(
     longest_ns = longest_reference_ns(common, parameters)
     controller = law.make(LawSetup(robot, gains, common.tick_ns, longest_ns, computed_torque))
     return controller if law.name in SHIPPED else CheckedController(controller, robot.joint_names)
+
+
+def make_runner(
+    plant: FreeFloatingPlant,
+    controller: Controller,
+    known: RobotModel,
+    common: CommonParameters,
+    parameters: PlantParameters,
+) -> PeriodRunner:
+    """Return what carries out the ticks of a period: C where dynamics are compiled and the law is ours.
+
+    ``known`` is the robot as the law knows it. Raises ConfigurationError.
+    """
+    if common.dynamics != COMPILED:
+        return PythonRunner(plant, controller)
+    if not CompiledTicks.fits(plant, controller, known):
+        _LOG.warning(
+            "ticks are carried out by Python: C has only our own laws, and truth and model with joints alike"
+        )
+        return PythonRunner(plant, controller)
+    return CompiledTicks(plant, controller, known, parameters.integrator, common.tick_ns)
 
 
 def longest_reference_ns(common: CommonParameters, parameters: ControllerParameters) -> int:

@@ -182,7 +182,7 @@ def test_a_library_is_made_once(
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     CompiledComputedTorque(robot)
     assert [record.message.split(":")[0] for record in caplog.records] == [
-        "compiling the computed torque of this robot"
+        "compiling the computed torque of robots of this kind"
     ]
     (library,) = (tmp_path / "sms_handover").iterdir()
     made = library.stat()

@@ -69,7 +69,7 @@ def test_the_loop_shows_what_simulate_records(overrides: Overrides) -> None:
         loop.reset()
         rows = 0
         while not loop.finished:
-            ticks = loop.advance_period()
+            ticks = loop.advance_period().observations
             period = ticks[0].period
             assert period is not None and not any(tick.period for tick in ticks[1:])
             for tick in ticks:

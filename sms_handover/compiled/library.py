@@ -1,0 +1,62 @@
+"""Library of a kind of robot: the C code of its equations, compiled once for all robots of its structure."""
+
+import hashlib
+from collections.abc import Mapping
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sms_handover.compiled.compiler import library_of
+from sms_handover.compiled.tree import Body, body_tree
+from sms_handover.errors import MissingDependencyError
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.plant.integrators import TABLEAUS, Tableau
+
+
+def dynamics_library(robot: RobotModel, schemes: Mapping[str, Tableau] = TABLEAUS) -> Path:
+    """Return the library with the equations of a robot, made unless it is cached.
+
+    It steps by ``schemes``, by default all that parameters can name. Raises ConfigurationError where it
+    cannot be made.
+    """
+    bodies = body_tree(robot)
+    identity = _identity(bodies, schemes)
+    return library_of("dynamics", identity, lambda: str(_writer().dynamics_source(bodies, schemes)))
+
+
+def _identity(bodies: tuple[Body, ...], schemes: Mapping[str, Tableau]) -> bytes:
+    """Return a digest of all that the C code depends on: generator, schemes, and how the bodies are joined.
+
+    Their inertial parameters are arguments of the functions, so one library serves every robot that has the
+    same joints in the same places.
+    """
+    digest = hashlib.sha256(f"{dict(schemes)} casadi {_casadi_version()}".encode())
+    here = Path(__file__).parent
+    for source in (*sorted(here.glob("*.py")), *sorted((here / "native").glob("*.c"))):
+        digest.update(source.read_bytes())
+    for body in bodies:
+        digest.update(body.parent.to_bytes(4, "little", signed=True))
+        for numbers in (body.rotation, body.place, body.axis):
+            digest.update(np.ascontiguousarray(numbers).tobytes())
+    return digest.digest()
+
+
+def _writer() -> Any:
+    """Return the C code generator; CasADi is imported only where code must be generated."""
+    try:
+        return import_module("sms_handover.compiled.source")
+    except ModuleNotFoundError as error:
+        if error.name != "casadi":
+            raise
+        raise MissingDependencyError("compiled dynamics", "casadi", "compiled") from error
+
+
+def _casadi_version() -> str:
+    """Return the version of CasADi, '' without it: cached libraries do not need it."""
+    try:
+        return version("casadi")
+    except PackageNotFoundError:
+        return ""

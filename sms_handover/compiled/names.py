@@ -1,0 +1,9 @@
+"""Names of the C functions that are made for a kind of robot."""
+
+COMPUTED_TORQUE = "sms_computed_torque"
+TICKS, WORK_SIZE = "sms_ticks", "sms_work_size"  # the loop, and the numbers that it needs room for
+
+
+def step_name(scheme: str) -> str:
+    """Return the name of the function that steps by a scheme."""
+    return f"sms_step_{scheme}"

@@ -1,0 +1,101 @@
+/* Ticks: the loop of simulation/period_runner.py in C, with the same operations in the same order.
+ *
+ * Included behind the functions that CasADi has generated for a kind of robot, and behind the definitions of
+ *   N           number of joints
+ *   PARAMETERS  number of inertial parameters
+ *   ARGUMENTS   most pointers that a generated function needs room for
+ * No operation may be fused or reordered (-ffp-contract=off), so that the two loops agree bit for bit.
+ */
+#include <string.h>
+
+#define NQ (7 + N)
+#define NV (6 + N)
+#define NS_PER_S 1e9 /* [ns/s] */
+
+enum { LAW_NMPC = 0, LAW_PID = 1 };
+
+/* All fields have 8 bytes: Python sees them as one array (compiled/ticks.py has the same order). */
+typedef struct {
+  double q[NQ], v[NV], effort[N];       /* state, and the efforts that acted up to it */
+  double motion[3][N];                  /* q_d rad, q_d' rad/s, q_d'' rad/s^2 at the last reference */
+  double gains[3];                      /* nmpc: A_1, A_2; pid: K_P, K_I, K_D */
+  double integral[N];                   /* rad s, of pid */
+  double limit[N];                      /* N m, of the joints as the law knows them */
+  double true_limit[N];                 /* N m, of the joints as they are */
+  double tick_s, work;                  /* s, J */
+  double true_parameters[PARAMETERS], known_parameters[PARAMETERS];
+  long long stamp_ns, reference_ns, longest_ns, tick_ns, law, saturated[N];
+} ticks_t;
+
+static double clipped(double value, double limit) {
+  if (value < -limit) return -limit;
+  if (value > limit) return limit;
+  return value; /* NaN too, as in NumPy */
+}
+
+static void desired_motion(const ticks_t *t, double (*desired)[N]) {
+  long long age_ns = t->stamp_ns - t->reference_ns;
+  int old = t->longest_ns >= 0 && age_ns > t->longest_ns;
+  double s = (double)(old ? t->longest_ns : age_ns) / NS_PER_S, half = 0.5 * s * s;
+  int still = 1;
+  for (int j = 0; j < N; j++)
+    if (t->motion[1][j] != 0.0 || t->motion[2][j] != 0.0) still = 0;
+  for (int j = 0; j < N; j++) {
+    double q = t->motion[0][j], rate = t->motion[1][j], acceleration = t->motion[2][j];
+    desired[0][j] = still ? q : q + s * rate + half * acceleration;
+    desired[1][j] = still ? rate : rate + s * acceleration + half * 0.0;
+    desired[2][j] = still ? acceleration : acceleration + s * 0.0 + half * 0.0;
+    if (old) desired[1][j] = desired[2][j] = 0.0;
+  }
+}
+
+static double sign(double x) { return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : x; }
+
+static void efforts_of(ticks_t *t, double (*desired)[N], double *efforts, double *w) {
+  if (t->law == LAW_NMPC) {
+    /* CasADi has columns where NumPy has rows: (3, n) in memory is its (n, 3) */
+    const double *arguments[ARGUMENTS] = {t->q, t->v, desired[0], t->gains, t->known_parameters};
+    double *results[ARGUMENTS] = {efforts};
+    sms_computed_torque(arguments, results, 0, w, 0);
+    for (int j = 0; j < N; j++) efforts[j] = clipped(efforts[j], t->limit[j]);
+    return;
+  }
+  for (int j = 0; j < N; j++) {
+    double error = t->q[7 + j] - desired[0][j], rate = t->v[6 + j] - desired[1][j];
+    double wanted = -(t->gains[0] * error + t->gains[1] * t->integral[j] + t->gains[2] * rate);
+    efforts[j] = clipped(wanted, t->limit[j]);
+    int winds_up = wanted != efforts[j] && sign(wanted) == -sign(error);
+    t->integral[j] += winds_up ? 0.0 : error * t->tick_s;
+  }
+}
+
+const long long sms_work_size = WORK;
+
+typedef int (*step_t)(const double **, double **, casadi_int *, double *, int);
+
+/* Carry out `ticks` ticks, of which `steps` are integrated; write a row of q, v, effort and command each. */
+void sms_ticks(ticks_t *t, long scheme, double *rows, double *w, long ticks, long steps) {
+  static const step_t schemes[] = STEPS;
+  double desired[3][N], command[N], acted[N], force[NV] = {0.0}, q[NQ], v[NV];
+  for (long k = 0; k < ticks; k++) {
+    desired_motion(t, desired);
+    efforts_of(t, desired, command, w);
+    memcpy(rows, t->q, sizeof t->q), rows += NQ;
+    memcpy(rows, t->v, sizeof t->v), rows += NV;
+    memcpy(rows, t->effort, sizeof t->effort), rows += N;
+    memcpy(rows, command, sizeof command), rows += N;
+    if (k == steps) return;
+    for (int j = 0; j < N; j++) {
+      double size = command[j] < 0.0 ? -command[j] : command[j];
+      t->saturated[j] += size >= t->true_limit[j];
+      acted[j] = clipped(command[j], t->true_limit[j]);
+      force[6 + j] = acted[j];
+    }
+    const double *arguments[ARGUMENTS] = {t->q, t->v, force, t->true_parameters, &t->tick_s};
+    double *results[ARGUMENTS] = {q, v};
+    schemes[scheme](arguments, results, 0, w, 0);
+    for (int j = 0; j < N; j++) t->work += acted[j] * (q[7 + j] - t->q[7 + j]);
+    memcpy(t->q, q, sizeof q), memcpy(t->v, v, sizeof v), memcpy(t->effort, acted, sizeof acted);
+    t->stamp_ns += t->tick_ns;
+  }
+}

@@ -1,0 +1,120 @@
+"""Ticks in C: a reference period of the loop in one call, with the bits of Python and compiled dynamics."""
+
+import ctypes
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from sms_handover.compiled.library import dynamics_library
+from sms_handover.compiled.names import TICKS, WORK_SIZE
+from sms_handover.compiled.tree import PER_BODY, body_tree, inertial_parameters
+from sms_handover.control.controller import JointController
+from sms_handover.control.nmpc import NmpcLaw
+from sms_handover.control.pid import PidLaw
+from sms_handover.control.protocol import Controller
+from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
+from sms_handover.plant.free_floating import FreeFloatingPlant
+from sms_handover.plant.integrators import TABLEAUS
+from sms_handover.types import TickRows, frozen
+from sms_handover.units import ns_to_seconds
+
+_LAWS: Mapping[type, int] = MappingProxyType({NmpcLaw: 0, PidLaw: 1})  # as in native/ticks.c
+_UNBOUNDED_NS = -1  # in place of the longest age of a reference
+
+
+class CompiledTicks:
+    """Carries out the ticks of a plant under a joint controller in C.
+
+    The state lives in plant and controller, as by Python; a call takes it over, goes on, and gives it back.
+    Not thread-safe.
+    """
+
+    @staticmethod
+    def fits(plant: FreeFloatingPlant, controller: Controller, known: RobotModel) -> bool:
+        """Whether a controller is one of our joint laws, with a robot that has its joints where they are."""
+        is_ours = isinstance(controller, JointController) and type(controller.law) in _LAWS
+        return is_ours and dynamics_library(known) == dynamics_library(plant.robot)
+
+    def __init__(
+        self, plant: FreeFloatingPlant, controller: Controller, known: RobotModel, scheme: str, tick_ns: int
+    ) -> None:
+        """Load the loop; ``known`` is the robot as the law knows it. Raises ConfigurationError."""
+        assert isinstance(controller, JointController)
+        true, longest_ns = plant.robot, controller.track.longest_ns
+        self._plant, self._controller = plant, controller
+        self._scheme = tuple(TABLEAUS).index(scheme)
+        self._state = np.zeros((), _layout(true.n_joints))
+        self._at: dict[str, Any] = {name: self._state[name] for name in self._state.dtype.names or ()}
+        constant: dict[str, Any] = {
+            "limit": known.effort_limit,
+            "true_limit": true.effort_limit,
+            "tick_s": ns_to_seconds(tick_ns),
+            "tick_ns": tick_ns,
+            "true_parameters": inertial_parameters(body_tree(true)),
+            "known_parameters": inertial_parameters(body_tree(known)),
+            "law": _LAWS[type(controller.law)],
+            "longest_ns": _UNBOUNDED_NS if longest_ns is None else longest_ns,
+        }
+        for name, value in constant.items():
+            self._at[name][...] = value
+        library = ctypes.PyDLL(str(dynamics_library(true)))
+        self._work = np.zeros(ctypes.c_longlong.in_dll(library, WORK_SIZE).value)
+        self._call = library[TICKS]
+        pointer, number = ctypes.c_void_p, ctypes.c_long
+        self._call.argtypes = [pointer, number, pointer, pointer, number, number]
+        self._call.restype = None
+        n = true.n_joints
+        self._ends = np.cumsum([BASE_NQ + n, BASE_NV + n, n, n]).tolist()
+
+    def run(self, ticks: int, steps: int) -> TickRows:
+        """Carry out ``ticks`` ticks, of which the first ``steps`` are integrated."""
+        plant, at = self._plant, self._at
+        first_ns, tick_ns = plant.stamp_ns, int(at["tick_ns"])
+        self._take_over()
+        nq, nv, acted, width = self._ends
+        rows = np.empty((ticks, width))
+        self._call(
+            self._state.ctypes.data, self._scheme, rows.ctypes.data, self._work.ctypes.data, ticks, steps
+        )
+        self._give_back(steps)
+        stamps = np.arange(first_ns, first_ns + ticks * tick_ns, tick_ns)
+        return TickRows(stamps, rows[:, :nq], rows[:, nq:nv], rows[:, nv:acted], rows[:, acted:])
+
+    def _take_over(self) -> None:
+        """Take the state of plant and controller."""
+        plant, law, track, at = self._plant, self._controller.law, self._controller.track, self._at
+        at["q"][:], at["v"][:], at["effort"][:] = plant.q, plant.v, plant.joint_effort
+        at["work"][...] = plant.work
+        at["stamp_ns"][...] = plant.stamp_ns
+        at["motion"][:] = track.motion
+        at["reference_ns"][...] = track.stamp_ns
+        if isinstance(law, PidLaw):
+            at["gains"][:] = (law.gains.proportional, law.gains.integral, law.gains.derivative)
+            at["integral"][:] = law.memory
+        elif isinstance(law, NmpcLaw):
+            at["gains"][:2] = law.feedback[:, 0]
+        at["saturated"][:] = 0
+
+    def _give_back(self, steps: int) -> None:
+        """Give plant and controller the state that the ticks have led to."""
+        plant, law, at = self._plant, self._controller.law, self._at
+        state = (frozen(at[name].copy()) for name in ("q", "v", "effort"))
+        plant.adopt(steps, *state, float(at["work"]), at["saturated"])
+        if isinstance(law, PidLaw):
+            law.restore(at["integral"])
+
+
+def _layout(joints: int) -> np.dtype[Any]:
+    """Return the fields of ``ticks_t`` in native/ticks.c."""
+    nq, nv, parameters = BASE_NQ + joints, BASE_NV + joints, PER_BODY * (joints + 1)
+    reals = {
+        **{"q": nq, "v": nv, "effort": joints, "motion": (3, joints), "gains": 3, "integral": joints},
+        **{"limit": joints, "true_limit": joints, "tick_s": (), "work": ()},
+        **{"true_parameters": parameters, "known_parameters": parameters},
+    }
+    counts = {name: () for name in ("stamp_ns", "reference_ns", "longest_ns", "tick_ns", "law")}
+    fields: list[tuple[str, str, Any]] = [(name, "f8", shape) for name, shape in reals.items()]
+    fields += [(name, "i8", shape) for name, shape in counts.items()]
+    return np.dtype([*fields, ("saturated", "i8", joints)])
