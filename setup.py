@@ -58,7 +58,7 @@ setup(
     maintainer_email="maintainers@sms-handover.example",
     license="BSD-3-Clause",
     packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
-    package_data={PACKAGE: ["py.typed", "report/web/*", "scene/web/*"]},
+    package_data={PACKAGE: ["py.typed", "compiled/native/*", "report/web/*", "scene/web/*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),

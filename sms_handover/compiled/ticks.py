@@ -100,8 +100,8 @@ class CompiledTicks:
     def _give_back(self, steps: int) -> None:
         """Give plant and controller the state that the ticks have led to."""
         plant, law, at = self._plant, self._controller.law, self._at
-        state = (frozen(at[name].copy()) for name in ("q", "v", "effort"))
-        plant.adopt(steps, *state, float(at["work"]), at["saturated"])
+        q, v, effort = (frozen(at[name].copy()) for name in ("q", "v", "effort"))
+        plant.adopt(steps, q, v, effort, float(at["work"]), at["saturated"])
         if isinstance(law, PidLaw):
             law.restore(at["integral"])
 

@@ -1,6 +1,7 @@
 """Compiled dynamics: the values of Pinocchio to rounding, a library made once, and what can be missing."""
 
 import stat
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -10,9 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sms_handover.compiled import dynamics
+from sms_handover.compiled import library
 from sms_handover.compiled.compiler import library_of
 from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
+from sms_handover.compiled.ticks import CompiledTicks
+from sms_handover.control.protocol import Guidance
 from sms_handover.errors import ConfigurationError, MissingDependencyError, UnknownNameError
 from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.description import load_robot
@@ -20,9 +23,12 @@ from sms_handover.model.reduced import reduced_dynamics, reduced_inverse_dynamic
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.integrators import TABLEAUS
 from sms_handover.plant.stepper import PinocchioStepper
+from sms_handover.simulation.period_runner import PythonRunner
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
-from sms_handover.types import Array
+from sms_handover.simulation.snapshot import controller_data, plain
+from sms_handover.simulation.wiring import make_controller, make_plant, make_runner
+from sms_handover.types import Array, JointReference, TaskPhase
 
 from .conftest import Draw
 from .robots import someone_else
@@ -175,6 +181,66 @@ def test_pid_is_compiled_too() -> None:
     assert np.abs(found.joint_position - theirs.joint_position).max() < 1e-13
 
 
+@pytest.mark.parametrize("scheme", TABLEAUS)
+@pytest.mark.parametrize("law", ["nmpc", "pid"])
+def test_ticks_in_c_are_those_of_python(law: str, scheme: str) -> None:
+    """Bit for bit, with saturated motors, a moving reference, one that grows old, and an unlike truth."""
+    values = {
+        "law": law,
+        **{"common.dynamics": "compiled", "plant.integrator": scheme, "trajectory.time_law": "quintic"},
+        **{"robot.arms.arm_a.limits.joint_2.effort": 0.02, "truth.robot.base.mass": 260.0},
+        **{"controller.reference_hold": 0.0, "model.robot.arms.arm_b.limits.joint_1.effort": 0.01},
+    }
+    scenario = load_scenario(values=values)
+    common, parameters = scenario.parameters.common, scenario.parameters
+    ends = []
+    for compiled in (True, False):
+        plant = make_plant(scenario.truth.robot, scenario.truth.schedule, common, parameters.plant)
+        known = scenario.model
+        controller = make_controller(known.robot, known.schedule, common, parameters.controller)
+        runner = make_runner(plant, controller, known.robot, common, parameters.plant)
+        assert isinstance(runner, CompiledTicks)
+        used = runner if compiled else PythonRunner(plant, controller)
+        rows = []
+        for index in range(3):
+            velocity = 0.3 * np.cos(np.arange(known.robot.n_joints) + index)
+            position = plant.q[BASE_NQ:] + 0.1 * velocity
+            reference = JointReference(plant.stamp_ns, position, velocity)
+            controller.guide(Guidance(TaskPhase(plant.stamp_ns, index, ""), reference, {}))
+            rows.append(used.run(40, 40 if index < 2 else 39))
+        ends.append((rows, plant.snapshot(), controller_data(controller, law)))
+    (ours, plant_state, memory), (theirs, their_state, their_memory) = ends
+    for one, other in zip(ours, theirs, strict=True):
+        for field in ("stamp_ns", "q", "v", "joint_effort", "effort"):
+            assert getattr(one, field).tobytes() == getattr(other, field).tobytes(), field
+    assert plain(plant_state) == plain(their_state) and memory == their_memory
+    assert sum(plant_state.saturated_ticks) > 0
+
+
+def test_another_robot_of_a_kind_compiles_nothing(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Its inertial parameters are arguments; at one time only one process compiles."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    code = (
+        "import logging; logging.basicConfig()\n"
+        "from sms_handover.compiled.library import dynamics_library\n"
+        "from sms_handover.model.robot_model import RobotModel\n"
+        "dynamics_library(RobotModel.load())"
+    )
+    call = [sys.executable, "-c", code]
+    four = [subprocess.Popen(call, stderr=subprocess.PIPE, text=True) for _ in range(4)]
+    told = [process.communicate()[1].count("compiling the dynamics") for process in four]
+    assert [process.returncode for process in four] == [0] * 4 and sum(told) == 1
+    for index in range(10):
+        mass = 200.0 + index
+        scenario = load_scenario(
+            values={"robot.base.mass": mass, "robot.arms.arm_a.gripper.mass": 0.5 + index}
+        )
+        CompiledStepper(scenario.truth.robot, TABLEAUS["rk4"], _TICK)
+    assert not caplog.records
+
+
 def test_a_library_is_made_once(
     robot: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -182,19 +248,19 @@ def test_a_library_is_made_once(
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     CompiledComputedTorque(robot)
     assert [record.message.split(":")[0] for record in caplog.records] == [
-        "compiling the computed torque of robots of this kind"
+        "compiling the dynamics of robots of this kind"
     ]
-    (library,) = (tmp_path / "sms_handover").iterdir()
-    made = library.stat()
-    assert stat.S_IMODE(library.parent.stat().st_mode) == 0o700
+    (made_library,) = (tmp_path / "sms_handover").iterdir()
+    made = made_library.stat()
+    assert stat.S_IMODE(made_library.parent.stat().st_mode) == 0o700
 
     def refuse() -> None:
         raise AssertionError("asked for again")
 
-    monkeypatch.setattr(dynamics, "_writer", refuse)
+    monkeypatch.setattr(library, "_writer", refuse)
     CompiledComputedTorque(robot)
     assert len(caplog.records) == 1
-    assert (library.stat().st_ino, library.stat().st_mtime_ns) == (made.st_ino, made.st_mtime_ns)
+    assert (made_library.stat().st_ino, made_library.stat().st_mtime_ns) == (made.st_ino, made.st_mtime_ns)
     with pytest.raises(AssertionError, match="asked for again"):
         CompiledComputedTorque(_one_armed())
 
@@ -209,18 +275,18 @@ def test_a_library_of_another_robot_is_not_used(monkeypatch: pytest.MonkeyPatch)
         libraries.append(made(*arguments))
         return libraries[0]
 
-    monkeypatch.setattr(dynamics, "library_of", remember)
+    monkeypatch.setattr(library, "library_of", remember)
     CompiledComputedTorque(wrong)
-    with pytest.raises(ConfigurationError, match=r"torque-\w+\.so differ from Pinocchio by .*: remove"):
+    with pytest.raises(ConfigurationError, match=r"dynamics-\w+\.so differ from Pinocchio by .*: remove"):
         CompiledComputedTorque(RobotModel.load())
 
 
 def test_a_damaged_library_is_named(
     robot: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    library = tmp_path / "damaged.so"
-    library.write_bytes(b"none")
-    monkeypatch.setattr(dynamics, "library_of", lambda *arguments: library)
+    damaged = tmp_path / "damaged.so"
+    damaged.write_bytes(b"none")
+    monkeypatch.setattr(library, "library_of", lambda *arguments: damaged)
     with pytest.raises(ConfigurationError, match=r"cannot load .*damaged\.so: .*; remove the file"):
         CompiledComputedTorque(robot)
 
