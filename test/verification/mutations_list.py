@@ -606,8 +606,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "command recorded as the effort that acted",
         "simulation/recorder",
-        "effort[k] = tick.joint_effort",
-        "effort[k] = tick.effort",
+        "rows.joint_effort, rows.effort), strict",
+        "rows.effort, rows.effort), strict",
         "analysis_runs",
     ),
     # clearance
