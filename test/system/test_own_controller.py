@@ -59,8 +59,8 @@ def own(schedule: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, t
 @pytest.fixture(scope="module")
 def in_one_process(schedule: Path) -> RunData:
     """The same law in one process."""
-    scenario = load_scenario({"common": {"schedule": str(schedule)}})
-    return simulate(scenario, controller=task_space_pd.TaskSpacePd(scenario.robot))
+    scenario = load_scenario(values={"common": {"schedule": str(schedule)}})
+    return simulate(scenario, controller=task_space_pd.TaskSpacePd(scenario.truth.robot))
 
 
 def test_the_same_object_gives_the_same_bits_over_dds(
@@ -78,9 +78,9 @@ def test_a_law_of_a_small_package_is_as_one_of_ours(
     law = ("--controller", "joint_pd", "-p", "controller.frequency:=1.2")
     ended = sms_handover("run", *law, "--schedule", schedule, "-o", "mine", cwd=tmp_path)
     assert ended.code == 0, ended
-    scenario = load_scenario({"common": {"schedule": str(schedule)}})
-    gains = (my_law.Gains(frequency=1.2),) * len(scenario.schedule.phases)
-    setup = LawSetup(scenario.robot, gains, scenario.parameters.common.tick_ns)
+    scenario = load_scenario(values={"common": {"schedule": str(schedule)}})
+    gains = (my_law.Gains(frequency=1.2),) * len(scenario.model.schedule.phases)
+    setup = LawSetup(scenario.model.robot, gains, scenario.parameters.common.tick_ns)
     by_hand = simulate(scenario, controller=my_law.JointPd(setup))
     assert compare_runs(read_run(tmp_path / "mine" / "bag"), by_hand) == ()
     assert read_info(tmp_path / "mine" / "bag").parameters["controller"]["frequency"] == 1.2
