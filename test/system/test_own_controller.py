@@ -85,8 +85,10 @@ def test_a_law_of_a_small_package_is_as_one_of_ours(
     assert compare_runs(read_run(tmp_path / "mine" / "bag"), by_hand) == ()
     assert read_info(tmp_path / "mine" / "bag").parameters["controller"]["frequency"] == 1.2
     assert sms_handover("reproduce", "mine", cwd=tmp_path).code == 0
-    together = called("compare", "mine", recorded["nmpc"][0], recorded["pid"][0], cwd=tmp_path)
-    assert together.out.splitlines()[0].split()[-3:] == ["mine", "nmpc", "pid"]
+    ours = (recorded["nmpc"][0], recorded["pid"][0])
+    assert called("compare", "mine", *ours, "--csv", "all.csv", cwd=tmp_path).code == 0
+    runs = [line.partition(",")[0] for line in (tmp_path / "all.csv").read_text().splitlines()[1:]]
+    assert list(dict.fromkeys(runs)) == ["mine", "nmpc", "pid"]
     assert called("report", "mine", recorded["nmpc"][0], "-o", "page", cwd=tmp_path).code == 0
     assert "law joint_pd" in (tmp_path / "page" / "index.html").read_text(encoding="utf-8")
 
