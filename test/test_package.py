@@ -13,6 +13,8 @@ import yaml
 
 import sms_handover
 from docs.reference import pages
+from sms_handover.configuration import package_files
+from sms_handover.errors import ConfigurationError
 
 from .workspace import ROOT, entry_points
 
@@ -93,6 +95,31 @@ def test_what_is_imported_is_declared_to_rosdep(module: str) -> None:
 def test_a_reference_page_is_up_to_date(path: Path) -> None:
     """After a change of parameters, topics or services: ``make reference``."""
     assert path.read_text(encoding="utf-8") == PAGES[path], "run: make reference"
+
+
+@pytest.mark.parametrize(
+    ("package", "share"),
+    [
+        ("venv/lib/python3.11/site-packages", "venv/share"),
+        ("target", "target/share"),
+        ("clone", ""),
+    ],
+)
+def test_config_is_found_where_pip_puts_it(
+    package: str, share: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By itself, with --user and --prefix, and with --target; `.ci/wheel` tries it with pip."""
+    home = tmp_path / share / "sms_handover" if share else tmp_path / package
+    (home / "config").mkdir(parents=True)
+    (home / "config" / "robot.yaml").touch()
+    file = tmp_path / package / "sms_handover" / "configuration" / "package_files.py"
+    monkeypatch.setattr(package_files, "__file__", str(file))
+    monkeypatch.setattr("sysconfig.get_path", lambda name: "/nowhere")
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    assert package_files.share_directory() == home
+    monkeypatch.setattr(package_files, "__file__", "/sms_handover/configuration/package_files.py")
+    with pytest.raises(ConfigurationError, match="not installed; searched /, /nowhere/share/sms_handover"):
+        package_files.share_directory()
 
 
 def requirements() -> dict[str, list[str]]:

@@ -17,11 +17,7 @@ def share_directory() -> Path:
     """
     found_in = Path(__file__).resolve().parent.parent.parent
     prefixes = [Path(p) for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p]
-    prefixes += [
-        Path(sysconfig.get_path("data")),
-        found_in.parents[2],
-        found_in,
-    ]  # lib/python3.x/site-packages
+    prefixes += [Path(sysconfig.get_path("data")), *found_in.parents[2:3], found_in]
     candidates = [found_in, *dict.fromkeys(prefix / "share" / _PACKAGE for prefix in prefixes)]
     for candidate in candidates:
         if (candidate / "config" / "robot.yaml").is_file():
