@@ -23,7 +23,7 @@ CODE = [
     *(Block(str(path.relative_to(ROOT)), "python", path.read_text("utf-8")) for path in EXAMPLES),
 ]
 TASKS = {  # a task: where a user reads how to do it, and what that code calls
-    "simulate": ("README.md", "simulate"),
+    "simulate": ("install.md", "simulate"),
     "own law": ("examples/my_law/my_law.py", "Law"),
     "read a bag": ("analysis.md", "read_run"),
     "compare": ("analysis.md", "compare"),
