@@ -1,11 +1,13 @@
-"""C functions as CasADi generates them, called on arrays of the caller."""
+"""C functions of a library, as CasADi generates them and as they are written, on arrays of the caller."""
 
 import ctypes
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from sms_handover.compiled.names import WORK_SIZE
 from sms_handover.errors import ConfigurationError
 from sms_handover.types import Array
 
@@ -23,11 +25,7 @@ class CFunction:
         self, library: Path, name: str, arguments: Sequence[Array], results: Sequence[Array]
     ) -> None:
         """Load the library; raises ConfigurationError if it has no such function."""
-        try:
-            loaded = ctypes.PyDLL(str(library))
-            call, work_space = loaded[name], loaded[f"{name}_work"]
-        except (OSError, AttributeError) as error:
-            raise ConfigurationError(f"cannot load {library}: {error}; remove the file") from error
+        call, work_space = (_loaded(library, each) for each in (name, f"{name}_work"))
         sizes = [ctypes.c_longlong() for _ in range(_SIZES)]
         work_space(*(ctypes.byref(size) for size in sizes))
         n_arguments, n_results, _, n_work = (size.value for size in sizes)
@@ -41,3 +39,35 @@ class CFunction:
     def __call__(self) -> None:
         """Compute the results of the present arguments."""
         self._call(self._arguments, self._results, None, self._work, 0)
+
+
+class NativeFunction:
+    """A function of a shared library that is written in C; its last pointer is to work space of its own.
+
+    Arguments are addresses of arrays, or whole numbers. The GIL is not released.
+    """
+
+    def __init__(self, library: Path, name: str, kinds: Sequence[type]) -> None:
+        """Load the library; raises ConfigurationError if it has no such function.
+
+        ``kinds`` are the types of the arguments before the work space: ``ctypes.c_void_p`` or ``c_long``.
+        """
+        self._call = _loaded(library, name)
+        self._call.argtypes = [*kinds, ctypes.c_void_p]
+        self._call.restype = ctypes.c_long
+        size = ctypes.c_longlong.in_dll(ctypes.PyDLL(str(library)), WORK_SIZE).value
+        self._kept = np.zeros(size)
+        self._work = self._kept.ctypes.data
+
+    def __call__(self, *arguments: int | None) -> int:
+        """Call the function; what it returns means nothing where it is void."""
+        found: int = self._call(*arguments, self._work)
+        return found
+
+
+def _loaded(library: Path, name: str) -> Any:
+    """Return a function of a library; raises ConfigurationError if there is none."""
+    try:
+        return ctypes.PyDLL(str(library))[name]
+    except (OSError, AttributeError) as error:
+        raise ConfigurationError(f"cannot load {library}: {error}; remove the file") from error

@@ -1,23 +1,18 @@
 """Compiled dynamics: what plant and controller use in place of Pinocchio's algorithms."""
 
-from pathlib import Path
-
 import numpy as np
-import pinocchio as pin
 
 from sms_handover.compiled.c_function import CFunction
+from sms_handover.compiled.example import example_of, require_equal
 from sms_handover.compiled.library import dynamics_library
 from sms_handover.compiled.names import COMPUTED_TORQUE, step_name
 from sms_handover.compiled.tree import body_tree, inertial_parameters
 from sms_handover.control.computed_torque import ComputedTorque
-from sms_handover.errors import ConfigurationError
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.integrators import TABLEAUS, Tableau
 from sms_handover.plant.stepper import PinocchioStepper
 from sms_handover.types import Array, frozen
 
-_TOLERANCE = 1e-9  # [-] of the largest value; rounding leaves 1e-14
-_SEED = 0
 _EXAMPLE_S = 1e-3  # [s] short, so that rounding is not amplified by a light wrist
 
 
@@ -36,9 +31,9 @@ class CompiledStepper:
         parameters = inertial_parameters(body_tree(robot))
         arguments = (self._q, self._v, self._force, parameters, duration)
         self._function = CFunction(library, step_name(scheme), arguments, (self._q_next, self._v_next))
-        example = _example(robot)
+        example = example_of(robot)
         theirs = PinocchioStepper(robot, tableau, _EXAMPLE_S).step(*example)
-        _require_equal(library, [*zip(self.step(*example), theirs, strict=True)])
+        require_equal(library, [*zip(self.step(*example), theirs, strict=True)])
         duration[0] = h
 
     def step(self, q: Array, v: Array, effort: Array) -> tuple[Array, Array]:
@@ -63,10 +58,10 @@ class CompiledComputedTorque:
         parameters = inertial_parameters(body_tree(robot))
         arguments = (self._q, self._v, self._desired, self._feedback, parameters)
         self._function = CFunction(library, COMPUTED_TORQUE, arguments, (self._efforts,))
-        q, v, wanted = _example(robot)
+        q, v, wanted = example_of(robot)
         desired = np.array([0.9 * q[BASE_NQ:], 0.9 * v[BASE_NV:], wanted])
         example = (q, v, desired, np.array([[2.0], [3.0]]))
-        _require_equal(library, [(self(*example), ComputedTorque(robot)(*example))])
+        require_equal(library, [(self(*example), ComputedTorque(robot)(*example))])
 
     def __call__(self, q: Array, v: Array, desired: Array, feedback: Array) -> Array:
         """Return the joint efforts (n,) N m, not limited."""
@@ -77,22 +72,3 @@ class CompiledComputedTorque:
         self._function()
         efforts: Array = self._efforts.copy()
         return efforts
-
-
-def _example(robot: RobotModel) -> tuple[Array, Array, Array]:
-    """Return a fixed q, v and one value per joint."""
-    random = np.random.default_rng(_SEED)
-    base = pin.SE3ToXYZQUAT(pin.SE3(pin.exp3(random.normal(size=3)), random.normal(size=3)))
-    q = np.concatenate([base, random.uniform(-1.0, 1.0, robot.n_joints)])
-    return q, random.uniform(-0.1, 0.1, robot.pin.nv), random.uniform(-1.0, 1.0, robot.n_joints)
-
-
-def _require_equal(library: Path, pairs: list[tuple[Array, Array]]) -> None:
-    """Raise ConfigurationError unless a library agrees with Pinocchio."""
-    for ours, theirs in pairs:
-        apart = float(np.abs(ours - theirs).max() / np.abs(theirs).max())
-        if not apart <= _TOLERANCE:
-            raise ConfigurationError(
-                f"compiled dynamics in {library} differ from Pinocchio by {apart:.1e} of the largest value, "
-                f"must be <= {_TOLERANCE:g}: remove the file, or use dynamics 'pinocchio'"
-            )

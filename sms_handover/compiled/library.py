@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from sms_handover.compiled.compiler import library_of
-from sms_handover.compiled.tree import Body, body_tree
+from sms_handover.compiled.tree import Body, Tool, body_tree, tools_of
 from sms_handover.errors import MissingDependencyError
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.integrators import TABLEAUS, Tableau
@@ -22,16 +22,16 @@ def dynamics_library(robot: RobotModel, schemes: Mapping[str, Tableau] = TABLEAU
     It steps by ``schemes``, by default all that parameters can name. Raises ConfigurationError where it
     cannot be made.
     """
-    bodies = body_tree(robot)
-    identity = _identity(bodies, schemes)
-    return library_of("dynamics", identity, lambda: str(_writer().dynamics_source(bodies, schemes)))
+    bodies, tools = body_tree(robot), tools_of(robot)
+    identity = _identity(bodies, tools, schemes)
+    return library_of("dynamics", identity, lambda: str(_writer().dynamics_source(bodies, tools, schemes)))
 
 
-def _identity(bodies: tuple[Body, ...], schemes: Mapping[str, Tableau]) -> bytes:
+def _identity(bodies: tuple[Body, ...], tools: tuple[Tool, ...], schemes: Mapping[str, Tableau]) -> bytes:
     """Return a digest of all that the C code depends on: generator, schemes, and how the bodies are joined.
 
     Their inertial parameters are arguments of the functions, so one library serves every robot that has the
-    same joints in the same places.
+    same joints and tools in the same places.
     """
     digest = hashlib.sha256(f"{dict(schemes)} casadi {_casadi_version()}".encode())
     here = Path(__file__).parent
@@ -40,6 +40,10 @@ def _identity(bodies: tuple[Body, ...], schemes: Mapping[str, Tableau]) -> bytes
     for body in bodies:
         digest.update(body.parent.to_bytes(4, "little", signed=True))
         for numbers in (body.rotation, body.place, body.axis):
+            digest.update(np.ascontiguousarray(numbers).tobytes())
+    for tool in tools:
+        digest.update(f"{tool.body} {tool.first_joint} {tool.joints}".encode())
+        for numbers in (tool.rotation, tool.place):
             digest.update(np.ascontiguousarray(numbers).tobytes())
     return digest.digest()
 

@@ -1,9 +1,14 @@
 """Names of the C functions that are made for a kind of robot."""
 
 COMPUTED_TORQUE = "sms_computed_torque"
+TOOLS, TOOL_JACOBIANS = "sms_tools", "sms_tool_jacobians"
+MOTION, CONSERVED = "sms_motion", "sms_conserved"
 TICKS, WORK_SIZE = "sms_ticks", "sms_work_size"  # the loop, and the numbers that it needs room for
 
 
 def step_name(scheme: str) -> str:
     """Return the name of the function that steps by a scheme."""
     return f"sms_step_{scheme}"
+
+
+TOOL_ROWS, MOTION_ROWS, FIND_JOINTS = "sms_tool_rows", "sms_motion_rows", "sms_find_joints"

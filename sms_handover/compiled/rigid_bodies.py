@@ -44,7 +44,7 @@ class RigidBodies:
         self._rotations = [ca.SX.eye(3)]  # of each body in its parent
         self._twists = [(v[:3], v[3:BASE_NV])]
         for body, angle, rate in zip(bodies[1:], _elements(angles), self._rates, strict=True):
-            self._rotations.append(ca.SX(body.rotation) @ _turned(body, angle))
+            self._rotations.append(ca.SX(body.rotation) @ turned_about_axis(body, angle))
             linear, angular = self._carried(len(self._twists), *self._twists[body.parent])
             self._twists.append((linear, angular + ca.SX(body.axis) * rate))
         self._composites = self._composed()
@@ -74,6 +74,29 @@ class RigidBodies:
             for body, (_, moment) in zip(self._bodies[1:], wrenches[1:], strict=True)
         ]
         return _solved(self._inertia_matrix(), force - ca.vertcat(*wrenches[0], *bias))
+
+    def momentum(self) -> tuple[Expression, Expression]:
+        """Return linear momentum and angular momentum about the origin of the base, in its axes."""
+        momenta = [rigid.wrench(*twist) for rigid, twist in zip(self._rigids, self._twists, strict=True)]
+        for index in range(len(self._bodies) - 1, 0, -1):
+            parent, passed = self._bodies[index].parent, self._passed_on(index, *momenta[index])
+            momenta[parent] = (momenta[parent][0] + passed[0], momenta[parent][1] + passed[1])
+        return momenta[0]
+
+    def kinetic_energy(self) -> Expression:
+        """Return the kinetic energy in J, with that of the rotors."""
+        energy = ca.SX(0.0)
+        for rigid, (linear, angular) in zip(self._rigids, self._twists, strict=True):
+            momentum, spin = rigid.wrench(linear, angular)
+            energy += 0.5 * (ca.dot(linear, momentum) + ca.dot(angular, spin))
+        for body, rate in zip(self._bodies[1:], self._rates, strict=True):
+            energy += 0.5 * body.rotor * rate**2
+        return energy
+
+    def centre_of_mass(self) -> Expression:
+        """Return the centre of mass (3,) m in the frame of the base."""
+        whole = self._composites[0]
+        return whole.first_moment / whole.mass
 
     def _carried(self, index: int, linear: Expression, angular: Expression) -> tuple[Expression, Expression]:
         """Return a twist or acceleration of the parent in the frame of a body."""
@@ -186,7 +209,7 @@ def _is_zero(value: Expression) -> bool:
     return bool(ca.SX(value).is_zero())
 
 
-def _turned(body: Body, angle: Expression) -> Expression:
+def turned_about_axis(body: Body, angle: Expression) -> Expression:
     """Return the rotation about the axis of a joint by Rodrigues' formula."""
     cross, along = np.array(ca.skew(body.axis)), np.outer(body.axis, body.axis)
     return ca.cos(angle) * ca.SX(np.eye(3) - along) + ca.sin(angle) * ca.SX(cross) + ca.SX(along)

@@ -7,22 +7,27 @@ from typing import Any
 
 import casadi as ca
 
+from sms_handover.compiled.kinematics_functions import kinematics_functions
 from sms_handover.compiled.names import COMPUTED_TORQUE, step_name
 from sms_handover.compiled.rigid_bodies import RigidBodies
 from sms_handover.compiled.step import step_function
-from sms_handover.compiled.tree import PER_BODY, Body
+from sms_handover.compiled.tree import PER_BODY, Body, Tool
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV
 from sms_handover.plant.integrators import Tableau
 
 _NATIVE = Path(__file__).parent / "native"
 
 
-def dynamics_source(bodies: Sequence[Body], schemes: Mapping[str, Tableau]) -> str:
-    """Return the C code of a kind of robot: steps by some schemes, computed torque, and the loop of ticks."""
+_NATIVE_FILES = ("ticks", "poses", "inverse_kinematics")  # each may use those before it
+
+
+def dynamics_source(bodies: Sequence[Body], tools: Sequence[Tool], schemes: Mapping[str, Tableau]) -> str:
+    """Return the C code of a kind of robot: its equations, and the loop and inverse kinematics on them."""
     joints = len(bodies) - 1
     functions = [
         *(_step(name, tableau, bodies) for name, tableau in schemes.items()),
         _computed_torque(bodies),
+        *kinematics_functions(tools, *_symbols(bodies)[:2], *_with_parameters(bodies)),
     ]
     generator = ca.CodeGenerator("dynamics", {"with_header": False})
     for function in functions:
@@ -33,10 +38,14 @@ def dynamics_source(bodies: Sequence[Body], schemes: Mapping[str, Tableau]) -> s
         "ARGUMENTS": max(max(function.sz_arg(), function.sz_res()) for function in functions),
         "WORK": max(1, *(function.sz_w() for function in functions)),
         "STEPS": f"{{{', '.join(map(step_name, schemes))}}}",
+        "ARMS": len(tools),
+        "FIRST_JOINTS": f"{{{', '.join(str(tool.first_joint) for tool in tools)}}}",
+        "ARM_JOINTS": f"{{{', '.join(str(tool.joints) for tool in tools)}}}",
+        "MOST_JOINTS": max(tool.joints for tool in tools),
     }
     lines = [f"#define {name} {value}" for name, value in definitions.items()]
-    native = (_NATIVE / "ticks.c").read_text(encoding="ascii")
-    return "\n".join((generator.dump(), *lines, native))
+    native = [(_NATIVE / f"{name}.c").read_text(encoding="ascii") for name in _NATIVE_FILES]
+    return "\n".join((generator.dump(), *lines, *native))
 
 
 def _step(scheme: str, tableau: Tableau, bodies: Sequence[Body]) -> Any:

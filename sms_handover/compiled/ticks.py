@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from sms_handover.compiled.c_function import NativeFunction
 from sms_handover.compiled.library import dynamics_library
-from sms_handover.compiled.names import TICKS, WORK_SIZE
+from sms_handover.compiled.names import TICKS
 from sms_handover.compiled.tree import PER_BODY, body_tree, inertial_parameters
 from sms_handover.control.controller import JointController
 from sms_handover.control.nmpc import NmpcLaw
@@ -59,12 +60,9 @@ class CompiledTicks:
         }
         for name, value in constant.items():
             self._at[name][...] = value
-        library = ctypes.PyDLL(str(dynamics_library(true)))
-        self._work = np.zeros(ctypes.c_longlong.in_dll(library, WORK_SIZE).value)
-        self._call = library[TICKS]
         pointer, number = ctypes.c_void_p, ctypes.c_long
-        self._call.argtypes = [pointer, number, pointer, pointer, number, number]
-        self._call.restype = None
+        kinds = (pointer, number, pointer, number, number)
+        self._call = NativeFunction(dynamics_library(true), TICKS, kinds)
         n = true.n_joints
         self._ends = np.cumsum([BASE_NQ + n, BASE_NV + n, n, n]).tolist()
 
@@ -75,9 +73,7 @@ class CompiledTicks:
         self._take_over()
         nq, nv, acted, width = self._ends
         rows = np.empty((ticks, width))
-        self._call(
-            self._state.ctypes.data, self._scheme, rows.ctypes.data, self._work.ctypes.data, ticks, steps
-        )
+        self._call(self._state.ctypes.data, self._scheme, rows.ctypes.data, ticks, steps)
         self._give_back(steps)
         stamps = np.arange(first_ns, first_ns + ticks * tick_ns, tick_ns)
         return TickRows(stamps, rows[:, :nq], rows[:, nq:nv], rows[:, nv:acted], rows[:, acted:])

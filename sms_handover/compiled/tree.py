@@ -33,6 +33,21 @@ class Body:
     rotor: float
 
 
+@dataclass(frozen=True, eq=False)
+class Tool:
+    """A tool, its place on the body that carries it, and the joints of its arm.
+
+    ``rotation`` (3, 3) and ``place`` (3,) m are in the frame of ``body``; the arm has ``joints``
+    joints, from ``first_joint`` on.
+    """
+
+    body: int
+    rotation: Array
+    place: Array
+    first_joint: int
+    joints: int
+
+
 PER_BODY = 11  # mass, first moment (3), inertia (6: xx xy xz yy yz zz), rotor
 
 
@@ -50,6 +65,19 @@ def body_tree(robot: RobotModel) -> tuple[Body, ...]:
     """Return the bodies, base first, then one for each joint in the order of ``robot.joint_names``."""
     model = robot.pin
     return tuple(_body(model, index) for index in range(_BASE, model.njoints))
+
+
+def tools_of(robot: RobotModel) -> tuple[Tool, ...]:
+    """Return the tools in the order of ``robot.arms``."""
+    return tuple(_tool(robot, arm) for arm in robot.arms)
+
+
+def _tool(robot: RobotModel, arm: str) -> Tool:
+    """Return the tool of an arm."""
+    frame, joints = robot.pin.frames[robot.tool_frame_id[arm]], robot.arm_joints[arm]
+    placement, body = frame.placement, frame.parentJoint - _BASE
+    rotation, place = _tidy(placement.rotation), _tidy(placement.translation)
+    return Tool(body, rotation, place, joints.start, joints.stop - joints.start)
 
 
 def _body(model: pin.Model, index: int) -> Body:

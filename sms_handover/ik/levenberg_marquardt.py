@@ -1,5 +1,6 @@
 """Levenberg-Marquardt inverse kinematics with the error-dependent damping of Sugihara."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 
@@ -25,9 +26,16 @@ class Solution:
     iterations: int
 
 
+FindJoints = Callable[[IkRequest], Solution]  # for one robot and its parameters
+
+
 def solve_ik(robot: RobotModel, request: IkRequest, parameters: IkParameters) -> IkResult:
     """Return the result of :func:`find_joints` with measures of its quality."""
-    found = find_joints(robot, request, parameters)
+    return rated(robot, request, find_joints(robot, request, parameters))
+
+
+def rated(robot: RobotModel, request: IkRequest, found: Solution) -> IkResult:
+    """Return a solution with measures of its quality."""
     q = found.joint_position
     return IkResult(
         joint_position=q,

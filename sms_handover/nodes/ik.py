@@ -9,7 +9,7 @@ from sms_handover_interfaces.srv import SolveIK
 from sms_handover.errors import GraphError, SmsHandoverError
 from sms_handover.frames import WORLD
 from sms_handover.graph.topics import IK, SOLVE_IK
-from sms_handover.ik.levenberg_marquardt import solve_ik
+from sms_handover.ik.levenberg_marquardt import rated
 from sms_handover.ik.parameters import IkParameters
 from sms_handover.messages.values import time_ns
 from sms_handover.ros.codecs.convert import (
@@ -23,6 +23,7 @@ from sms_handover.ros.node.diagnostics import NodeReport
 from sms_handover.ros.node.graph_node import GraphNode
 from sms_handover.ros.process.main import run_node
 from sms_handover.simulation.feasibility import check_feasibility
+from sms_handover.simulation.wiring import make_ik
 from sms_handover.types import IkRequest, IkStatus, Pose
 
 
@@ -39,6 +40,7 @@ class IkNode(GraphNode[IkParameters]):
         tolerates is for the plant to say. Raises ScheduleError.
         """
         check_feasibility(self.robot, self.schedule, self.parameters)
+        self._find_joints = make_ik(self.robot, self.common, self.parameters)
         self.reset_run()
         self._names = list(self.robot.joint_names)
         self._response = SolveIK.Response(valid=True)  # refilled each time: most of it never changes
@@ -69,7 +71,7 @@ class IkNode(GraphNode[IkParameters]):
         except (SmsHandoverError, ValueError) as error:
             self._rejected += 1
             return SolveIK.Response(message=str(error))
-        result = solve_ik(self.robot, question, self.parameters)
+        result = rated(self.robot, question, self._find_joints(question))
         self._solved[result.status] += 1
         self._stamp_ns = stamp_ns = time_ns(request.seed.header.stamp)
         response = self._response

@@ -40,7 +40,8 @@ from sms_handover.ros.node.graph_node import GraphNode
 from sms_handover.ros.process.main import run_node
 from sms_handover.ros.transport.stamp_sync import StampSync
 from sms_handover.simulation.parameters import LOCKSTEP
-from sms_handover.trajectory.generator import Targets, TrajectoryGenerator
+from sms_handover.simulation.wiring import make_generator
+from sms_handover.trajectory.generator import Targets
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.types import Array, RobotState, TaskPhase
 from sms_handover.units import NS_PER_S
@@ -59,7 +60,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
 
     def prepare(self) -> None:
         """Set up the generator; that its targets are in reach, the IK node checks."""
-        self._generator = TrajectoryGenerator(self.robot, self.schedule, self.parameters)
+        self._generator = make_generator(self.robot, self.schedule, self.common, self.parameters)
         self._reference_codec = JointStateCodec(self.robot.joint_names, ("position", "velocity"))
         self._pose_codec, self._phase_codec = PoseCodec(WORLD), PhaseCodec()
         self._lockstep = self.common.mode == LOCKSTEP

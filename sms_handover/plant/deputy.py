@@ -64,6 +64,7 @@ class MasslessDeputy:
 
     def __init__(self, deputy_in_world: Pose, grasp_frames: Mapping[str, Pose]) -> None:
         self._grasp_frames = {name: se3_of(pose) for name, pose in grasp_frames.items()}
+        self._carried: Pose | None = None  # the pose as it was given
         self._place(se3_of(deputy_in_world), Twist(np.zeros(3), np.zeros(3)))
         self._holder = ""
         self._deputy_in_tool = pin.SE3.Identity()
@@ -71,7 +72,17 @@ class MasslessDeputy:
     @property
     def state(self) -> DeputyState:
         """Return pose and twist in ``world`` axes, and who holds it."""
-        return DeputyState(pose_of(self._pose()), self._twist, self._holder)
+        return DeputyState(self._carried or pose_of(self._pose()), self._twist, self._holder)
+
+    @property
+    def in_tool(self) -> pin.SE3:
+        """The pose in the tool that holds it."""
+        return self._deputy_in_tool
+
+    @property
+    def rests(self) -> bool:
+        """Whether it floats where it is."""
+        return not (self._holder or np.any(self._twist.linear) or np.any(self._twist.angular))
 
     @property
     def motion(self) -> DeputyMotion:
@@ -107,7 +118,7 @@ class MasslessDeputy:
 
     def detach(self) -> None:
         """Release the deputy: it drifts with its present twist."""
-        self._holder = ""
+        self._holder, self._carried = "", None
 
     def follow(self, tool_in_world: Pose, tool_twist_in_world: Twist) -> None:
         """Move with the tool that holds it."""
@@ -117,6 +128,11 @@ class MasslessDeputy:
         linear = tool_twist_in_world.linear + _cross(tool_twist_in_world.angular, lever)
         self._place(pose, Twist(linear, tool_twist_in_world.angular))
 
+    def carry(self, deputy_in_world: Pose, twist_deputy_in_world: Twist) -> None:
+        """Move to where the tool that holds it has carried it."""
+        self._place(se3_of(deputy_in_world), twist_deputy_in_world)
+        self._carried = deputy_in_world
+
     def drift(self, duration: float) -> None:
         """Move freely over ``duration`` s."""
         self._drifted_s += duration
@@ -124,6 +140,7 @@ class MasslessDeputy:
     def _place(self, pose: pin.SE3, twist: Twist) -> None:
         """Begin to drift from a pose with a twist."""
         self._start, self._twist, self._drifted_s = pose, twist, 0.0
+        self._carried = None
 
     def _pose(self) -> pin.SE3:
         """Return the present pose: p0 + v t, exp(omega t) R0 since it was last placed."""

@@ -7,11 +7,12 @@ import numpy as np
 import numpy.typing as npt
 
 from sms_handover.errors import ConfigurationError
-from sms_handover.model.conserved import ConservedQuantities, conserved_quantities
+from sms_handover.model.conserved import ConservedQuantities
 from sms_handover.model.robot_model import BASE_NQ, RobotModel
 from sms_handover.plant.deputy import DeputyMotion, MasslessDeputy
 from sms_handover.plant.grasping import execute_grasp
 from sms_handover.plant.integrators import TABLEAUS
+from sms_handover.plant.kinematics import PinocchioKinematics, PlantKinematics
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.plant.stepper import PinocchioStepper, Stepper
 from sms_handover.types import (
@@ -66,6 +67,7 @@ class FreeFloatingPlant:
         initial: InitialState,
         tick_ns: int,
         stepper: Stepper | None = None,
+        kinematics: PlantKinematics | None = None,
     ) -> None:
         """Place robot and deputy at rest; raises ConfigurationError on a joint outside its limits."""
         self._robot = robot
@@ -74,6 +76,7 @@ class FreeFloatingPlant:
         self._tick_ns = tick_ns
         self._tick_s = ns_to_seconds(tick_ns)
         self._stepper = stepper or PinocchioStepper(robot, TABLEAUS[parameters.integrator], self._tick_s)
+        self._kinematics = kinematics or PinocchioKinematics(robot)
         self._check_start()
         self.reset()
 
@@ -139,19 +142,19 @@ class FreeFloatingPlant:
     @property
     def tools_in_world(self) -> dict[str, Pose]:
         """Return the pose of every tool."""
-        return self._robot.tools_at(self.q)
+        return self._kinematics.tools_at(self.q)
 
     @property
     def conserved(self) -> ConservedQuantities:
         """Return momenta, energy and centre of mass of the robot."""
-        return conserved_quantities(self._robot, self.q, self.v)
+        return self._kinematics.conserved(self.q, self.v)
 
     def execute(self, commands: tuple[GraspCommand, ...]) -> tuple[GraspEvent, ...]:
         """Execute grasp commands at this instant, in order, and return their events."""
         if not commands:
             return ()
         self._deputy_follow()
-        motions = {arm: self._robot.tool_motion(self.q, self.v, arm) for arm in self._robot.arms}
+        motions = {arm: self._kinematics.tool_motion(self.q, self.v, arm) for arm in self._robot.arms}
         tools = {arm: pose for arm, (pose, _) in motions.items()}
         twists = {arm: twist for arm, (_, twist) in motions.items()}
         return tuple(
@@ -199,9 +202,8 @@ class FreeFloatingPlant:
 
     def _deputy_follow(self) -> None:
         """Move a held deputy with its tool."""
-        holder = self._deputy.holder
-        if holder:
-            self._deputy.follow(*self._robot.tool_motion(self.q, self.v, holder))
+        if self._deputy.holder:
+            self._kinematics.carry(self._deputy, self.q, self.v)
 
     def _check_start(self) -> None:
         """Raise ConfigurationError where a joint starts outside its limits."""

@@ -10,12 +10,10 @@ from sms_handover.control.registry import law_named
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import CONTROLLER
-from sms_handover.ik.levenberg_marquardt import find_joints
 from sms_handover.model.conserved import ConservedQuantities
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.snapshot import Snapshot, controller_data, restore_controller
-from sms_handover.simulation.wiring import make_controller, make_plant, make_runner
-from sms_handover.trajectory.generator import TrajectoryGenerator
+from sms_handover.simulation.wiring import make_controller, make_generator, make_ik, make_plant, make_runner
 from sms_handover.types import (
     Array,
     DeputyState,
@@ -124,7 +122,8 @@ class Loop:
         robot, schedule = self.scenario.model.robot, self.scenario.model.schedule
         self._common = parameters.common
         self._plant = make_plant(truth.robot, truth.schedule, self._common, parameters.plant)
-        self._generator = TrajectoryGenerator(robot, schedule, parameters.trajectory)
+        self._generator = make_generator(robot, schedule, self._common, parameters.trajectory)
+        self._find_joints = make_ik(robot, self._common, parameters.ik)
         self._per_reference = self._common.ticks_per_reference
         self._controller: Controller
         if controller is not None:
@@ -221,13 +220,13 @@ class Loop:
 
     def _begin_period(self) -> Period:
         """Guide the controller and execute the grasp commands of this instant."""
-        plant, generator, robot = self._plant, self._generator, self.scenario.model.robot
+        plant, generator = self._plant, self._generator
         state, deputy = plant.state, plant.deputy
         tools, conserved = plant.tools_in_world, plant.conserved
         phase, targets = generator.targets(state, deputy.deputy_in_world)
         request = generator.ik_request(state, targets)
         asked = bool(request.tool_in_world)
-        solution = find_joints(robot, request, self.scenario.parameters.ik) if asked else None
+        solution = self._find_joints(request) if asked else None
         joints = solution.joint_position if solution else targets.joint_position
         reference, aims = generator.reference(state, targets, joints)
         self._guidance = Guidance(phase, reference, aims if self._aims else {})

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 
 from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
+from sms_handover.compiled.inverse_kinematics import CompiledIk
+from sms_handover.compiled.kinematics import CompiledKinematics
 from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.control.computed_torque import ComputedTorque
 from sms_handover.control.law import LawSetup, Need
@@ -14,13 +16,18 @@ from sms_handover.control.protocol import CheckedController, Controller
 from sms_handover.control.registry import SHIPPED, law_named, require_law
 from sms_handover.control.stability import check_stability
 from sms_handover.errors import ConfigurationError
+from sms_handover.ik.levenberg_marquardt import FindJoints, find_joints
+from sms_handover.ik.parameters import IkParameters
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
 from sms_handover.plant.integrators import TABLEAUS, Tableau
+from sms_handover.plant.kinematics import PinocchioKinematics
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.plant.stepper import PinocchioStepper, Stepper
 from sms_handover.simulation.parameters import COMPILED, CommonParameters
 from sms_handover.simulation.period_runner import PeriodRunner, PythonRunner
+from sms_handover.trajectory.generator import TrajectoryGenerator
+from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.schedule import Schedule
 from sms_handover.types import Array
 from sms_handover.units import ns_to_seconds, seconds_to_ns
@@ -48,13 +55,29 @@ def make_plant(
     )
     tableau = TABLEAUS[parameters.integrator]
     stepper = make_stepper(robot, common.dynamics, tableau, ns_to_seconds(common.tick_ns))
-    return FreeFloatingPlant(robot, parameters, initial, common.tick_ns, stepper)
+    kinematics = CompiledKinematics(robot) if common.dynamics == COMPILED else PinocchioKinematics(robot)
+    return FreeFloatingPlant(robot, parameters, initial, common.tick_ns, stepper, kinematics)
 
 
 def make_stepper(robot: RobotModel, dynamics: str, tableau: Tableau, h: float) -> Stepper:
     """Return the stepper for steps of ``h`` s; raises ConfigurationError."""
     kind = CompiledStepper if dynamics == COMPILED else PinocchioStepper
     return kind(robot, tableau, h)
+
+
+def make_generator(
+    robot: RobotModel, schedule: Schedule, common: CommonParameters, parameters: TrajectoryParameters
+) -> TrajectoryGenerator:
+    """Return the generator of the trajectory; raises ConfigurationError."""
+    tools_at = CompiledKinematics(robot).tools_at if common.dynamics == COMPILED else robot.tools_at
+    return TrajectoryGenerator(robot, schedule, parameters, tools_at)
+
+
+def make_ik(robot: RobotModel, common: CommonParameters, parameters: IkParameters) -> FindJoints:
+    """Return the solver of inverse kinematics; raises ConfigurationError."""
+    if common.dynamics == COMPILED:
+        return CompiledIk(robot, parameters)
+    return lambda request: find_joints(robot, request, parameters)
 
 
 def gains_by_phase(schedule: Schedule, parameters: ControllerParameters) -> tuple[Any, ...]:

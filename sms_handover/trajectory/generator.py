@@ -1,6 +1,6 @@
 """Generator of the trajectory: schedule and current state to targets and joint reference."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -67,14 +67,25 @@ class GeneratorState:
     tools_at_start: Mapping[str, Pose]
 
 
+ToolsAt = Callable[[Array, Iterable[str]], Mapping[str, Pose]]  # in world, of q (7 + n,) and some arms
+
+
 class TrajectoryGenerator:
     """Follows a schedule; each reference period it gives targets, an IK request and a reference.
 
     Inverse kinematics is solved by the caller: in the graph it is a service.
     """
 
-    def __init__(self, robot: RobotModel, schedule: Schedule, parameters: TrajectoryParameters) -> None:
+    def __init__(
+        self,
+        robot: RobotModel,
+        schedule: Schedule,
+        parameters: TrajectoryParameters,
+        tools_at: ToolsAt | None = None,
+    ) -> None:
+        """Follow a schedule; ``tools_at`` is the forward kinematics of the robot, by default by Pinocchio."""
         self._robot = robot
+        self._tools_at = tools_at or robot.tools_at
         self._schedule = schedule
         self._progress = TaskProgress(schedule, parameters)
         self._time_law = TIME_LAWS[parameters.time_law]
@@ -103,7 +114,7 @@ class TrajectoryGenerator:
         stage = self._progress.at(state.stamp_ns)
         if stage.begins:
             self._joints_at_start = state.joint_position
-            self._tools_at_start = self._robot.tools_at(state.q)
+            self._tools_at_start = self._tools_at(state.q, self._robot.arms)
         return stage.task, self._targets_of(stage, state, deputy_in_world)
 
     @property
@@ -141,7 +152,8 @@ class TrajectoryGenerator:
         """
         robot, led = self._robot, targets.tool_in_world
         others = [arm for arm in robot.arms if arm not in led]
-        by_joints = robot.tools_in_world(state.base_in_world, joint_position, others) if others else {}
+        at = robot.configuration(state.base_in_world, joint_position)
+        by_joints = self._tools_at(at, others) if others else {}
         velocity = targets.joint_velocity
         if any(_moves(twist) for twist in targets.tool_twist_in_world.values()):
             velocity = self._resolve_rates(state, targets, velocity)

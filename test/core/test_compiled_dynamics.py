@@ -40,7 +40,7 @@ _ROUNDING = 1e-12  # [-] of the largest value: ten frames of a dozen operations,
 @pytest.fixture(autouse=True, scope="module")
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A folder of this module for the libraries, so that each is made here once."""
-    folder = tmp_path_factory.mktemp("cache")
+    folder = tmp_path_factory.getbasetemp() / "compiled"  # that of all modules
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(folder))
         yield folder / "sms_handover"

@@ -74,7 +74,7 @@ const long long sms_work_size = WORK;
 typedef int (*step_t)(const double **, double **, casadi_int *, double *, int);
 
 /* Carry out `ticks` ticks, of which `steps` are integrated; write a row of q, v, effort and command each. */
-void sms_ticks(ticks_t *t, long scheme, double *rows, double *w, long ticks, long steps) {
+void sms_ticks(ticks_t *t, long scheme, double *rows, long ticks, long steps, double *w) {
   static const step_t schemes[] = STEPS;
   double desired[3][N], command[N], acted[N], force[NV] = {0.0}, q[NQ], v[NV];
   for (long k = 0; k < ticks; k++) {
