@@ -139,8 +139,8 @@ Robot, gains, tick and the three phases of 20 s are those of `paper`.
 
 Possible means: targets in reach, the task completed under both laws with every grasp made, no two bodies that
 touch at any reference period, joints within their limits of position and rate. Most candidates are not:
-{simulated} were simulated for these {number}; one that fails is drawn anew in the phase in which it failed. Where
-they failed most often:
+{simulated} were simulated for these {number}; one that fails is drawn anew in the phase in which it failed.
+Where they failed most often:
 
 {table(["Phase and cause", "Candidates"], failures)}
 

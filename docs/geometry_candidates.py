@@ -13,7 +13,8 @@ from sms_handover.ik.levenberg_marquardt import find_joints
 from sms_handover.ik.parameters import IkParameters
 from sms_handover.model.poses import pose_from_xyz_rpy, pose_of, se3_of
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.types import Array, IkRequest, IkStatus, Pose
+from sms_handover.trajectory.schedule import Schedule, ToolTarget
+from sms_handover.types import BASE_NQ, BASE_NV, Array, IkRequest, IkStatus, Pose
 
 ARM_A, ARM_B = "arm_a", "arm_b"
 END_A, END_B = "end_a", "end_b"
@@ -41,7 +42,7 @@ class Design:
 
     Centre (3,) and roll of the deputy at the start, centre (3,) at the handover, and how far B takes it
     from there (3,), in ``world``; the turns of the tools about their own axes in the grasp frames; joints
-    (7,) with which A grasps and B takes over, guesses that IK makes exact; those of the starts minus these.
+    (7,) with which A grasps and B takes over, guesses that IK makes exact; sweeps to the starts (7,).
     """
 
     deputy: Array
@@ -130,7 +131,7 @@ def varied(design: Design, random: np.random.Generator, scale: float) -> Design:
     def change(size: int, deviation: float) -> Array:
         return random.normal(0.0, scale * deviation, size) * (random.random(size) < _OFTEN)
 
-    in_plane = np.array([4.0, 1.0, 1.0, 1.0, 1.0, 1.0, 6.0])  # joints 1 and 7 keep the tool in its plane
+    in_plane = np.array([8.0, 1.0, 1.0, 1.0, 1.0, 1.0, 4.0])  # joints 1 and 7 keep the tool in its plane
     shift = change(3, 0.03)
     return replace(
         design,
@@ -141,8 +142,8 @@ def varied(design: Design, random: np.random.Generator, scale: float) -> Design:
         turn_b=design.turn_b + float(change(1, 0.2)[0]),
         grasp_a=design.grasp_a + change(7, 0.1),
         take_b=design.take_b + change(7, 0.1),
-        sweep_a=design.sweep_a + change(7, 0.02) * in_plane,
-        sweep_b=design.sweep_b + change(7, 0.02) * in_plane,
+        sweep_a=design.sweep_a + change(7, 0.01) * in_plane,
+        sweep_b=design.sweep_b + change(7, 0.01) * in_plane,
     ).rounded()
 
 
@@ -173,22 +174,67 @@ def resolved(design: Design, robot: RobotModel, ik: IkParameters) -> Geometry | 
         return bool(inside.all()) and side * robot.tools_in_world(ORIGIN, q, [arm])[arm].position[1] >= 0.0
 
     grasp = reach(design.grasp_a, ARM_A, deputy, END_A)
-    if grasp is None or not allowed(grasp + design.sweep_a, ARM_A):
+    if grasp is None:
+        return APPROACH
+    start_a = _round(grasp + _swept(robot, ARM_A, grasp, design.sweep_a), 1e-4)
+    if not allowed(start_a, ARM_A) or _turned(grasp, start_a):
         return APPROACH
     give = reach(grasp, ARM_A, meeting, END_A)
     if give is None or _turned(grasp, give):
         return CARRY
     take = reach(design.take_b, ARM_B, meeting, END_B)
-    if take is None or not allowed(take + design.sweep_b, ARM_B):
+    if take is None:
+        return CARRY
+    start_b = _round(take + _swept(robot, ARM_B, take, design.sweep_b), 1e-4)
+    if not allowed(start_b, ARM_B) or _turned(take, start_b):
         return CARRY
     last = reach(take, ARM_B, end, END_B)
     if last is None or _turned(take, last):
         return WITHDRAW
-    start_a, start_b = _round(grasp + design.sweep_a, 1e-4), _round(take + design.sweep_b, 1e-4)
     pairs = ((start_a, start_b), (grasp, start_b), (give, take), (give, last))
     one, two, three, four = (np.concatenate(pair) for pair in pairs)
     exact = replace(design, grasp_a=grasp, take_b=take)
     return Geometry(exact, (one, two, three, four), deputy, meeting, end, frames)
+
+
+def design_of(schedule: Schedule, robot: RobotModel, ik: IkParameters) -> Design:
+    """Return the design of a schedule that :func:`schedule_text` wrote, to vary it further."""
+    _, carry, withdraw = schedule.phases
+    frames = {name: se3_of(frame) for name, frame in schedule.deputy.grasp_frames.items()}
+    targets = (carry.targets[ARM_A], carry.targets[ARM_B], withdraw.targets[ARM_B])
+    give, take, last = (target.tool_in_world for target in targets if isinstance(target, ToolTarget))
+    deputy = se3_of(schedule.deputy.deputy_in_world)
+    meeting = (se3_of(give) * frames[END_A].inverse()).translation
+    along = pin.utils.rotate("y", pi / 2.0).T
+
+    def swept(arm: str, tool: Pose) -> tuple[Array, Array]:
+        start, part = schedule.initial_joints[arm], robot.arm_joints[arm]
+        seed = np.zeros(robot.n_joints)
+        seed[part] = start
+        joints = find_joints(robot, IkRequest(ORIGIN, seed, {arm: tool}), ik).joint_position[part]
+        pure = _swept(robot, arm, joints, np.array([start[0] - joints[0], *np.zeros(6)]))
+        change = start - joints - pure
+        change[0] = start[0] - joints[0]
+        return joints, change
+
+    def turn(frame: str) -> float:
+        rotation = along @ frames[frame].rotation
+        return float(np.arctan2(rotation[1, 0], rotation[0, 0]))
+
+    grasp_a, sweep_a = swept(ARM_A, pose_of(deputy * frames[END_A]))
+    take_b, sweep_b = swept(ARM_B, take)
+    return Design(
+        deputy=deputy.translation,
+        roll=float(pin.rpy.matrixToRpy(deputy.rotation)[0]),
+        meeting=meeting,
+        away=last.position - take.position,
+        turn_a=turn(END_A),
+        turn_b=turn(END_B),
+        grasp_a=grasp_a,
+        take_b=take_b,
+        sweep_a=sweep_a,
+        sweep_b=sweep_b,
+    )
 
 
 def schedule_text(geometry: Geometry) -> str:
@@ -249,10 +295,26 @@ def _guess(random: np.random.Generator) -> Array:
 
 
 def _sweep(random: np.random.Generator) -> Array:
-    """Return the joints of a start minus those where the sweep ends."""
-    change = random.normal(0.0, 0.02, 7)
-    change[0] = random.uniform(0.25, 1.0) * random.choice([-1.0, 1.0])
-    change[6] = random.uniform(-0.6, 0.6)
+    """Return a sweep: how far joint 1 goes, and what the other joints add to it (7,)."""
+    change = random.normal(0.0, 0.01, 7)
+    change[0] = random.uniform(0.25, 0.9) * random.choice([-1.0, 1.0])
+    return change
+
+
+def _swept(robot: RobotModel, arm: str, joints: Array, sweep: Array) -> Array:
+    """Return by how much joints (7,) change in a sweep about joint 1, with what is added to it.
+
+    IK takes the shortest way to a pose. For that to be joints 1 and 7 alone, neither may move the elbow about
+    the line from shoulder to wrist: the change is at right angles to the null vector of the Jacobian, which
+    depends on neither of the two.
+    """
+    part = robot.arm_joints[arm]
+    q = robot.configuration(ORIGIN, np.zeros(robot.n_joints))
+    q[BASE_NQ + part.start : BASE_NQ + part.stop] = joints
+    jacobian = pin.computeFrameJacobian(robot.pin, robot.data, q, robot.tool_frame_id[arm])
+    null = np.linalg.svd(jacobian[:, BASE_NV + part.start : BASE_NV + part.stop])[2][-1]
+    change = np.array(sweep)
+    change[6] -= sweep[0] * null[0] / null[6]
     return change
 
 

@@ -15,6 +15,7 @@ from docs.geometry_candidates import (
     WITHDRAW,
     Design,
     Geometry,
+    design_of,
     drawn,
     redrawn,
     resolved,
@@ -24,6 +25,7 @@ from docs.geometry_candidates import (
 from docs.geometry_trial import Bench, Trial
 from sms_handover.control.nmpc import NMPC
 from sms_handover.control.pid import PID
+from sms_handover.errors import ScheduleError
 from sms_handover.units import MM_PER_M
 
 FOLDER = Path("build/geometries")
@@ -148,6 +150,15 @@ def _free(
     return None
 
 
+def _begun(bench: Bench, file: Path) -> Found:
+    """Return the geometry in a file and what comes of it; raises ScheduleError if it is out of reach."""
+    design = design_of(bench.schedule(file.read_text(encoding="utf-8")), bench.robot, bench.ik)
+    geometry = resolved(design, bench.robot, bench.ik)
+    if isinstance(geometry, str):
+        raise ScheduleError(f"{file}: phase {geometry!r} is out of reach")
+    return Found(geometry, bench.trial(bench.schedule(schedule_text(geometry))))
+
+
 def _line(trial: Trial) -> str:
     """Return one line on a trial."""
     failed = trial.failed
@@ -167,6 +178,7 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("--seed", type=int, default=1, help="of every random number")
     parser.add_argument("--count", type=int, default=1, help="geometries to find")
     parser.add_argument("--improve", type=int, default=0, help="variations of the best one to simulate")
+    parser.add_argument("--begin", type=Path, help="schedule of an earlier search to improve instead")
     parser.add_argument("--upright", action="store_true", help="deputy upright, handed over at the centre")
     parser.add_argument("--output", type=Path, default=FOLDER, help="folder for the schedules")
     options = parser.parse_args(arguments)
@@ -177,12 +189,14 @@ def main(arguments: list[str]) -> None:
 
     options.output.mkdir(parents=True, exist_ok=True)
     pool: list[Found] = []
-    for found in possible(bench, random, tally, report, upright=options.upright):
-        pool.append(found)
+    if options.begin:
+        pool.append(_begun(bench, options.begin))
+        report(_line(pool[0].trial))
+    finds = possible(bench, random, tally, report, upright=options.upright)
+    while len(pool) < options.count:
+        pool.append(next(finds))
         name = f"geometry_{options.seed}_{len(pool)}.yaml"
-        (options.output / name).write_text(found.text, encoding="utf-8")
-        if len(pool) >= options.count:
-            break
+        (options.output / name).write_text(pool[-1].text, encoding="utf-8")
     best = min(pool, key=lambda found: shortfall(found.trial))
     for better in improved(bench, best, random, options.improve, report):
         best = better
