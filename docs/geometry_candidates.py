@@ -31,6 +31,7 @@ _ELBOW_OUT = np.array([0.648, -1.712, 1.448, 1.87, 1.671, -1.412, 1.205])  # rad
 _MIRROR = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0])  # to the arm at -y
 _MARGIN = 0.1  # rad that joints keep from their position limits at rest
 _TURN = 0.9  # rad that a joint turns at most in a phase; the rate under PID is up to K_P / K_D of it
+_ACROSS = 1e-3  # m that a tool at rest may be on the side of the other arm: rounding
 _GRID = 0.01  # m, to which positions are rounded
 _FINE, _COARSE = radians(5.0), radians(15.0)  # to which turns of tools and rolls of the deputy are rounded
 _OFTEN = 0.4  # [-] share of the numbers that a variation changes
@@ -40,13 +41,15 @@ _OFTEN = 0.4  # [-] share of the numbers that a variation changes
 class Design:
     """The numbers that make a geometry, and that a search varies: lengths in m, angles in rad.
 
-    Centre (3,) and roll of the deputy at the start, centre (3,) at the handover, and how far B takes it
-    from there (3,), in ``world``; the turns of the tools about their own axes in the grasp frames; joints
-    (7,) with which A grasps and B takes over, guesses that IK makes exact; sweeps to the starts (7,).
+    Centre (3,) and roll of the deputy at the start, roll (``stance``) and centre (3,) at the handover, and
+    how far B takes it from there (3,), in ``world``; the turns of the tools about their own axes in the
+    grasp frames; joints (7,) with which A grasps and B takes over, guesses that IK makes exact; the sweeps
+    that lead to these from the starts (7,).
     """
 
     deputy: Array
     roll: float
+    stance: float
     meeting: Array
     away: Array
     turn_a: float
@@ -62,6 +65,7 @@ class Design:
             self,
             deputy=_round(self.deputy, _GRID),
             roll=float(_round(self.roll, _COARSE)),
+            stance=float(_round(self.stance, _COARSE)),
             meeting=_round(self.meeting, _GRID),
             away=_round(self.away, _GRID),
             turn_a=float(_round(self.turn_a, _FINE)),
@@ -84,42 +88,49 @@ class Geometry:
     frames: Mapping[str, Pose]
 
 
-def drawn(random: np.random.Generator, *, upright: bool = False) -> Design:
-    """Return a random design, that of an ``upright`` deputy that meets B at the centre line if wanted."""
+def drawn(random: np.random.Generator, *, wide: bool = False) -> Design:
+    """Return a random design; for ``wide`` see :func:`redrawn`."""
     none, joints = np.zeros(3), np.zeros(7)
-    design = Design(none, 0.0, none, none, 0.0, 0.0, joints, joints, joints, joints)
+    design = Design(none, 0.0, 0.0, none, none, 0.0, 0.0, joints, joints, joints, joints)
     for phase in PHASES:
-        design = redrawn(design, phase, random, upright=upright)
+        design = redrawn(design, phase, random, wide=wide)
     return design
 
 
-def redrawn(design: Design, phase: str, random: np.random.Generator, *, upright: bool = False) -> Design:
+def redrawn(design: Design, phase: str, random: np.random.Generator, *, wide: bool = False) -> Design:
     """Return a design with what decides a phase drawn anew.
 
     The arms sweep about their joints 1 along the face of a deputy in front of them. Joint 1 of both arms
     turns about the x axis of the base: a tool that points along it and a face across it stay as far apart as
     they are while the arm swings past, however far a law overshoots.
+
+    A ``wide`` motion is one for the shipped handover: the deputy far out, so that the arms move much
+    inertia far, its long edge upright, so that they pass above each other, handed over at the centre line.
     """
-    along = random.uniform
+    along, least = random.uniform, 0.5 if wide else 0.25  # rad
     if phase == APPROACH:
-        roll = 0.0 if upright else _COARSE * int(random.integers(-2, 3))
+        height = along(0.35 if wide else 0.0, 0.6) * float(random.choice([-1.0, 1.0]))  # m
+        upright = wide or random.random() < 0.5
+        stance = pi / 2.0 if upright else 0.0
+        roll = stance if wide else stance + _COARSE * int(random.integers(-2, 3))
         return replace(
             design,
-            deputy=np.array([along(1.0, 1.2), along(0.05, 0.45), along(-0.55, 0.55)]),
+            deputy=np.array([along(1.0, 1.2), along(0.2 if wide else 0.05, 0.45), height]),
             roll=roll,
+            stance=stance,
             turn_a=float(along(-pi, pi)),
             grasp_a=_guess(random),
-            sweep_a=_sweep(random),
+            sweep_a=_sweep(random, least),
         ).rounded()
     if phase == CARRY:
         x, _, z = design.deputy
-        y = 0.0 if upright else along(-0.1, 0.1)
+        y = 0.0 if design.stance else along(-0.1, 0.1)  # a tool on the side of the other arm is rejected
         return replace(
             design,
             meeting=np.array([x - along(0.0, 0.01), y, z + along(-0.25, 0.25)]),
             turn_b=float(along(-pi, pi)),
             take_b=_guess(random) * _MIRROR,
-            sweep_b=_sweep(random),
+            sweep_b=_sweep(random, least),
         ).rounded()
     away = np.array([along(0.03, 0.2), along(-0.3, 0.0), along(-0.2, 0.2)])
     return replace(design, away=away).rounded()
@@ -155,8 +166,9 @@ def resolved(design: Design, robot: RobotModel, ik: IkParameters) -> Geometry | 
     """
     frames = {END_A: _grasp_frame(1.0, design.turn_a), END_B: _grasp_frame(-1.0, design.turn_b)}
     deputy = pose_from_xyz_rpy(design.deputy, np.array([design.roll, 0.0, 0.0]))
-    meeting = pose_from_xyz_rpy(design.meeting, np.zeros(3))
-    end = pose_from_xyz_rpy(design.meeting + design.away, np.zeros(3))
+    stance = np.array([design.stance, 0.0, 0.0])
+    meeting = pose_from_xyz_rpy(design.meeting, stance)
+    end = pose_from_xyz_rpy(design.meeting + design.away, stance)
 
     def reach(guess: Array, arm: str, deputy: Pose, frame: str) -> Array | None:
         tool = pose_of(se3_of(deputy) * se3_of(frames[frame]))
@@ -171,7 +183,8 @@ def resolved(design: Design, robot: RobotModel, ik: IkParameters) -> Geometry | 
         inside = (joints >= robot.lower[part] + _MARGIN) & (joints <= robot.upper[part] - _MARGIN)
         q = np.zeros(robot.n_joints)
         q[part] = joints
-        return bool(inside.all()) and side * robot.tools_in_world(ORIGIN, q, [arm])[arm].position[1] >= 0.0
+        across = side * robot.tools_in_world(ORIGIN, q, [arm])[arm].position[1]
+        return bool(inside.all()) and across >= -_ACROSS
 
     grasp = reach(design.grasp_a, ARM_A, deputy, END_A)
     if grasp is None:
@@ -204,7 +217,7 @@ def design_of(schedule: Schedule, robot: RobotModel, ik: IkParameters) -> Design
     targets = (carry.targets[ARM_A], carry.targets[ARM_B], withdraw.targets[ARM_B])
     give, take, last = (target.tool_in_world for target in targets if isinstance(target, ToolTarget))
     deputy = se3_of(schedule.deputy.deputy_in_world)
-    meeting = (se3_of(give) * frames[END_A].inverse()).translation
+    meeting = se3_of(give) * frames[END_A].inverse()
     along = pin.utils.rotate("y", pi / 2.0).T
 
     def swept(arm: str, tool: Pose) -> tuple[Array, Array]:
@@ -226,7 +239,8 @@ def design_of(schedule: Schedule, robot: RobotModel, ik: IkParameters) -> Design
     return Design(
         deputy=deputy.translation,
         roll=float(pin.rpy.matrixToRpy(deputy.rotation)[0]),
-        meeting=meeting,
+        stance=float(pin.rpy.matrixToRpy(meeting.rotation)[0]),
+        meeting=meeting.translation,
         away=last.position - take.position,
         turn_a=turn(END_A),
         turn_b=turn(END_B),
@@ -294,10 +308,10 @@ def _guess(random: np.random.Generator) -> Array:
     return joints
 
 
-def _sweep(random: np.random.Generator) -> Array:
-    """Return a sweep: how far joint 1 goes, and what the other joints add to it (7,)."""
+def _sweep(random: np.random.Generator, least: float) -> Array:
+    """Return a sweep: how far joint 1 goes, at ``least`` rad, and what the other joints add to it (7,)."""
     change = random.normal(0.0, 0.01, 7)
-    change[0] = random.uniform(0.25, 0.9) * random.choice([-1.0, 1.0])
+    change[0] = random.uniform(least, 0.9) * random.choice([-1.0, 1.0])
     return change
 
 

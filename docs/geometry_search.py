@@ -60,7 +60,7 @@ class Found:
 
 
 def possible(
-    bench: Bench, random: np.random.Generator, tally: Tally, report: Report, *, upright: bool = False
+    bench: Bench, random: np.random.Generator, tally: Tally, report: Report, *, wide: bool = False
 ) -> Iterator[Found]:
     """Yield possible geometries without end, whatever the claims come to.
 
@@ -69,7 +69,7 @@ def possible(
     """
     while True:
         tally.drawn += 1
-        geometry = _free(bench, drawn(random, upright=upright), "", random, tally, upright=upright)
+        geometry = _free(bench, drawn(random, wide=wide), "", random, tally, wide=wide)
         for _ in range(_REPAIRS):
             if geometry is None:
                 break
@@ -81,7 +81,7 @@ def possible(
                 yield Found(geometry, trial)
                 break
             tally.failures[f"{failed.phase}: {failed.failure}"] += 1
-            geometry = _free(bench, geometry.design, failed.phase, random, tally, upright=upright)
+            geometry = _free(bench, geometry.design, failed.phase, random, tally, wide=wide)
 
 
 def improved(
@@ -127,13 +127,13 @@ def shortfall(trial: Trial) -> float:
 
 
 def _free(
-    bench: Bench, design: Design, phase: str, random: np.random.Generator, tally: Tally, *, upright: bool
+    bench: Bench, design: Design, phase: str, random: np.random.Generator, tally: Tally, *, wide: bool
 ) -> Geometry | None:
     """Return a geometry free of collision at rest and on straight paths, with ``phase`` drawn anew first."""
     fails: Counter[str] = Counter()
     for _ in range(_DRAWS):
         if phase:
-            design = redrawn(design, phase, random, upright=upright)
+            design = redrawn(design, phase, random, wide=wide)
         geometry = resolved(design, bench.robot, bench.ik)
         phase = geometry if isinstance(geometry, str) else bench.collides(geometry)
         if not isinstance(geometry, str):
@@ -146,7 +146,7 @@ def _free(
             if phase == WITHDRAW:
                 phase = CARRY
             else:
-                design, phase = redrawn(design, WITHDRAW, random, upright=upright), APPROACH
+                design, phase = redrawn(design, WITHDRAW, random, wide=wide), APPROACH
     return None
 
 
@@ -179,7 +179,7 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("--count", type=int, default=1, help="geometries to find")
     parser.add_argument("--improve", type=int, default=0, help="variations of the best one to simulate")
     parser.add_argument("--begin", type=Path, help="schedule of an earlier search to improve instead")
-    parser.add_argument("--upright", action="store_true", help="deputy upright, handed over at the centre")
+    parser.add_argument("--wide", action="store_true", help="an upright deputy, far out")
     parser.add_argument("--output", type=Path, default=FOLDER, help="folder for the schedules")
     options = parser.parse_args(arguments)
     bench, random, tally = Bench(), np.random.default_rng(options.seed), Tally()
@@ -192,7 +192,7 @@ def main(arguments: list[str]) -> None:
     if options.begin:
         pool.append(_begun(bench, options.begin))
         report(_line(pool[0].trial))
-    finds = possible(bench, random, tally, report, upright=options.upright)
+    finds = possible(bench, random, tally, report, wide=options.wide)
     while len(pool) < options.count:
         pool.append(next(finds))
         name = f"geometry_{options.seed}_{len(pool)}.yaml"
