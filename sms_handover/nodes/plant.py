@@ -216,7 +216,8 @@ class PlantNode(GraphNode[PlantParameters]):
         self._outputs.publish_loop(self._plant, with_reference=with_reference)
         self._loop_clock.published()
         self._outputs.publish_rest(self._plant, with_reference=with_reference)
-        self._publish_excesses(self._plant.take_excesses())
+        if excesses := self._plant.take_excesses():
+            self._publish_excesses(excesses)
 
     def _publish_excesses(self, excesses: Iterable[RunEvent]) -> None:
         """Publish limits of joints that have been exceeded."""

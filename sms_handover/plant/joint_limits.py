@@ -11,7 +11,7 @@ from sms_handover.types import Array
 from sms_handover.units import ns_to_seconds
 
 REPORT, ENFORCE = "report", "enforce"
-_BLOCK = 20  # [states] looked at together: one look costs as much as five ticks of waiting
+_BLOCK = 20  # [states] looked at together
 _QUIET_NS = 100_000_000  # [ns] own choice: excesses of one limit that are less apart are one
 
 
@@ -45,11 +45,13 @@ class JointLimitWatch:
         free_pose, free_twist = np.full(BASE_NQ, np.inf), np.full(BASE_NV, np.inf)
         self._upper = np.concatenate([free_pose, robot.upper, free_twist, self._rate_limit])
         self._lower = np.concatenate([-free_pose, robot.lower, -free_twist, -self._rate_limit])
+        # q, v, q, v, ... of a block; those of the block before stay until they are replaced
+        self._parts: list[Array] = [np.zeros(0)] * (2 * _BLOCK)
         self.reset()
 
     def reset(self) -> None:
         """Forget every state and excess."""
-        self._parts: list[Array] = []  # q, v, q, v, ... of the states that are still to be looked at
+        self._count = 0  # of the parts that are still to be looked at
         self._excesses: dict[int, Excess] = {}
 
     def restore(self, excesses: tuple[Excess, ...]) -> None:
@@ -64,7 +66,9 @@ class JointLimitWatch:
 
     def add(self, tick: int, q: Array, v: Array) -> tuple[RunEvent, ...]:
         """Add the state of a tick, one after the other, and return the excesses that are over."""
-        self._parts += (q, v)
+        count, parts = self._count, self._parts
+        parts[count], parts[count + 1] = q, v
+        self._count = count + 2
         if tick % _BLOCK:
             return ()
         stamp_ns = tick * self._tick_ns
@@ -78,10 +82,10 @@ class JointLimitWatch:
 
     def _look(self, stamp_ns: int) -> None:
         """Look at the states added since the last look; the last of them has this stamp."""
-        if not self._parts:
+        if not self._count:
             return
-        states = np.concatenate(self._parts).reshape(-1, self._upper.size)
-        self._parts.clear()
+        states = np.concatenate(self._parts[: self._count]).reshape(-1, self._upper.size)
+        self._count = 0
         beyond = (states > self._upper) | (states < self._lower)
         if not np.count_nonzero(beyond):
             return
