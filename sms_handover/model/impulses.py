@@ -14,8 +14,8 @@ def impulse_response(robot: RobotModel, q: Array) -> Array:
     The rows of the base are its reaction: nothing outside acts on it, so momentum stays as it is.
     """
     inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.LOCAL)
-    result: Array = eigenpy.LLT(inertia).solve(np.eye(robot.pin.nv)[:, BASE_NV:])
-    return result
+    solved: Array = eigenpy.LLT(inertia).solve(np.eye(robot.pin.nv)[:, BASE_NV:])
+    return solved.reshape(robot.pin.nv, -1)  # one column comes back as a vector
 
 
 def predicted_velocity(robot: RobotModel, q: Array, v: Array, effort: Array, h: float) -> Array:

@@ -19,9 +19,9 @@ _QUIET_NS = 100_000_000  # [ns] own choice: excesses of one limit that are less 
 class Excess:
     """An excess of one limit: ``row`` is the joint for its position, and n plus the joint for its rate.
 
-    ``value`` is the farthest position in rad or the fastest rate in rad/s, ``start_ns`` the stamp of the first
-    state beyond the limit, ``end_ns`` the end of the tick that the latest one began, ``beyond_ns`` the time
-    beyond the limit between them.
+    ``value`` is the farthest position in rad or the fastest rate in rad/s, ``start_ns`` the stamp of the
+    first state beyond the limit, ``end_ns`` the end of the tick that the latest one began, ``beyond_ns`` the
+    time beyond the limit between them.
     """
 
     row: int

@@ -32,9 +32,9 @@ from sms_handover.types import (
 class Period:
     """What is worked out once per reference period, at the instant at which it begins.
 
-    Tool poses and targets are in ``world``; ``work`` J is that of the joint efforts since the start, less what
-    joint stops have taken; ``ik_status`` is None where no tool had a target. ``events`` has what came of grasp
-    commands, ``decisions`` what was decided about the task.
+    Tool poses and targets are in ``world``; ``work`` J is that of the joint efforts since the start, less
+    what joint stops have taken; ``ik_status`` is None where no tool had a target. ``events`` has what came
+    of grasp commands, ``decisions`` what was decided about the task.
     """
 
     phase: TaskPhase
@@ -219,4 +219,6 @@ class Loop:
             generator.solved(converged=status is IkStatus.CONVERGED)
         self.last_tick = self._common.last_tick(phase.end_ns, failed=phase.failed)
         decisions = generator.take_decisions()
-        return Period(phase, reference, aims, tools, deputy, conserved, plant.net_work, status, events, decisions)
+        return Period(
+            phase, reference, aims, tools, deputy, conserved, plant.net_work, status, events, decisions
+        )

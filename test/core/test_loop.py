@@ -22,6 +22,10 @@ from .conftest import SCHEDULE
 from .loop_rest import bytes_of, digest_of_rest
 
 TICKS = 1_821  # of the run with a retry
+ENFORCED: Overrides = {
+    "plant": {"joint_limits": "enforce"},
+    "robot": {"arms.arm_a.limits": {"joint_6": {"position": [-1.41, 0.0], "velocity": 0.1}}},
+}
 LAWS: dict[str, dict[str, object]] = {"nmpc": {"rolling_period": 0.3}, "pid": {"law": "pid"}}
 
 
@@ -42,9 +46,10 @@ def test_a_run_goes_on_from_any_snapshot_in_a_fresh_process(
 ) -> None:
     """The rest is that of the uninterrupted run bit for bit: states, efforts, references, deputy, events.
 
-    Among the ticks are those at which a grasp has been commanded, but its event is not yet known.
+    Among the ticks are those at which a grasp has been commanded, but its event is not yet known. Under PID
+    joint 6 is at its stop and faster than its limit in some of them.
     """
-    given = {**overrides, "controller": LAWS[law]}
+    given = {**overrides, "controller": LAWS[law], **(ENFORCED if law == "pid" else {})}
     loop, ticks = Loop(load_scenario(given)), list[bytes]()
     chosen = {401, 421, *np.random.default_rng(14).choice(1_400, size=count - 2, replace=False).tolist()}
     files: dict[int, Path] = {}
