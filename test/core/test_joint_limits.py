@@ -183,6 +183,18 @@ def test_a_motor_runs_up_to_its_limit_as_its_torque_speed_line_says(sign: float)
     assert plant.joint_effort[0] == -effort[0]
 
 
+def test_a_motor_does_not_brake_a_joint_that_is_dragged_past_its_limit() -> None:
+    """It gives nothing in the direction of the motion, as it is asked to, and all that it is asked for else."""
+    wheel = Wheel(velocity=1.0)
+    plant = wheel.plant()
+    rates = np.array([0.0, 0.0, 0.0, 0.0, 0.0, wheel.reaction, 1.0])
+    for asked, given in ((5.0, 0.0), (0.0, 0.0), (-5.0, -5.0)):
+        plant.restore(replace(plant.snapshot(), v=2.0 * rates))
+        plant.apply(np.array([asked]))
+        assert plant.joint_effort[0] == given
+        assert plant.v[-1] == pytest.approx(2.0 + given * _TICK / wheel.inertia, rel=1e-9)
+
+
 def test_a_motor_that_could_pass_the_limit_within_a_tick_does_not() -> None:
     """However strong it is, as the line holds for the rate that its torque leads to."""
     plant = Wheel(velocity=1.0, effort=5000.0).plant()

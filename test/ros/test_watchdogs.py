@@ -93,7 +93,7 @@ def test_enforced_limits_lead_to_the_same_over_dds(bench: Bench) -> None:
     """In bits and in events: one joint runs up its torque-speed line, another is dragged into a stop."""
     limits = "{joint_5: {position: [-1.459, -1.458]}, joint_7: {position: [-6.0, -1.53]}}"  # [rad]
     given: dict[str, dict[str, Any]] = {"controller": {"law": "pid"}, PLANT: {"joint_limits": "enforce"}}
-    common = {"values": (f"robot.arms.arm_b.limits:={limits}",)}
+    common: dict[str, Any] = {"values": (f"robot.arms.arm_b.limits:={limits}",)}
     graph = Graph(bench, {**given, "common": common})
     graph.run()
     common["schedule"] = str(bench.folder / "schedule.yaml")
