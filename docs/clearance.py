@@ -75,8 +75,10 @@ Position and rate limits are reported, not enforced, unless `plant.joint_limits`
 
 
 def _measured(law: str, time_law: str) -> RunMetrics:
-    scenario = load_scenario({"controller": {"law": law}, "trajectory": {"time_law": time_law}})
-    return measure(simulate(scenario), texts=TaskTexts(scenario.robot.urdf, scenario.schedule.text))
+    scenario = load_scenario(values={"controller": {"law": law}, "trajectory": {"time_law": time_law}})
+    return measure(
+        simulate(scenario), texts=TaskTexts(scenario.truth.robot.urdf, scenario.truth.schedule.text)
+    )
 
 
 if __name__ == "__main__":

@@ -184,7 +184,7 @@ def test_a_motor_runs_up_to_its_limit_as_its_torque_speed_line_says(sign: float)
 
 
 def test_a_motor_does_not_brake_a_joint_that_is_dragged_past_its_limit() -> None:
-    """It gives nothing in the direction of the motion, as it is asked to, and all that it is asked for else."""
+    """It gives nothing in the direction of the motion, and all that it is asked for in the other."""
     wheel = Wheel(velocity=1.0)
     plant = wheel.plant()
     rates = np.array([0.0, 0.0, 0.0, 0.0, 0.0, wheel.reaction, 1.0])
@@ -304,7 +304,7 @@ def test_events_of_a_run_say_what_its_states_say(make_scenario: MakeScenario) ->
     limits = {"joint_6": {"velocity": 0.1, "position": [-1.41, 0.0]}}  # [rad/s], [rad]
     scenario = make_scenario(controller={"law": "pid"}, robot={"arms.arm_a.limits": limits})
     run = simulate(scenario)
-    use = limit_use(run, scenario.robot.pin)
+    use = limit_use(run, scenario.truth.robot.pin)
     rate, position = sorted(
         (e for e in run.run_events if e.node == PLANT), key=lambda event: event.unit == "rad"
     )
