@@ -1,7 +1,7 @@
 """Plant node: the simulated robot and deputy, and the clock of the loop."""
 
 import gc
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from time import monotonic
 from typing import Any
@@ -12,6 +12,7 @@ from sms_handover_interfaces.msg import RunState
 from std_msgs.msg import String
 
 from sms_handover.errors import MessageError, Reason
+from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import (
     DEPUTY_MARKER,
     GRASP_EVENT,
@@ -214,6 +215,13 @@ class PlantNode(GraphNode[PlantParameters]):
         self._outputs.publish_loop(self._plant, with_reference=with_reference)
         self._loop_clock.published()
         self._outputs.publish_rest(self._plant, with_reference=with_reference)
+        if excesses := self._plant.take_excesses():
+            self._publish_excesses(excesses)
+
+    def _publish_excesses(self, excesses: Iterable[RunEvent]) -> None:
+        """Publish limits of joints that have been exceeded."""
+        for event in excesses:
+            self.events.publish(event)
 
     def _resend(self) -> None:
         """Publish the state of this tick again if nothing has answered it for a while (lock step).
@@ -330,6 +338,8 @@ class PlantNode(GraphNode[PlantParameters]):
 
     def restart(self) -> None:
         """End this run and wait for the next one at time zero."""
+        if not self.finished:
+            self._publish_excesses(self._plant.end_excesses())
         self.enter(RunState.WAITING, "reset")
         if not self.finished:
             self.membership.end()
@@ -353,6 +363,7 @@ class PlantNode(GraphNode[PlantParameters]):
         """End the run and publish what real time has cost; every node then publishes its counts."""
         if not self.lockstep and self._loop_clock.misses:
             detail = f"{detail}; {self._loop_clock.misses}"
+        self._publish_excesses(self._plant.end_excesses())
         self.membership.finished = True
         self.enter(state, detail)
         self.membership.end()
