@@ -1,0 +1,81 @@
+"""Dotted paths of all values of a document or a parameter group, each with its value, unit and range."""
+
+import re
+from collections.abc import Iterator
+from collections.abc import Mapping as AnyMapping
+from dataclasses import dataclass
+from typing import Any
+
+from sms_handover.configuration.field_specification import (
+    EitherSpec,
+    MappingSpec,
+    NamedSpec,
+    Spec,
+    ValueSpec,
+)
+from sms_handover.configuration.parameters import specs_of
+from sms_handover.configuration.robot_fields import ROBOT_FIELDS
+from sms_handover.configuration.schedule_fields import SCHEDULE_FIELDS
+from sms_handover.configuration.values import DEPUTY, ROBOT, SCHEDULE
+
+_NAME = re.compile(r"[^.\[\]]+")
+FIELDS: dict[str, MappingSpec] = {ROBOT: ROBOT_FIELDS, SCHEDULE: SCHEDULE_FIELDS}
+
+
+@dataclass(frozen=True)
+class ValuePath:
+    """A value that can be set by path, its present value, and unit, range and meaning as text.
+
+    ``value`` is None for a key that may be given and is not.
+    """
+
+    path: str
+    value: object
+    unit: str
+    allowed: str
+    description: str
+
+
+def value_paths(document: str, content: AnyMapping[str, Any]) -> tuple[ValuePath, ...]:
+    """Return the values of a ``robot`` or a ``schedule`` by path, in the order of its specification.
+
+    ``content`` is that of the file, which its reader has accepted. The values of the deputy, which is a
+    section of the schedule, begin with ``deputy``.
+    """
+    return tuple(_walk(document, FIELDS[document], content))
+
+
+def parameter_paths(node: str, cls: type[object], values: AnyMapping[str, object]) -> tuple[ValuePath, ...]:
+    """Return the parameters of a group by path ``node.name``, with their values by name."""
+    specs = specs_of(cls).items()
+    return tuple(_value_path(f"{node}.{name}", values[name], spec) for name, spec in specs)
+
+
+def _value_path(path: str, value: object, spec: ValueSpec) -> ValuePath:
+    """Return a value with what its specification says of it."""
+    return ValuePath(path, value, spec.unit, spec.allowed, spec.description)
+
+
+def _walk(path: str, spec: Spec, value: Any) -> Iterator[ValuePath]:
+    """Yield the values below a path; a word, or what is not given, is one value."""
+    if isinstance(spec, EitherSpec):
+        spec = spec.words if value is None or isinstance(value, str) else spec.other
+    if isinstance(spec, ValueSpec):
+        yield _value_path(path, value, spec)
+    elif isinstance(spec, MappingSpec):
+        for key, inner in spec.fields.items():
+            if key in value or (isinstance(inner, ValueSpec | EitherSpec) and key not in spec.one_of):
+                yield from _walk(_below(path, key), inner, value.get(key))
+    elif isinstance(spec, NamedSpec):
+        for name, item in value.items():
+            yield from _walk(_below(path, name), spec.each, item)
+    else:
+        for index, item in enumerate(value):
+            name = str(item.get("name", ""))
+            place = _below(path, name) if _NAME.fullmatch(name) else f"{path}[{index}]"
+            yield from _walk(place, spec.each, item)
+
+
+def _below(path: str, key: str) -> str:
+    """Return the path of a key below a path."""
+    return key if (path, key) == (SCHEDULE, DEPUTY) else f"{path}.{key}"
