@@ -47,37 +47,6 @@ _BASE = MappingSpec(
     },
     {"panels": ListSpec("solar panels", _PANEL)},
 )
-_GRIPPER = MappingSpec(
-    "a rigid uniform cylinder on the flange, the tool frame at its far end",
-    {
-        "mass": _MASS,
-        "radius": ValueSpec("radius of the cylinder", "m", above=0.0),
-        "length": ValueSpec("length from the flange to the tool frame", "m", above=0.0),
-    },
-)
-_ARM = MappingSpec(
-    "an arm of the robot",
-    {
-        "name": text("name of the arm: lower-case letters, digits and _"),
-        "description": text("file of the arm, its path relative to this file"),
-        "mount": pose("root frame of the arm in base_link"),
-        "gripper": _GRIPPER,
-        "rotor_inertia": ValueSpec(
-            "inertia of each rotor at its joint: times gear ratio squared", "kg m^2", kind=FLOATS
-        ),
-    },
-    {
-        "limits": NamedSpec(
-            "limits in place of those of the file of the arm, by joint_<number>",
-            MappingSpec("limits of one joint", optional=_LIMITS),
-        )
-    },
-)
-ROBOT_FIELDS = MappingSpec(
-    "a free-floating spacecraft with arms",
-    {"name": text("name of the robot"), "base": _BASE, "arms": ListSpec("the arms, one or more", _ARM)},
-)
-
 _LINK = MappingSpec(
     "the body that the joint moves",
     {
@@ -102,4 +71,34 @@ ARM_FIELDS = MappingSpec(
         "joints": ListSpec("joints from the mount outwards", _JOINT, shortest=1),
         "flange": pose("frame of the flange in the last link"),
     },
+)
+_GRIPPER = MappingSpec(
+    "a rigid uniform cylinder on the flange, the tool frame at its far end",
+    {
+        "mass": _MASS,
+        "radius": ValueSpec("radius of the cylinder", "m", above=0.0),
+        "length": ValueSpec("length from the flange to the tool frame", "m", above=0.0),
+    },
+)
+_ARM = MappingSpec(
+    "an arm of the robot",
+    {
+        "name": text("name of the arm: lower-case letters, digits and _"),
+        "description": EitherSpec(text("file of the arm, its path relative to this one"), ARM_FIELDS),
+        "mount": pose("root frame of the arm in base_link"),
+        "gripper": _GRIPPER,
+        "rotor_inertia": ValueSpec(
+            "inertia of each rotor at its joint: times gear ratio squared", "kg m^2", kind=FLOATS
+        ),
+    },
+    {
+        "limits": NamedSpec(
+            "limits in place of those of the file of the arm, by joint_<number>",
+            MappingSpec("limits of one joint", optional=_LIMITS),
+        )
+    },
+)
+ROBOT_FIELDS = MappingSpec(
+    "a free-floating spacecraft with arms",
+    {"name": text("name of the robot"), "base": _BASE, "arms": ListSpec("the arms, one or more", _ARM)},
 )

@@ -16,7 +16,7 @@ HOLD, TARGET_KINDS = "hold", ("joints", "tool_in_world", "grasp_frame")
 MOST_RETRIES = 100  # of one phase; more is a mistake rather than patience
 _SHORTEST = 1e-9  # [s]
 
-_DEPUTY = MappingSpec(
+DEPUTY_FIELDS = MappingSpec(
     "the object that is handed over",
     {
         "mass": ValueSpec("mass; only 0 yet", "kg", minimum=0.0),
@@ -93,7 +93,7 @@ SCHEDULE_FIELDS = MappingSpec(
                 "joints": NamedSpec("joint angles of every arm", _JOINTS),
             },
         ),
-        "deputy": _DEPUTY,
+        "deputy": DEPUTY_FIELDS,
         "phases": ListSpec("the phases in the order of time", _PHASE, shortest=1),
     },
 )

@@ -34,7 +34,8 @@ class Section:
         path: str = "",
         spec: Spec | None = None,
     ) -> None:
-        self._values, self._file, self._kind, self._path, self._spec = values, file, kind, path, spec
+        self._values, self._file, self._kind, self._path = values, values.file or file, kind, path
+        self._spec = spec
         for key in values:
             if not isinstance(key, str):
                 raise self.error(f"key {key!r} must be text", key)

@@ -16,10 +16,12 @@ from jsonschema import Draft7Validator
 from docs.reference import SCHEMAS, pages
 from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.parameters import build, read_parameter_files
+from sms_handover.configuration.robot_fields import ARM_FIELDS
+from sms_handover.configuration.sections import Section
 from sms_handover.configuration.yaml_reader import Mapping, load, read_yaml
-from sms_handover.errors import SmsHandoverError
+from sms_handover.errors import RobotDescriptionError, SmsHandoverError
 from sms_handover.graph.topics import CONTROLLER
-from sms_handover.model.arm_file import read_arm_file
+from sms_handover.model.arm_file import read_arm as arm_of
 from sms_handover.model.description import load_robot
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.ros.reference.interfaces import OWN_GROUPS
@@ -46,7 +48,7 @@ def read_robot(path: Path) -> None:
 
 
 def read_arm(path: Path) -> None:
-    read_arm_file(path, "arm_a")
+    arm_of(Section.read(path, RobotDescriptionError, ARM_FIELDS), "arm_a")
 
 
 def read_schedule(path: Path) -> None:
