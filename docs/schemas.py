@@ -15,8 +15,10 @@ from sms_handover.configuration.field_specification import (
 )
 from sms_handover.configuration.parameters import EVERY_NODE, specs_of
 from sms_handover.configuration.robot_fields import ARM_FIELDS, ROBOT_FIELDS
-from sms_handover.configuration.schedule_fields import SCHEDULE_FIELDS
-from sms_handover.graph.topics import CONTROLLER, NODES
+from sms_handover.configuration.scenario_file import COMMON, DESCRIPTION, EXTENDS, KEYS, SHORT
+from sms_handover.configuration.schedule_fields import DEPUTY_FIELDS, SCHEDULE_FIELDS
+from sms_handover.configuration.values import DEPUTY, ROBOT, ROLES, SCHEDULE
+from sms_handover.graph.topics import CONTROLLER, LOOP_NODES, NODES
 from sms_handover.ros.reference.interfaces import COMMON_GROUP, OWN_GROUPS
 
 Schema = dict[str, Any]
@@ -34,6 +36,7 @@ def schemas() -> dict[str, str]:
         "arm": schema_of(ARM_FIELDS),
         "schedule": schema_of(SCHEDULE_FIELDS),
         "parameters": _parameter_files(),
+        "scenario": _scenario(),
     }
     return {
         f"{name}.schema.json": json.dumps({"$schema": _DRAFT, **schema}, indent=1) + "\n"
@@ -95,3 +98,57 @@ def _section(parameters: Mapping[str, Spec]) -> Schema:
     """Return the schema of the section of a node."""
     inner = {**_object(parameters), "patternProperties": {_OF_ROS: {}}}
     return {"type": "object", "properties": {_PARAMETERS: inner}, "required": [_PARAMETERS]}
+
+
+def _scenario() -> Schema:
+    """Return the schema of scenario files."""
+    file = {"type": "string"}
+    definitions = {ROBOT: change_of(ROBOT_FIELDS), SCHEDULE: change_of(SCHEDULE_FIELDS)}
+    for change in definitions.values():
+        change["anyOf"][0]["properties"][EXTENDS] = {"description": "the file that is changed", **file}
+    definitions[DEPUTY] = change_of(DEPUTY_FIELDS)
+    named = {name: {"$ref": f"#/definitions/{name}"} for name in definitions}
+    of_roles = {name: named[name] for name in (ROBOT, DEPUTY)}
+    sections = {COMMON: COMMON_GROUP, **{node: OWN_GROUPS[node] for node in LOOP_NODES}}
+    properties: Schema = {
+        EXTENDS: {"description": "name of a shipped scenario, or path of a file", **file},
+        DESCRIPTION: {"description": "what the scenario is, in one line", **file},
+        ROBOT: {"anyOf": [file, named[ROBOT]]},
+        SCHEDULE: {"anyOf": [file, named[SCHEDULE]]},
+        DEPUTY: named[DEPUTY],
+        **{name: schema_of(specs_of(sections[section].cls)[name]) for name, section in SHORT.items()},
+        **{role: {"type": "object", "properties": of_roles, "additionalProperties": False} for role in ROLES},
+        **{section: _object(specs_of(group.cls)) for section, group in sections.items()},
+    }
+    properties[CONTROLLER]["additionalProperties"] = True  # parameters of laws of other packages
+    return {
+        "description": "one run: what differs from another",
+        "type": "object",
+        "properties": {key: properties[key] for key in KEYS},
+        "additionalProperties": False,
+        "definitions": definitions,
+    }
+
+
+def change_of(spec: Spec) -> Schema:
+    """Return what accepts every change that a scenario may make to a value: any part of it, null to remove.
+
+    Named things are a list, or a mapping from name to change.
+    """
+    if isinstance(spec, ValueSpec):
+        changes = [schema_of(spec)]
+    elif isinstance(spec, EitherSpec):
+        changes = [_value(spec.words), change_of(spec.other)]
+    elif isinstance(spec, NamedSpec):
+        changes = [{"type": "object", "additionalProperties": change_of(spec.each)}]
+    elif isinstance(spec, ListSpec):
+        each = change_of(spec.each)
+        changes = [{"type": "array", "items": each}]
+        if "name" in spec.each.required:
+            changes.append({"type": "object", "additionalProperties": each})
+    else:
+        properties = {key: change_of(inner) for key, inner in spec.fields.items()}
+        nothing_to_remove = {"type": "null"}
+        changes = [{"type": "object", "properties": properties, "additionalProperties": nothing_to_remove}]
+    description = spec.words.description if isinstance(spec, EitherSpec) else spec.description
+    return {"description": description, "anyOf": [*changes, {"type": "null"}]}

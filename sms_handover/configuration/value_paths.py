@@ -1,9 +1,11 @@
 """Dotted paths of all values of a document or a parameter group, each with its value, unit and range."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import reduce
 from typing import Any
 
 from sms_handover.configuration.field_specification import (
@@ -16,7 +18,8 @@ from sms_handover.configuration.field_specification import (
 from sms_handover.configuration.parameters import specs_of
 from sms_handover.configuration.robot_fields import ROBOT_FIELDS
 from sms_handover.configuration.schedule_fields import SCHEDULE_FIELDS
-from sms_handover.configuration.values import DEPUTY, ROBOT, SCHEDULE
+from sms_handover.configuration.values import DEPUTY, ROBOT, SCHEDULE, path_of
+from sms_handover.errors import UnknownNameError
 
 _NAME = re.compile(r"[^.\[\]]+")
 FIELDS: dict[str, MappingSpec] = {ROBOT: ROBOT_FIELDS, SCHEDULE: SCHEDULE_FIELDS}
@@ -43,6 +46,37 @@ def value_paths(document: str, content: AnyMapping[str, Any]) -> tuple[ValuePath
     section of the schedule, begin with ``deputy``.
     """
     return tuple(_walk(document, FIELDS[document], content))
+
+
+def require_known(values: Sequence[str], document: str, content: AnyMapping[str, Any]) -> None:
+    """Raise UnknownNameError with the nearest path on a value at one that a document cannot have."""
+    for text in values:
+        role, of_document, steps = path_of(text)
+        spec = FIELDS.get(document) if of_document == document else None
+        right = steps if spec is None else _corrected(spec, steps)
+        if right == steps:
+            continue
+        begin = f"{role}." if role else ""
+        all_paths = [item.path for item in value_paths(document, content)]
+        known = all_paths if right is None else [reduce(_below, right, document)]
+        path, listed_by = text.partition(":=")[0], "sms-handover list paths"
+        raise UnknownNameError("path", path, [f"{begin}{one}" for one in known], listed_by=listed_by)
+
+
+def _corrected(spec: Spec, steps: Sequence[str]) -> list[str] | None:
+    """Return steps with the nearest key in place of each unknown one; None where there is none."""
+    if isinstance(spec, EitherSpec):
+        spec = spec.other
+    if not steps or isinstance(spec, ValueSpec):
+        return list(steps)
+    step, *rest = steps
+    if isinstance(spec, MappingSpec):
+        nearest = get_close_matches(step, spec.fields, n=1) if step not in spec.fields else [step]
+        if not nearest:
+            return None
+        step = nearest[0]
+    below = _corrected(spec.fields[step] if isinstance(spec, MappingSpec) else spec.each, rest)
+    return None if below is None else [step, *below]
 
 
 def parameter_paths(node: str, cls: type[object], values: AnyMapping[str, object]) -> tuple[ValuePath, ...]:

@@ -1,5 +1,6 @@
 """The schemas for editors accept what the readers accept, and reject most of what they reject."""
 
+import json
 from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import dataclass
@@ -25,16 +26,38 @@ from sms_handover.model.arm_file import read_arm as arm_of
 from sms_handover.model.description import load_robot
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.ros.reference.interfaces import OWN_GROUPS
-from sms_handover.simulation.scenario import load_parameters
+from sms_handover.simulation.scenario import load_parameters, load_scenario
 from sms_handover.trajectory.load import load_schedule
 
 from ..core.conftest import SCHEDULE
 
 CONFIG = config_file("")
 MODELINE = "# yaml-language-server: $schema="
-SAMPLE = 40  # changed documents of each kind
+SAMPLE = 30  # changed documents of each kind
 CAUGHT = 0.75  # [-] least share of what the reader rejects that the schema rejects too
 _WRONG: tuple[Any, ...] = (None, True, -1, 0, 3, 0.5, 1e9, "", "wrong", "hold", [], [1.0, 2.0, 3.0], {})
+
+SCENARIOS = (
+    """
+    extends: paper
+    description: mine
+    robot:
+      base: {mass: 300, panels: null}
+      arms: {arm_b: {gripper: {mass: 0.9}, limits: {joint_2: {effort: 20}}}}
+    schedule:
+      phases: [{name: carry, duration: 30}, {name: rest, duration: 5, arms: {arm_a: hold, arm_b: hold}}]
+    deputy: {size: [0.2, 0.4, 0.2]}
+    """,
+    """
+    extends: paper
+    law: pid
+    seed: 3
+    plant: {integrator: rk4}
+    controller: {proportional: 3}
+    truth: {robot: {base: {mass: 264.0}}, deputy: {grasp_frames: {end_a: {xyz: [0.0, 0.1, 0.0]}}}}
+    model: {robot: {arms: [{name: arm_a, mount: {rpy: [0.0, 1.57, 0.0]}}]}}
+    """,
+)
 
 
 @cache
@@ -53,6 +76,10 @@ def read_arm(path: Path) -> None:
 
 def read_schedule(path: Path) -> None:
     load_schedule(path, robot(), 20_000_000)
+
+
+def read_scenario(path: Path) -> None:
+    load_scenario(path)
 
 
 def read_parameters(path: Path) -> None:
@@ -94,12 +121,13 @@ KINDS = {
     "arm": Kind(read_arm, (read_yaml(config_file("gen3.yaml")),)),
     "schedule": Kind(read_schedule, (read_yaml(config_file("handover.yaml")), load(SCHEDULE))),
     "parameters": Kind(read_parameters, (parameters(),)),
+    "scenario": Kind(read_scenario, tuple(map(load, SCENARIOS))),
 }
 
 
 @cache
 def validator(kind: str) -> Draft7Validator:
-    schema = load(pages()[SCHEMAS / f"{kind}.schema.json"])
+    schema = json.loads(pages()[SCHEMAS / f"{kind}.schema.json"])
     Draft7Validator.check_schema(schema)
     return Draft7Validator(schema)
 
