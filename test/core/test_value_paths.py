@@ -1,10 +1,14 @@
 """Every value has a path, which says unit and range, and which sets that value."""
 
+import re
 from copy import deepcopy
+from pathlib import Path
 
 import pytest
 
+from sms_handover.configuration.field_specification import EitherSpec, MappingSpec, Spec
 from sms_handover.configuration.package_files import config_file
+from sms_handover.configuration.schedule_fields import SCHEDULE_FIELDS
 from sms_handover.configuration.value_paths import ValuePath, parameter_paths, value_paths
 from sms_handover.configuration.values import DEPUTY, DOCUMENTS, ROBOT, SCHEDULE, with_values, written
 from sms_handover.configuration.yaml_reader import Mapping, load, read_yaml
@@ -68,6 +72,19 @@ def test_a_name_with_a_dot_is_replaced_by_its_index() -> None:
     content = deepcopy(CONTENTS[ROBOT][1])
     content["arms"][0]["name"] = "arm.a"
     assert "robot.arms[0].name" in by_path(value_paths(ROBOT, content))
+
+
+def keys_of(spec: Spec) -> set[str]:
+    """Return all keys that stand in mappings of a specification."""
+    if isinstance(spec, MappingSpec):
+        return {*spec.fields, *(key for inner in spec.fields.values() for key in keys_of(inner))}
+    inner = spec.other if isinstance(spec, EitherSpec) else getattr(spec, "each", None)
+    return keys_of(inner) if inner else set()
+
+
+def test_the_page_of_the_schedule_has_every_key() -> None:
+    page = Path(__file__).parents[2].joinpath("docs", "schedule.md").read_text(encoding="utf-8")
+    assert [key for key in sorted(keys_of(SCHEDULE_FIELDS)) if not re.search(rf"\b{key}\b", page)] == []
 
 
 def test_paths_of_parameters(scenario: Scenario) -> None:
