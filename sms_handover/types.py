@@ -224,6 +224,20 @@ class GraspEvent:
     detail: str
 
 
+@dataclass(frozen=True)
+class Collision:
+    """Two bodies that are nearer to each other than ``allowed`` at ``stamp_ns``: signed distances in m.
+
+    ``group`` is what reports count the two to; ``allowed`` is 0, or minus the depth of a declared contact.
+    """
+
+    stamp_ns: int
+    group: str
+    bodies: tuple[str, str]
+    distance: float
+    allowed: float
+
+
 class PhaseState(Enum):
     """Whether a phase is active, or has failed and the joints are held."""
 

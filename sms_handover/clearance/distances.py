@@ -8,8 +8,10 @@ import numpy as np
 import pinocchio as pin
 
 from sms_handover.clearance.allowed_pairs import counted_pairs
-from sms_handover.clearance.bodies import DEPUTY_BODY, Body, bodies_of, read_geometry
+from sms_handover.clearance.bodies import DEPUTY_BODY, Body, bodies_of
+from sms_handover.clearance.solids import read_solids
 from sms_handover.model.poses import se3_of
+from sms_handover.model.shape_elements import read_contacts
 from sms_handover.types import Array, Pose, read_only
 
 
@@ -45,9 +47,9 @@ class ClearanceModel:
         be read.
         """
         self._model, self._data = model, model.createData()
-        geometry = read_geometry(model, urdf)
+        geometry = read_solids(model, urdf)
         robot_bodies = bodies_of(model, geometry, arms)
-        pairs = counted_pairs(model, geometry)
+        pairs = counted_pairs(model, geometry, read_contacts(urdf))
         box = coal.Box(*(float(edge) for edge in deputy_size))
         universe = 0  # Pinocchio's number of the joint that never moves: the deputy is placed by hand
         deputy = pin.GeometryObject(DEPUTY_BODY.name, universe, pin.SE3.Identity(), box)

@@ -32,6 +32,11 @@ class Section:
         return key in self._values
 
     @property
+    def file(self) -> Path:
+        """The file, to which paths in it are relative."""
+        return self._file
+
+    @property
     def keys(self) -> tuple[str, ...]:
         """The keys in the order of the file."""
         return tuple(self._values)

@@ -634,9 +634,9 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "contact declared for ever after a release",
-        "analysis/clearance",
-        "(declared[row - 1] and distances[row] <= 0.0)",
-        "declared[row - 1]",
+        "clearance/contacts",
+        "(self.declared and distance <= 0.0)",
+        "self.declared",
         "analysis_clearance",
     ),
 )
