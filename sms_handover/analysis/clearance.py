@@ -1,5 +1,6 @@
 """The clearance of a run: how near bodies came to each other, when, and whether they might touch."""
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import pinocchio as pin
 from sms_handover.analysis.grasps import holds
 from sms_handover.clearance.contacts import CONTACT_DEPTH, GraspContact, Group, contacts_of, fixed_groups
 from sms_handover.clearance.distances import ClearanceModel
+from sms_handover.clearance.solids import MissingMeshError, require_meshes
 from sms_handover.errors import RobotDescriptionError, ScheduleError, UnknownNameError
 from sms_handover.frames import tool_frame
 from sms_handover.model.floating_model import floating_model, joint_columns
@@ -16,6 +18,8 @@ from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.run_data import RunData
 from sms_handover.trajectory.schedule_text import deputy_size, grasping_arms
 from sms_handover.types import BASE_NQ, Array, Pose
+
+_LOG = logging.getLogger(__name__)
 
 Rows = npt.NDArray[np.bool_]  # one per reference period
 
@@ -68,10 +72,14 @@ class TaskTexts:
     contact_depth: float = CONTACT_DEPTH
 
     def fit(self, run: RunData) -> bool:
-        """Whether they describe a robot with the joints of a run, and a deputy."""
+        """Whether they describe a robot with the joints of a run, and a deputy; meshes must be there."""
         try:
             joint_columns(floating_model(self.urdf), run.joint_names)
             deputy_size(self.schedule), grasping_arms(self.schedule)
+            require_meshes(self.urdf)
+        except MissingMeshError as error:
+            _LOG.warning("the clearance of the run is not judged: %s", error)
+            return False
         except (RobotDescriptionError, ScheduleError, UnknownNameError):
             return False
         return True

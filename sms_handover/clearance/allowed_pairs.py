@@ -30,13 +30,12 @@ def counted_pairs(
     touching = _always_touching(model, geometry, pairs)
     derived = set(pairs) - touching
     names = [model.frames[item.parentFrame].name for item in geometry.geometryObjects]
-    allowed, counted = (set(map(frozenset, pairs)) for pairs in (stated.allow, stated.count))
-    found = []
-    for pair in combinations(range(geometry.ngeoms), 2):
-        links = frozenset(names[item] for item in pair)
-        if links in counted or (pair in derived and links not in allowed):
-            found.append(pair)
-    return found
+    return [
+        (first, second)
+        for first, second in combinations(range(geometry.ngeoms), 2)
+        if stated.counts(names[first], names[second])
+        or ((first, second) in derived and not stated.allows(names[first], names[second]))
+    ]
 
 
 def _joined(model: pin.Model, geometry: pin.GeometryModel, first: int, second: int) -> bool:

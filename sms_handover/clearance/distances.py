@@ -10,6 +10,7 @@ import pinocchio as pin
 from sms_handover.clearance.allowed_pairs import counted_pairs
 from sms_handover.clearance.bodies import DEPUTY_BODY, Body, bodies_of
 from sms_handover.clearance.solids import read_solids
+from sms_handover.frames import DEPUTY
 from sms_handover.model.poses import se3_of
 from sms_handover.model.shape_elements import read_contacts
 from sms_handover.types import Array, Pose, read_only
@@ -49,12 +50,14 @@ class ClearanceModel:
         self._model, self._data = model, model.createData()
         geometry = read_solids(model, urdf)
         robot_bodies = bodies_of(model, geometry, arms)
-        pairs = counted_pairs(model, geometry, read_contacts(urdf))
+        stated = read_contacts(urdf)
+        pairs = counted_pairs(model, geometry, stated)
         box = coal.Box(*(float(edge) for edge in deputy_size))
         universe = 0  # Pinocchio's number of the joint that never moves: the deputy is placed by hand
         deputy = pin.GeometryObject(DEPUTY_BODY.name, universe, pin.SE3.Identity(), box)
+        links = [model.frames[item.parentFrame].name for item in geometry.geometryObjects]
         self._deputy = geometry.addGeometryObject(deputy)
-        pairs += [(body, self._deputy) for body in range(len(robot_bodies))]
+        pairs += [(body, self._deputy) for body, link in enumerate(links) if not stated.allows(link, DEPUTY)]
         for pair in pairs:
             geometry.addCollisionPair(pin.CollisionPair(*pair))
         self.bodies: tuple[Body, ...] = (*robot_bodies, DEPUTY_BODY)

@@ -14,22 +14,36 @@ from sms_handover.model.shape_elements import read_replaced
 _HULL = "Qt"  # qhull: faces with more than three corners are cut into triangles
 
 
+class MissingMeshError(RobotDescriptionError):
+    """The file of a mesh is not where the description says."""
+
+
+def require_meshes(urdf: str) -> None:
+    """Raise MissingMeshError unless the file of every solid mesh is there."""
+    try:
+        meshes = ET.fromstring(urdf).iterfind("link/collision/geometry/mesh")
+    except ET.ParseError as error:
+        raise RobotDescriptionError(f"the robot description cannot be read: {error}") from error
+    for mesh in meshes:
+        _require(mesh.get("filename", ""))
+
+
 def read_solids(model: pin.Model, urdf: str) -> pin.GeometryModel:
     """Return the solids of a description as Pinocchio's geometry, without pairs.
 
     ``model`` is Pinocchio's reading of the same text. A solid is what has a collision element; of a mesh it
     is the convex hull. What is drawn besides is solid too if all that is solid of its link is drawn, or
     nothing is: a description that draws its solids draws all of them, as the first edition's does with its
-    solar panels. Meshes that are drawn are not. Raises RobotDescriptionError if the shapes cannot be read.
+    solar panels. Meshes that are drawn are not. Raises RobotDescriptionError if the shapes cannot be read,
+    MissingMeshError where a file is missing.
     """
+    require_meshes(urdf)
     try:
         root = ET.fromstring(urdf)
-        for mesh in root.iterfind("link/collision/geometry/mesh"):
-            _require(mesh.get("filename", ""))
         folders = [str(folder) for folder in package_folders()]
         solids = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION, package_dirs=folders)
         drawn = pin.buildGeomFromUrdfString(model, _without_drawn_meshes(root), pin.GeometryType.VISUAL)
-    except (ValueError, RuntimeError, ET.ParseError) as error:
+    except (ValueError, RuntimeError) as error:
         raise RobotDescriptionError(f"the shapes of the robot cannot be read: {error}") from error
     replaced = read_replaced(urdf)
     given = list(solids.geometryObjects)
@@ -55,7 +69,7 @@ def package_folders() -> tuple[Path, ...]:
 
 
 def _require(uri: str) -> None:
-    """Raise RobotDescriptionError unless the file of a mesh is there."""
+    """Raise MissingMeshError unless the file of a mesh is there."""
     parts = urlsplit(uri)
     name = unquote(f"{parts.netloc}{parts.path}")
     if parts.scheme == "package":
@@ -65,7 +79,7 @@ def _require(uri: str) -> None:
     else:
         places, where = [Path(unquote(parts.path))], ""
     if not any(place.is_file() for place in places):
-        raise RobotDescriptionError(f"there is no mesh file {uri}{where}")
+        raise MissingMeshError(f"there is no mesh file {uri}{where}")
 
 
 def _without_drawn_meshes(root: ET.Element) -> str:

@@ -7,7 +7,7 @@ from re import fullmatch
 from types import MappingProxyType
 
 from sms_handover.errors import RobotDescriptionError, UnknownNameError
-from sms_handover.frames import BASE, joint_name, mount_frame, tool_frame
+from sms_handover.frames import BASE, DEPUTY, joint_name, mount_frame, tool_frame
 from sms_handover.model.parts import Floats, Gripper, Inertia, JointDescription, LinkDescription, Origin
 from sms_handover.model.shapes import ContactPairs, Shapes
 from sms_handover.model.validation import vector
@@ -89,7 +89,7 @@ class RobotDescription:
     """A free-floating spacecraft with one or more arms, in the order of the file.
 
     ``shapes`` has the solids of some links by name, in place of what is drawn for them, and ``contacts``
-    the pairs of links whose contact counts, or does not, whatever is derived.
+    the pairs of links, or of a link and the deputy, whose contact counts, or does not, whatever is derived.
     """
 
     name: str
@@ -106,9 +106,10 @@ class RobotDescription:
         if count > 1:
             raise RobotDescriptionError(f"arm name {name!r} is given {count} times")
         named = [link for pair in (*self.contacts.allow, *self.contacts.count) for link in pair]
-        for link in (*self.shapes, *named):
-            if link not in self.link_names:
-                raise RobotDescriptionError(str(UnknownNameError("link", link, self.link_names)))
+        for links, known in ((self.shapes, self.link_names), (named, (*self.link_names, DEPUTY))):
+            for link in links:
+                if link not in known:
+                    raise RobotDescriptionError(str(UnknownNameError("link", link, known)))
 
     @property
     def link_names(self) -> tuple[str, ...]:

@@ -84,3 +84,11 @@ class ContactPairs:
 
     allow: tuple[LinkPair, ...] = ()
     count: tuple[LinkPair, ...] = ()
+
+    def allows(self, first: str, second: str) -> bool:
+        """Whether the contact of two links is said not to count."""
+        return (first, second) in self.allow or (second, first) in self.allow
+
+    def counts(self, first: str, second: str) -> bool:
+        """Whether the contact of two links is said to count."""
+        return (first, second) in self.count or (second, first) in self.count

@@ -105,7 +105,7 @@ class GraphNode(LifecycleNode, Generic[P]):
         if self._invalid is not None:
             raise self._invalid
         self.robot: RobotModel = load_robot_model(self.common)
-        topics = graph_topics(self.robot.arms)
+        topics = graph_topics(self.robot.arms, clearance=self.common.measures_clearance)
         self.endpoints = Endpoints(self, topics, self.common.peers, self.common.external)
         self.message_filter = MessageFilter(self.get_logger().warning, self._on_first_rejected)
         self.inputs.connect(self.endpoints, self.message_filter)
