@@ -60,18 +60,21 @@ def _always_touching(
     model: pin.Model, geometry: pin.GeometryModel, pairs: list[tuple[int, int]]
 ) -> set[tuple[int, int]]:
     """Return the pairs that touch or enter each other whatever the joint angles."""
-    sampled = geometry.copy()
-    for pair in pairs:
-        sampled.addCollisionPair(pin.CollisionPair(*pair))
-    data, distances = model.createData(), pin.GeometryData(sampled)
+    sampled, data = geometry.copy(), model.createData()
     random = np.random.default_rng(_SEED)
     lower = np.maximum(model.lowerPositionLimit[BASE_NQ:], -np.pi)
     upper = np.minimum(model.upperPositionLimit[BASE_NQ:], np.pi)
-    q = pin.neutral(model)
-    touching = np.ones(len(pairs), dtype=bool)
+    q, touching = pin.neutral(model), pairs
     for _ in range(_SAMPLES):
+        if not touching:
+            break
+        sampled.removeAllCollisionPairs()
+        for pair in touching:
+            sampled.addCollisionPair(pin.CollisionPair(*pair))
+        distances = pin.GeometryData(sampled)
         q[BASE_NQ:] = random.uniform(lower, upper)
         pin.updateGeometryPlacements(model, data, sampled, distances, q)
         pin.computeDistances(sampled, distances)
-        touching &= [result.min_distance <= 0.0 for result in distances.distanceResults]
-    return {pair for pair, always in zip(pairs, touching, strict=True) if always}
+        results = zip(touching, distances.distanceResults, strict=True)
+        touching = [pair for pair, result in results if result.min_distance <= 0.0]
+    return set(touching)

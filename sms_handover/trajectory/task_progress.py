@@ -283,7 +283,7 @@ def _collision_in_words(collision: Collision) -> str:
     """Return which bodies collide, when, and how deep they are in each other."""
     first, second = collision.bodies
     depth, time_s = -collision.distance * MM_PER_M, ns_to_seconds(collision.stamp_ns)
-    return f"{first} and {second} are {depth:.2f} mm in each other at {time_s:.2f} s"
+    return f"{first} and {second} overlap by {depth:.2f} mm at {time_s:.2f} s"
 
 
 def _in_words(event: GraspEvent) -> str:
