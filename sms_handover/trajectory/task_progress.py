@@ -18,7 +18,7 @@ from sms_handover.graph.topics import TRAJECTORY
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.schedule import ArmTarget, Hold, MissAction, Phase, Schedule
 from sms_handover.types import Collision, GraspCommand, GraspEvent, GraspStatus, PhaseState, TaskPhase
-from sms_handover.units import MM_PER_M, ns_to_seconds, seconds_to_ns
+from sms_handover.units import seconds_to_ns
 
 Figures = tuple[float, float, str]  # value, limit, unit
 
@@ -213,11 +213,10 @@ class TaskProgress:
             if self._failed or collision.group in self._colliding:
                 continue
             figures = (collision.distance, collision.allowed, "m")
-            what = _collision_in_words(collision)
             if self._abort_on_collision:
-                self._fail(stamp_ns, index, COLLISION, f"{what}; the joints are held", figures)
+                self._fail(stamp_ns, index, COLLISION, f"{collision}; the joints are held", figures)
             else:
-                self._report(stamp_ns, index, COLLISION, Severity.WARNING, what, figures)
+                self._report(stamp_ns, index, COLLISION, Severity.WARNING, str(collision), figures)
         self._colliding = tuple(collision.group for collision in self._collisions)
 
     def _on_answers(self, stamp_ns: int, issue: "_Issue") -> None:
@@ -277,13 +276,6 @@ class TaskProgress:
         self._decisions.append(
             RunEvent(stamp_ns, TRAJECTORY, kind, severity, detail, phase, float(value), float(limit), unit)
         )
-
-
-def _collision_in_words(collision: Collision) -> str:
-    """Return which bodies collide, when, and how deep they are in each other."""
-    first, second = collision.bodies
-    depth, time_s = -collision.distance * MM_PER_M, ns_to_seconds(collision.stamp_ns)
-    return f"{first} and {second} overlap by {depth:.2f} mm at {time_s:.2f} s"
 
 
 def _in_words(event: GraspEvent) -> str:
