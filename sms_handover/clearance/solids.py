@@ -44,7 +44,7 @@ def read_solids(model: pin.Model, urdf: str) -> pin.GeometryModel:
         solids = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION, package_dirs=folders)
         drawn = pin.buildGeomFromUrdfString(model, _without_drawn_meshes(root), pin.GeometryType.VISUAL)
     except (ValueError, RuntimeError) as error:
-        raise RobotDescriptionError(f"the shapes of the robot cannot be read: {error}") from error
+        raise RobotDescriptionError(f"the shapes of the robot cannot be read: {_one_line(error)}") from error
     replaced = read_replaced(urdf)
     given = list(solids.geometryObjects)
     for item in drawn.geometryObjects:
@@ -95,16 +95,14 @@ def _hull(item: pin.GeometryObject) -> coal.ConvexBase:
     """Return the convex hull of a mesh; raises RobotDescriptionError if it has none."""
     mesh = item.geometry
     try:
-        built = mesh.buildConvexHull(True, _HULL)
+        mesh.buildConvexHull(True, _HULL)
     except RuntimeError as error:
         raise RobotDescriptionError(f"{item.meshPath} has no convex hull: {_one_line(error)}") from error
-    if not built:
-        raise RobotDescriptionError(f"{item.meshPath} has no convex hull")
     return mesh.convex
 
 
 def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())[:200]
+    return " ".join(str(error).split())
 
 
 def _same(one: pin.GeometryObject, other: pin.GeometryObject) -> bool:
