@@ -5,7 +5,8 @@ from itertools import pairwise
 
 import pytest
 
-from sms_handover.analysis.clearance import CONTACT_DEPTH, TaskTexts, run_clearance
+from sms_handover.analysis.clearance import TaskTexts, run_clearance
+from sms_handover.clearance.contacts import CONTACT_DEPTH
 from sms_handover.clearance.monitor import PeriodClearance
 from sms_handover.errors import CollisionError
 from sms_handover.graph.events import COLLISION, RunEvent, Severity
