@@ -39,7 +39,7 @@ def check_collisions(scenario: Scenario, options: Namespace) -> None:
     if options.no_dry_run or CONTROLLER in common.external:
         return
     with Progress(after_s=_AFTER_S) as progress:
-        end_ns = common.last_tick(scenario.schedule.end_ns) * common.tick_ns
+        end_ns = common.last_tick(scenario.end_ns) * common.tick_ns
 
         def show(stamp_ns: int, phase: TaskPhase) -> None:
             if progress.due:

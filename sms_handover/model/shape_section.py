@@ -1,5 +1,8 @@
 """Shape section ``clearance`` of a robot description: solids in place of what is drawn, pairs that count."""
 
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
 from sms_handover.configuration.sections import Section
 from sms_handover.model.arm_file import read_origin
 from sms_handover.model.shapes import (
@@ -60,14 +63,12 @@ def _geometry(section: Section, kind: str) -> Geometry:
 
 
 def _uri(section: Section) -> str:
-    """Return the URI of a mesh file: a path is relative to the file of the section and must be there."""
-    name = section.text("file")
-    if "://" in name:
-        return name
-    file = (section.file.parent / name).resolve()
-    if not file.is_file():
-        raise section.error(f"{section.path('file')}: there is no mesh file {file}", "file")
-    return file.as_uri()
+    """Return the URI of a mesh file, which must be there unless it is of a package."""
+    uri = section.text("file")
+    parts = urlsplit(uri)
+    if parts.scheme == "file" and not Path(unquote(parts.path)).is_file():
+        raise section.error(f"{section.path('file')}: there is no mesh file {unquote(parts.path)}", "file")
+    return uri
 
 
 def _pairs(section: Section, key: str) -> tuple[LinkPair, ...]:

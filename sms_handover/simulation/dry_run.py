@@ -38,15 +38,17 @@ class DryRun:
 
 
 def dry_run(scenario: Scenario, progress: Progress | None = None) -> DryRun:
-    """Return the collisions of a scenario under its own law, dynamics and ideal connections.
+    """Return the collisions of a scenario under its own law and dynamics, as far as the model knows.
 
-    In lock step these are those of the run, bit for bit. Clearance is measured each reference period; a
-    shallower contact between two of them goes unseen. ``progress`` is called each reference period with the
-    time in ns and the phase. Raises what :class:`~sms_handover.simulation.loop.Loop` does.
+    In lock step these are those of the run, bit for bit, unless truth and model differ; how far they do,
+    nobody knows before a run. They are measured each reference period, so that bodies which touch between two
+    of them alone go unseen. ``progress`` is called each period with the time in ns and the phase. Raises what
+    :class:`~sms_handover.simulation.loop.Loop` does.
     """
     parameters = scenario.parameters
     common = replace(parameters.common, clearance=ONLINE)
-    loop = Loop(replace(scenario, parameters=replace(parameters, common=common)))
+    known = replace(scenario, parameters=replace(parameters, common=common), truth=scenario.model)
+    loop = Loop(known)
     found: list[Collision] = []
     while not loop.finished:
         tick = loop.advance()

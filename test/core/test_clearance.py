@@ -1,6 +1,5 @@
 """Signed distances against closed forms, and which pairs of bodies count."""
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations, pairwise
@@ -21,7 +20,7 @@ from sms_handover.model.description import load_robot
 from sms_handover.model.parts import Origin
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.model.shapes import Box, Capsule, ContactPairs, Cylinder, Mesh, Shape, Sphere
-from sms_handover.simulation.scenario import Scenario
+from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.types import Array, Pose
 
 from .conftest import Draw
@@ -284,16 +283,16 @@ clearance:
 )
 def test_what_a_robot_file_may_not_say_of_clearance(path: str, value: object, words: str) -> None:
     with pytest.raises(RobotDescriptionError, match=words) as told:
-        load_robot(values=[f"robot.clearance.{path}:={json.dumps(value)}"])
+        load_scenario(values={f"robot.clearance.{path}": value})
     assert "\n" not in str(told.value)
 
 
 def test_a_third_of_random_poses_overlap(robot: RobotModel, scenario: Scenario) -> None:
     """111 of 300 did in the measurement that made restarts look out for overlaps: here three sigma of it."""
-    model = ClearanceModel(robot.pin, robot.urdf, robot.arms, scenario.schedule.deputy.size)
+    model = ClearanceModel(robot.pin, robot.urdf, robot.arms, scenario.truth.schedule.deputy.size)
     deputy, base, draw = (
-        scenario.schedule.deputy.deputy_in_world,
-        scenario.schedule.base_in_world,
+        scenario.truth.schedule.deputy.deputy_in_world,
+        scenario.truth.schedule.base_in_world,
         Draw(robot, 16),
     )
     count, share = 300, 111 / 300

@@ -29,7 +29,7 @@ ABORT = {"on_collision": "abort"}
 def run(scenario: Scenario) -> tuple[RunData, list[PeriodClearance]]:
     """Return a run with the clearance of its periods."""
     loop = Loop(scenario)
-    recorder, periods = RunRecorder(scenario.robot.joint_names, scenario.robot.arms, 1), []
+    recorder, periods = RunRecorder(scenario.truth.robot.joint_names, scenario.truth.robot.arms, 1), []
     while not loop.finished:
         tick = loop.advance()
         recorder.add(tick)
@@ -50,7 +50,7 @@ def online(make_scenario: MakeScenario) -> Scenario:
 def test_it_sees_what_the_recorded_run_shows(online: Scenario) -> None:
     """The same groups; in each the least of the periods, unless ticks between two of them come nearer."""
     data, periods = run(online)
-    after = run_clearance(data, TaskTexts(online.robot.urdf, online.schedule.text))
+    after = run_clearance(data, TaskTexts(online.truth.robot.urdf, online.truth.schedule.text))
     least: dict[str, float] = {}
     for item in (item for period in periods for item in period.groups):
         least[item.group] = min(item.distance, least.get(item.group, item.distance))
@@ -115,7 +115,7 @@ def test_the_depth_of_a_contact_is_a_parameter(make_scenario: MakeScenario) -> N
     )
     data, _ = run(deep)
     assert not collisions_in(data)
-    after = run_clearance(data, TaskTexts(deep.robot.urdf, deep.schedule.text, 0.2))
+    after = run_clearance(data, TaskTexts(deep.truth.robot.urdf, deep.truth.schedule.text, 0.2))
     assert not after.collisions and any(group.allowed == -0.2 for group in after.groups)
     assert load_parameters().common.contact_depth == CONTACT_DEPTH
 

@@ -9,6 +9,7 @@ from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import read_info
 from sms_handover.bag.run.reader import read_run
 from sms_handover.graph.topics import CLEARANCE, CONTAINER, RECORDER
+from sms_handover.launcher.recorded_scenario import scenario_in
 from sms_handover.run_data import RunData
 from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.scenario import Scenario, load_scenario
@@ -79,7 +80,8 @@ def test_compiled_dynamics(schedule: Path, simulated: dict[str, RunData], tmp_pa
     assert ended.code == 0, ended
     run = read_run(tmp_path / "out" / "bag")
     assert_same_bits(
-        run, simulate(load_scenario({"common": {"schedule": str(schedule), "dynamics": "compiled"}}))
+        run,
+        simulate(load_scenario(values={"common": {"schedule": str(schedule), "dynamics": "compiled"}})),
     )
     assert run.joint_velocity.tobytes() != simulated["nmpc"].joint_velocity.tobytes()
 
@@ -96,7 +98,7 @@ def test_a_collision_ends_the_run_in_the_same_tick(schedule: Path, tmp_path: Pat
     bag = tmp_path / "out" / "bag"
     assert sms_handover("bag", "check", bag, cwd=tmp_path).code == 0
     common = {"schedule": str(schedule), "on_collision": "abort"}
-    scenario = load_scenario({"common": common, "trajectory": {"failure_hold": 0.05}})
+    scenario = load_scenario(values={"common": common, "trajectory": {"failure_hold": 0.05}})
     assert_same_bits(read_run(bag), simulate(scenario))
     assert measured_in(bag) == measured_by(scenario)
 
@@ -121,6 +123,27 @@ def measured_by(scenario: Scenario) -> list[list[tuple[float, list[float]]]]:
             groups = period.clearance.groups
             found.append([(g.distance, g.nearest.points_in_world.ravel().tolist()) for g in groups])
     return found
+
+
+def test_every_node_has_the_robot_that_is_its(
+    schedule: Path, simulated: dict[str, RunData], tmp_path: Path
+) -> None:
+    """The plant is heavier than all others believe: read back from the bag, and repeated bit for bit."""
+    scenario = tmp_path / "heavy.yaml"
+    truth = "truth: {robot: {base: {mass: 264.0}}}"
+    scenario.write_text(f"extends: paper\nschedule: {schedule}\n{truth}\n", encoding="utf-8")
+    believed = "model.robot.arms.arm_a.gripper.mass:=0.7"
+    ended = sms_handover("run", scenario, "-p", believed, "-o", "out", cwd=tmp_path)
+    assert ended.code == 0, ended
+    bag = tmp_path / "out" / "bag"
+    same = load_scenario(scenario, {"model.robot.arms.arm_a.gripper.mass": 0.7})
+    assert_same_bits(read_run(bag), simulate(same))
+    assert compare_runs(read_run(bag), simulated["nmpc"])
+    found = scenario_in(read_info(bag), tmp_path)
+    assert (found.truth.robot.urdf, found.model.robot.urdf) == (same.truth.robot.urdf, same.model.robot.urdf)
+    assert found.truth.robot.mass - found.model.robot.mass == pytest.approx(24.0 - (0.7 - 0.6451))
+    scenario.unlink()  # the bag alone says what it was made with
+    assert sms_handover("reproduce", bag, cwd=tmp_path).code == 0
 
 
 def test_the_laws_differ(simulated: dict[str, RunData]) -> None:
