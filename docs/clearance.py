@@ -12,6 +12,33 @@ from sms_handover.simulation.simulate import simulate
 from sms_handover.trajectory.time_law import TIME_LAWS
 from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
 
+_WHEN = [
+    (
+        "before",
+        "`run` simulates the run in one process with the law, dynamics and model of the scenario: seconds. "
+        "`--no-dry-run` leaves it out; a controller of your own has none",
+        "a warning with bodies, time and depth; with `--reject-collisions` exit code 2, nothing is started",
+    ),
+    (
+        "during",
+        "`common.clearance: online`: the plant measures each reference period and publishes "
+        "[`clearance`](topics.md)",
+        "an event `collision` when it begins, a warning",
+    ),
+    (
+        "during",
+        "`common.on_collision: abort`, which sets the above",
+        "the phase has failed one period later: [the joints are held]"
+        "(watchdogs.md#a-phase-that-has-failed), the run ends with exit code 1, its bag is complete",
+    ),
+    (
+        "after",
+        "`simulate`, `compare`, `report`, from the recorded states: each reference period, and each tick "
+        "around the least distance of a group",
+        "rows in their tables; `simulate` warns, with `--reject-collisions` its exit code is 1",
+    ),
+]
+
 PAGE = Path(__file__).resolve().parent / "clearance.md"
 
 
@@ -59,12 +86,7 @@ from its grasp, until it has let go and the two have come apart. It may be `comm
 
 ## Before, during and after a run
 
-| When | How | Collision |
-|---|---|---|
-| before | `run` simulates the run in one process with the law, dynamics and model of the scenario: seconds. `--no-dry-run` leaves it out; a controller of your own has none | a warning with bodies, time and depth; with `--reject-collisions` exit code 2, nothing is started |
-| during | `common.clearance: online`: the plant measures each reference period and publishes [`clearance`](topics.md) | an event `collision` when it begins, a warning |
-| during | `common.on_collision: abort`, which sets the above | the phase has failed one period later: [the joints are held](watchdogs.md#a-phase-that-has-failed), the run ends with exit code 1, its bag is complete |
-| after | `simulate`, `compare`, `report`, from the recorded states: each reference period, and each tick around the least distance of a group | rows in their tables; `simulate` warns, with `--reject-collisions` its exit code is 1 |
+{table(("When", "How", "Collision"), _WHEN)}
 
 `simulate` is its own dry run. With `report`, the default, a collision changes no exit code: the scenario
 `colliding` is there to be run. Online a contact that begins and ends between two reference periods is
