@@ -218,7 +218,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self._loop_clock.published()
         self._outputs.publish_rest(self._plant, with_reference=with_reference)
         if with_reference and not self.lockstep:
-            self._clearance.publish(self._plant, self._phase_index)
+            self._clearance.publish(self._plant, self._plant.deputy.deputy_in_world, self._phase_index)
 
     def _resend(self) -> None:
         """Publish the state of this tick again if nothing has answered it for a while (lock step).
@@ -318,11 +318,12 @@ class PlantNode(GraphNode[PlantParameters]):
         self._phase_index = task.index
         if task.end_ns:
             self._last_tick = self.common.last_tick(task.end_ns, failed=task.failed)
+        deputy_in_world = self._plant.deputy.deputy_in_world  # as published; a grasp rounds it anew
         for event in self._plant.execute(task.commands):
             self._publish[GRASP_EVENT].publish(event_message(event))
             self.get_logger().info(f"{event.command.action.value}: {event.status.value}, {event.detail}")
         if self.lockstep:  # of this very period: the trajectory waits for it
-            self._clearance.publish(self._plant, task.index)
+            self._clearance.publish(self._plant, deputy_in_world, task.index)
 
     # What the services of the run's control ask for
 

@@ -10,6 +10,7 @@ from sms_handover.ros.node.endpoints import CountedPublisher
 from sms_handover.simulation.parameters import CommonParameters
 from sms_handover.simulation.wiring import make_monitor
 from sms_handover.trajectory.schedule import Schedule
+from sms_handover.types import Pose
 
 
 class PlantClearance:
@@ -31,11 +32,10 @@ class PlantClearance:
         if self._monitor:
             self._monitor.reset()
 
-    def publish(self, plant: FreeFloatingPlant, phase: int) -> None:
+    def publish(self, plant: FreeFloatingPlant, deputy_in_world: Pose, phase: int) -> None:
         """Publish the clearance of this instant in the phase of an index of the schedule."""
         if self._monitor is None or self._publisher is None:
             return
-        deputy = plant.deputy
-        pose, holder = deputy.deputy_in_world, deputy.holder
-        clearance = self._monitor.measure(plant.stamp_ns, plant.q, pose, phase, holder)
+        holder = plant.deputy.holder
+        clearance = self._monitor.measure(plant.stamp_ns, plant.q, deputy_in_world, phase, holder)
         self._publisher.publish(clearance_message(clearance))
