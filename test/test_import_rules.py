@@ -54,7 +54,7 @@ ALLOWED: dict[str, set[str]] = {
     "scene": {"messages", "model", "trajectory", "bag"},
     "playback": {"messages", "bag"},
     "export": {"messages", "bag"},
-    "report": {"plant", "bag", "analysis", "scene"},
+    "report": {"plant", "clearance", "bag", "analysis", "scene"},
     "ros": CORE,
     "nodes": CORE | {"ros"},
     "external": CORE | {"ros", "nodes"},
