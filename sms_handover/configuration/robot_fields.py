@@ -1,5 +1,6 @@
 """Fields of the files that describe a robot: robot.yaml, and the file of an arm that it names."""
 
+from sms_handover.configuration.clearance_fields import clearance_fields
 from sms_handover.configuration.field_specification import (
     FLOATS,
     EitherSpec,
@@ -101,4 +102,5 @@ _ARM = MappingSpec(
 ROBOT_FIELDS = MappingSpec(
     "a free-floating spacecraft with arms",
     {"name": text("name of the robot"), "base": _BASE, "arms": ListSpec("the arms, one or more", _ARM)},
+    {"clearance": clearance_fields(pose("frame of the shape in its link"))},
 )

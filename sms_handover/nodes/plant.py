@@ -27,6 +27,7 @@ from sms_handover.graph.topics import (
     TASK_PHASE,
 )
 from sms_handover.nodes.parts.marker import deputy_marker
+from sms_handover.nodes.parts.plant_clearance import PlantClearance
 from sms_handover.nodes.parts.plant_outputs import PlantOutputs
 from sms_handover.nodes.parts.run_control import RunControl
 from sms_handover.nodes.parts.watchdogs import AnswerWatchdog, CommandWatchdog, lag_skipped
@@ -85,6 +86,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self._reconfigured = self.runs > 0
         self._wait_for_others()
         self._make_endpoints()
+        self._clearance = PlantClearance(self.robot, schedule, self.common, self.endpoints.publisher)
         self.create_timer(_TIMING_PERIOD_S, self._publish_timing)
         if self.lockstep:
             self.create_timer(self.parameters.resend_after, self._resend)
@@ -217,6 +219,8 @@ class PlantNode(GraphNode[PlantParameters]):
         self._outputs.publish_rest(self._plant, with_reference=with_reference)
         if excesses := self._plant.take_excesses():
             self._publish_excesses(excesses)
+        if with_reference:
+            self._clearance.state_published(self._plant)
 
     def _publish_excesses(self, excesses: Iterable[RunEvent]) -> None:
         """Publish limits of joints that have been exceeded."""
@@ -320,9 +324,11 @@ class PlantNode(GraphNode[PlantParameters]):
         self._failed_phase = task.name if task.failed else ""
         if task.end_ns:
             self._last_tick = self.common.last_tick(task.end_ns, failed=task.failed)
+        self._clearance.phase_begins(self._plant, task.index)
         for event in self._plant.execute(task.commands):
             self._publish[GRASP_EVENT].publish(event_message(event))
             self.get_logger().info(f"{event.command.action.value}: {event.status.value}, {event.detail}")
+        self._clearance.commands_executed(self._plant)
 
     # What the services of the run's control ask for
 
@@ -346,6 +352,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self.membership.finished = False
         self._control.reset_run()
         self._plant.reset()
+        self._clearance.reset()
         self._inputs.reset_run()
         for order in self._orders.values():
             order.reset()
