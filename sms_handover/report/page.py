@@ -42,7 +42,10 @@ def report_page(runs: Sequence[RecordedRun]) -> str:
         policy=content_security_policy((*scripts, *inline_scripts(moving.html))),
         style=web_file("report.css"),
         scripts=scripts,
-        runs=[run_card(run, style) for run, style in zip(runs, styles, strict=True)],
+        runs=[
+            run_card(run, style, comparison.runs[run.name].completion)
+            for run, style in zip(runs, styles, strict=True)
+        ],
         highlights=highlights(comparison),
         sections=figure_sections(comparison, common_tolerance(runs)),
         claims=comparison.claims,
