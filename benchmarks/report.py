@@ -41,7 +41,7 @@ def measure(paths: Sequence[Path], folder: Path) -> Result:
             "the whole command": lambda: subprocess.run(command, check=True, capture_output=True),
             "reading the bags": lambda: read_all(paths),
             "signals, thinned": lambda: plot_groups([run.data for run in runs]),
-            "scenes for the animation": lambda: animation(runs),
+            "scenes for the animation": lambda: animation(runs, [None] * len(runs)),
             "the page, both of these included": lambda: report_page(runs),
         },
         ROUNDS,
@@ -50,7 +50,7 @@ def measure(paths: Sequence[Path], folder: Path) -> Result:
     parts = {
         "the page": size_mb,
         "of it plotly.js": len(plotly_script()) / _MB,
-        "of it the animation, three.js included": len(animation(runs).html) / _MB,
+        "of it the animation, three.js included": len(animation(runs, [None] * len(runs)).html) / _MB,
     }
     verdict = (
         f"Allowed are {LONGEST_S:g} s and {LARGEST_MB:g} MB; "

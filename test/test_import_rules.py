@@ -51,7 +51,7 @@ ALLOWED: dict[str, set[str]] = {
     "simulation": {"model", *MIDDLE, "compiled"},
     "bag": {"messages", "model", "simulation"},
     "analysis": {"model", "trajectory", "clearance", "simulation", "bag", "scene"},
-    "scene": {"messages", "model", "trajectory", "bag"},
+    "scene": {"messages", "model", "trajectory", "clearance", "bag"},
     "playback": {"messages", "bag"},
     "export": {"messages", "bag"},
     "report": {"plant", "bag", "analysis", "scene"},

@@ -1,15 +1,17 @@
 """The clearance of a run: how near bodies came to each other, when, and whether they might touch."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sms_handover.analysis.clearance_series import ClearanceSeries, SeriesOfGroups
 from sms_handover.analysis.grasps import holds
 from sms_handover.clearance.bodies import Body, BodyKind
 from sms_handover.clearance.distances import ClearanceModel
+from sms_handover.clearance.worst_pair import NearestRecord
 from sms_handover.errors import RobotDescriptionError, ScheduleError, UnknownNameError
 from sms_handover.frames import tool_frame
 from sms_handover.model.floating_model import floating_model, joint_columns
@@ -49,9 +51,10 @@ class GroupClearance:
 
 @dataclass(frozen=True)
 class RunClearance:
-    """The clearance of every group of bodies of a run, the worst one first."""
+    """The clearance of every group of bodies of a run, the worst one first, and its course over time."""
 
     groups: tuple[GroupClearance, ...]
+    series: ClearanceSeries | None = field(default=None, compare=False, repr=False)
 
     @property
     def collisions(self) -> tuple[GroupClearance, ...]:
@@ -92,14 +95,17 @@ def run_clearance(run: RunData, texts: TaskTexts, contact_depth: float = CONTACT
         for name, contact, rows in course.groups_of(one, other, sampled[:, pair]):
             if rows.any():
                 groups.setdefault((name, contact), []).append((pair, rows))
-    found = []
+    found, series = [], SeriesOfGroups(sampled)
     for (name, contact), members in groups.items():
         pair, rows = min(members, key=lambda member: float(sampled[member[1], member[0]].min()))
         least, stamp_ns = course.refined(pair, rows, sampled[:, pair])
         one, other = course.model.pairs[pair]
         allowed = -contact_depth if contact else 0.0
         found.append(GroupClearance(name, least, allowed, stamp_ns, (one.name, other.name)))
-    return RunClearance(tuple(sorted(found, key=lambda group: group.margin)))
+        series.add(name, allowed, found[-1].margin, members)
+    return RunClearance(
+        tuple(sorted(found, key=lambda group: group.margin)), course.series(series, contact_depth)
+    )
 
 
 class _Course:
@@ -109,6 +115,7 @@ class _Course:
         self._pin = floating_model(texts.urdf)
         self._run, self._data = run, self._pin.createData()
         self.model = ClearanceModel(self._pin, texts.urdf, run.arms, deputy_size(texts.schedule))
+        self._nearest = NearestRecord(self.model)
         self._columns = joint_columns(self._pin, run.joint_names)
         usable = np.isfinite(run.deputy_pose).all(axis=1)
         ticks = np.searchsorted(run.tick_ns, run.reference_ns)
@@ -123,9 +130,16 @@ class _Course:
 
     def sampled(self) -> Array:
         """Return the distances (M, pairs) m at the reference periods."""
-        return np.array(
-            [self.model.distances(self._q(tick), self._deputy(row)) for row, tick in enumerate(self._ticks)]
-        ).reshape(self._ticks.size, len(self.model.pairs))
+        distances = np.empty((self._ticks.size, len(self.model.pairs)))
+        for row, tick in enumerate(self._ticks):
+            distances[row] = self.model.distances(self._q(tick), self._deputy(row))
+            self._nearest.keep(distances[row])
+        return distances
+
+    def series(self, groups: SeriesOfGroups, contact_depth: float) -> ClearanceSeries:
+        """Return the sampled distances over time, with the worst pair of each reference period."""
+        worst = self._nearest.worst(self._stamps, groups.sampled, groups.declared, contact_depth)
+        return ClearanceSeries(self._stamps, groups.groups(), groups.allowed, worst)
 
     def groups_of(self, one: Body, other: Body, distances: Array) -> Iterator[tuple[str, bool, Rows]]:
         """Yield the groups that a pair counts to: name, whether the contact is declared, and when."""

@@ -54,7 +54,7 @@ def render(comparison: Comparison, tolerance: Tolerance | None = None) -> str:
 
 
 def figure_sections(comparison: Comparison, tolerance: Tolerance | None = None) -> tuple[Section, ...]:
-    """Return every figure of a comparison except the claims: completion, grasps, each phase, torques, physics."""
+    """Return every figure of a comparison but the claims: completion, grasps, phases, torques, physics."""
     runs = list(comparison.runs.values())
     return (
         Section("Task", _completion_rows(comparison)),

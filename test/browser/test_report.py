@@ -268,6 +268,20 @@ def test_the_animation_moves_and_shares_its_time_with_the_plots(opened: Open) ->
     assert visit.errors == []
 
 
+def test_clearance_is_drawn_with_the_lines_that_it_must_stay_above(opened: Open) -> None:
+    visit = opened()
+    frame_of(visit.page, "clearance")
+    plot = "plots.plots.find((plot) => plot.plot.key === 'clearance')"
+    shapes = visit.page.evaluate(
+        f"{plot}.frame.layout.shapes.filter((s) => s.type === 'line').map((s) => s.y0)"
+    )
+    assert shapes == [0, -1]  # mm
+    low, high = visit.page.evaluate(f"{plot}.frame.layout.yaxis.range")
+    least = visit.page.evaluate(f"Math.min(...{plot}.lines.flatMap((line) => [...line.values]))")
+    assert low < min(least, -1.0) and 0.0 < high < 250.0
+    assert visit.errors == []
+
+
 def test_nothing_in_a_bag_runs_as_a_script(opened: Open, tmp_path: Path) -> None:
     evil = report_page([read_recorded(EVIL, evil_bag(tmp_path / "evil"))])
     visit = opened(evil, before="window.broken = () => { window.ran = true; };")
