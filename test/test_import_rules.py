@@ -53,7 +53,7 @@ ALLOWED: dict[str, set[str]] = {
     "analysis": {"model", "trajectory", "clearance", "simulation", "bag", "scene"},
     "scene": {"messages", "model", "trajectory", "clearance", "bag"},
     "playback": {"messages", "bag"},
-    "export": {"messages", "bag"},
+    "export": {"messages", "model", "clearance", "bag"},
     "report": {"plant", "bag", "analysis", "scene"},
     "ros": CORE,
     "nodes": CORE | {"ros"},

@@ -20,13 +20,13 @@ def counted_pairs(model: pin.Model, geometry: pin.GeometryModel) -> list[tuple[i
         (first, second)
         for first in range(geometry.ngeoms)
         for second in range(first + 1, geometry.ngeoms)
-        if not _joined(model, geometry, first, second)
+        if not joined(model, geometry, first, second)
     ]
     touching = _always_touching(model, geometry, pairs)
     return [pair for pair in pairs if pair not in touching]
 
 
-def _joined(model: pin.Model, geometry: pin.GeometryModel, first: int, second: int) -> bool:
+def joined(model: pin.Model, geometry: pin.GeometryModel, first: int, second: int) -> bool:
     """Whether two bodies are fixed to each other, or are neighbours along a chain of links."""
     one, other = geometry.geometryObjects[first], geometry.geometryObjects[second]
     if one.parentJoint == other.parentJoint:
