@@ -90,7 +90,7 @@ def _solid(model: pin.Model, item: pin.GeometryObject) -> Solid:
             return Solid(frame.name, kind, (float(shape.radius), float(shape.halfLength)), pose)
     if isinstance(shape, coal.ConvexBase):
         return Solid(frame.name, "mesh", (), pose, shape.points())
-    name = type(shape).__name__
+    allowed = "a box, sphere, cylinder, capsule or convex hull"
     raise RobotDescriptionError(
-        f"link {frame.name!r} has a {name} as a solid, must be a box, sphere, cylinder, capsule or convex hull"
+        f"link {frame.name!r} has a {type(shape).__name__} as a solid, must be {allowed}"
     )

@@ -89,12 +89,13 @@ class _Writer:
 
     def meshes(self, root: ET.Element) -> None:
         """Add the vertices of all convex hulls."""
-        hulls = {index: solid for index, solid in enumerate(self._solids) if solid.vertices is not None}
-        if hulls:
-            asset = ET.SubElement(root, "asset")
-            for index, solid in hulls.items():
-                vertices = np.ravel(solid.vertices)
-                ET.SubElement(asset, "mesh", name=_hull(index), vertex=_text(vertices), inertia="convex")
+        asset = ET.Element("asset")
+        for index, solid in enumerate(self._solids):
+            if solid.vertices is not None:
+                vertices = _text(np.ravel(solid.vertices))
+                ET.SubElement(asset, "mesh", name=_hull(index), vertex=vertices, inertia="convex")
+        if len(asset):
+            root.append(asset)
 
     def fill(self, body: ET.Element, link: TreeLink) -> None:
         """Give a body its inertia, its solids, and the bodies that it carries."""

@@ -33,12 +33,12 @@ def scenes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Scene]:
     schedule.write_text(short_handover(stretch=3.0), encoding="utf-8")
     made = {}
     for law in ("nmpc", "pid"):
-        scenario = load_scenario({"common": {"schedule": str(schedule)}, "controller": {"law": law}})
-        run, urdf = simulate(scenario), scenario.robot.urdf
-        series = run_clearance(run, TaskTexts(urdf, scenario.schedule.text)).series
+        scenario = load_scenario(values={"common": {"schedule": str(schedule)}, "controller": {"law": law}})
+        run, truth = simulate(scenario), scenario.truth
+        series = run_clearance(run, TaskTexts(truth.robot.urdf, truth.schedule.text)).series
         assert series is not None
-        size, rate = scenario.schedule.deputy.size, FRAME_RATE
-        made[law] = make_scene(run, urdf, size, rate, series.worst_pair)
+        size, rate = truth.schedule.deputy.size, FRAME_RATE
+        made[law] = make_scene(run, truth.robot.urdf, size, rate, series.worst_pair)
     return made
 
 

@@ -35,7 +35,7 @@ def run(scenario: Scenario) -> RunData:
 
 @pytest.fixture
 def series(run: RunData, scenario: Scenario) -> ClearanceSeries:
-    found = run_clearance(run, TaskTexts(scenario.robot.urdf, scenario.schedule.text)).series
+    found = run_clearance(run, TaskTexts(scenario.truth.robot.urdf, scenario.truth.schedule.text)).series
     assert found is not None
     return found
 
@@ -44,7 +44,7 @@ def test_distances_over_time_are_those_of_the_model(
     series: ClearanceSeries, run: RunData, scenario: Scenario
 ) -> None:
     """Measured again one by one, from another start of coal's search, which ends within 1e-6 m."""
-    robot, size = scenario.robot, scenario.schedule.deputy.size
+    robot, size = scenario.truth.robot, scenario.truth.schedule.deputy.size
     model = ClearanceModel(robot.pin, robot.urdf, run.arms, size)
     assert np.array_equal(series.stamp_ns, run.reference_ns)
     for row in (0, 30, len(series.stamp_ns) - 1):
