@@ -30,7 +30,7 @@ def robot_files(urdf: str, rotor_inertia: Mapping[str, float] | None = None) -> 
     """Return the files of a robot that URDF text describes.
 
     ``rotor_inertia`` kg m^2 by joint goes to MJCF. Links do not collide in MJCF, and need not be checked by
-    the SRDF, where clearance does not count either. Raises RobotDescriptionError if the text is no robot.
+    the SRDF, where their clearance does not count. Raises RobotDescriptionError if the text is no robot.
     """
     model = floating_model(urdf)
     solids = read_geometry(model, urdf)
@@ -46,15 +46,17 @@ def robot_files(urdf: str, rotor_inertia: Mapping[str, float] | None = None) -> 
 
 
 def _disabled(model: pin.Model, solids: pin.GeometryModel) -> list[DisabledPair]:
-    """Return the pairs of links none of whose solids count with each other, in the order of the solids."""
+    """Return the pairs of links of which solids do not count with each other, in the order of the solids.
+
+    SRDF knows links only: where one pair of solids always touches, its links would never be apart.
+    """
     links = [model.frames[item.parentFrame].name for item in solids.geometryObjects]
-    counted = {frozenset((links[a], links[b])) for a, b in counted_pairs(model, solids)}
+    counted = set(counted_pairs(model, solids))
     found: dict[frozenset[str], DisabledPair] = {}
     for a, b in combinations(range(len(links)), 2):
-        pair = frozenset((links[a], links[b]))
-        if links[a] == links[b] or pair in counted or pair in found:
-            continue
-        found[pair] = DisabledPair(links[a], links[b], _reason(model, solids, a, b))
+        if links[a] != links[b] and (a, b) not in counted:
+            pair = DisabledPair(links[a], links[b], _reason(model, solids, a, b))
+            found.setdefault(frozenset((links[a], links[b])), pair)
     return list(found.values())
 
 

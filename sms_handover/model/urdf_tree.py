@@ -85,19 +85,28 @@ def read_urdf(urdf: str) -> UrdfTree:
         joints = tuple(map(_joint, root.findall("joint")))
     except ET.ParseError as error:
         raise RobotDescriptionError(f"the robot description cannot be read: {error}") from error
-    children = {joint.child for joint in joints}
     for joint in joints:
         for name in (joint.parent, joint.child):
             if name not in links:
-                raise RobotDescriptionError(
-                    f"joint {joint.name!r} refers to link {name!r}, which is not there"
-                )
+                raise RobotDescriptionError(f"joint {joint.name!r}: there is no link {name!r}")
+    children = {joint.child for joint in joints}
     roots = [name for name in links if name not in children]
-    if len(roots) != 1 or len(children) != len(joints):
+    tree = UrdfTree(root.get("name", ""), roots[0] if roots else "", links, joints)
+    if len(roots) != 1 or len(children) != len(joints) or _reached(tree) != {*links}:
         raise RobotDescriptionError(
-            f"the links of a robot must be one tree, with one root; these have {', '.join(roots) or 'none'}"
+            f"the links of a robot must be one tree with one root, its roots are {', '.join(roots) or 'none'}"
         )
-    return UrdfTree(root.get("name", ""), roots[0], links, joints)
+    return tree
+
+
+def _reached(tree: UrdfTree) -> set[str]:
+    """Return the links that joints connect to the root."""
+    reached, edge = {tree.root}, [tree.root]
+    while edge:
+        found = [joint.child for joint in tree.below(edge.pop())]
+        edge += [link for link in found if link not in reached]
+        reached.update(found)
+    return reached
 
 
 def _link(element: ET.Element) -> TreeLink:
