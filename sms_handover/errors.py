@@ -40,6 +40,10 @@ class UnstableLoopError(ConfigurationError):
     """The sampled closed loop of gains and tick diverges at the start configuration."""
 
 
+class CollisionError(ConfigurationError):
+    """Bodies of a scenario collide in a dry run."""
+
+
 class ControllerError(SmsHandoverError):
     """A controller from outside the package returned invalid efforts."""
 

@@ -48,7 +48,7 @@ ALLOWED: dict[str, set[str]] = {
     **{layer: {"model"} for layer in MIDDLE},
     "clearance": {"model"},
     "compiled": {"model", "plant", "control"},
-    "simulation": {"model", *MIDDLE, "compiled"},
+    "simulation": {"model", *MIDDLE, "compiled", "clearance"},
     "bag": {"messages", "model", "simulation"},
     "analysis": {"model", "trajectory", "clearance", "simulation", "bag", "scene"},
     "scene": {"messages", "model", "trajectory", "clearance", "bag"},

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sms_handover.clearance.bodies import Body, BodyKind
+from sms_handover.clearance.contacts import may_touch
 from sms_handover.clearance.distances import ClearanceModel
 from sms_handover.run_data import Stamps
 from sms_handover.types import Array, read_only
@@ -54,7 +54,7 @@ class NearestRecord:
     def __init__(self, model: ClearanceModel) -> None:
         """Begin an empty record of a model."""
         self._model = model
-        touching = [_may_touch(*pair) for pair in model.pairs]
+        touching = [may_touch(*pair) for pair in model.pairs]
         self._touching = [int(pair) for pair in np.flatnonzero(touching)]
         self._others = np.flatnonzero(np.logical_not(touching))
         self._kept: list[list[int]] = []
@@ -91,8 +91,3 @@ class NearestRecord:
         points = np.array(self._points)[instants, worst]
         points[~counts] = np.nan
         return WorstPair(stamp_ns, bodies, pair, np.where(counts, distance[instants, worst], np.nan), points)
-
-
-def _may_touch(one: Body, other: Body) -> bool:
-    """Whether contact of two bodies can be declared: a gripper and the deputy."""
-    return {one.kind, other.kind} == {BodyKind.GRIPPER, BodyKind.DEPUTY}

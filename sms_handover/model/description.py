@@ -12,6 +12,7 @@ from sms_handover.frames import BASE
 from sms_handover.model.arm_file import override_limits, read_arm, read_origin
 from sms_handover.model.assembly import ArmDescription, Base, Panel, RobotDescription, gripper_name
 from sms_handover.model.parts import Floats, Gripper, Inertia, box_moments
+from sms_handover.model.shape_section import read_contact_pairs, read_shapes
 
 _UNIFORM_BOX = "uniform_box"
 
@@ -31,11 +32,16 @@ def robot_of(content: Mapping) -> RobotDescription:
     Raises RobotDescriptionError on a key or value that no robot can have, with file and line.
     """
     root = Section(content, Path(), RobotDescriptionError)
-    root.only(("name", "base", "arms"))
+    root.only(("name", "base", "arms"), optional=("clearance",))
     name, base = root.text("name"), _base(root.section("base"))
     arms = tuple(map(_arm, root.sections("arms")))
     with root.located("arms"):
-        return RobotDescription(name, base, arms)
+        robot = RobotDescription(name, base, arms)
+    if "clearance" not in root:
+        return robot
+    section = root.section("clearance")
+    with section.located():
+        return replace(robot, shapes=read_shapes(section), contacts=read_contact_pairs(section))
 
 
 def _base(section: Section) -> Base:

@@ -35,6 +35,7 @@ class Solid:
     ``vertices`` (V, 3) m are those of a convex hull, in the frame of the solid.
     """
 
+    name: str
     link: str
     kind: str
     size: tuple[float, ...]
@@ -90,10 +91,10 @@ class _Writer:
     def meshes(self, root: ET.Element) -> None:
         """Add the vertices of all convex hulls."""
         asset = ET.Element("asset")
-        for index, solid in enumerate(self._solids):
+        for solid in self._solids:
             if solid.vertices is not None:
                 vertices = _text(np.ravel(solid.vertices))
-                ET.SubElement(asset, "mesh", name=_hull(index), vertex=vertices, inertia="convex")
+                ET.SubElement(asset, "mesh", name=solid.name, vertex=vertices, inertia="convex")
         if len(asset):
             root.append(asset)
 
@@ -101,9 +102,9 @@ class _Writer:
         """Give a body its inertia, its solids, and the bodies that it carries."""
         if link.inertia is not None:
             _inertial(body, link)
-        for index, solid in enumerate(self._solids):
+        for solid in self._solids:
             if solid.link == link.name:
-                _geom(body, index, solid)
+                _geom(body, solid)
         for joint in self._tree.below(link.name):
             child = self._tree.links[joint.child]
             if self._is_frame(joint, child):
@@ -154,16 +155,12 @@ def _inertial(body: ET.Element, link: TreeLink) -> None:
     ET.SubElement(body, "inertial", place, mass=_text([link.inertia.mass]), diaginertia=_text(moments))
 
 
-def _geom(body: ET.Element, index: int, solid: Solid) -> None:
+def _geom(body: ET.Element, solid: Solid) -> None:
     """Add a solid to a body."""
     x, y, z, w = solid.pose_in_link.quaternion_xyzw
     place = {"pos": _text(solid.pose_in_link.position), "quat": _text([w, x, y, z])}
-    what = {"mesh": _hull(index)} if solid.vertices is not None else {"size": _text(solid.size)}
-    ET.SubElement(body, "geom", place | what, type=solid.kind)
-
-
-def _hull(index: int) -> str:
-    return f"hull_{index}"
+    what = {"mesh": solid.name} if solid.vertices is not None else {"size": _text(solid.size)}
+    ET.SubElement(body, "geom", place | what, name=solid.name, type=solid.kind)
 
 
 def _place(origin: Origin) -> dict[str, str]:

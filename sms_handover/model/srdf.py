@@ -16,6 +16,7 @@ class DisabledReason(Enum):
     ADJACENT = "Adjacent"
     ALWAYS = "Always"
     NEVER = "Never"  # fixed to each other without being neighbours
+    USER = "User"  # stated in the description
 
 
 @dataclass(frozen=True)

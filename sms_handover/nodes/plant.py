@@ -26,6 +26,7 @@ from sms_handover.graph.topics import (
     TASK_PHASE,
 )
 from sms_handover.nodes.parts.marker import deputy_marker
+from sms_handover.nodes.parts.plant_clearance import PlantClearance
 from sms_handover.nodes.parts.plant_outputs import PlantOutputs
 from sms_handover.nodes.parts.run_control import RunControl
 from sms_handover.nodes.parts.watchdogs import AnswerWatchdog, CommandWatchdog, lag_skipped
@@ -84,6 +85,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self._reconfigured = self.runs > 0
         self._wait_for_others()
         self._make_endpoints()
+        self._clearance = PlantClearance(self.robot, schedule, self.common, self.endpoints.publisher)
         self.create_timer(_TIMING_PERIOD_S, self._publish_timing)
         if self.lockstep:
             self.create_timer(self.parameters.resend_after, self._resend)
@@ -196,6 +198,7 @@ class PlantNode(GraphNode[PlantParameters]):
         """Wait at the start of a run until every other node is ready."""
         self._waiting_for = set(self.common.peers) - {PLANT}
         self._last_tick, self._failed_phase = self.common.last_tick(self._end_ns), ""
+        self._phase_index = 0
         self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
         self._command_watchdog.reset()
         self._needed: tuple[str, ...] = _PHASE_AND_COMMAND  # what completes this tick, by arrival
@@ -214,6 +217,8 @@ class PlantNode(GraphNode[PlantParameters]):
         self._outputs.publish_loop(self._plant, with_reference=with_reference)
         self._loop_clock.published()
         self._outputs.publish_rest(self._plant, with_reference=with_reference)
+        if with_reference and not self.lockstep:
+            self._clearance.publish(self._plant, self._phase_index)
 
     def _resend(self) -> None:
         """Publish the state of this tick again if nothing has answered it for a while (lock step).
@@ -310,11 +315,14 @@ class PlantNode(GraphNode[PlantParameters]):
     def _execute(self, task: TaskPhase) -> None:
         """Carry out the grasp commands of a phase, publish the results, and note when the task ends."""
         self._failed_phase = task.name if task.failed else ""
+        self._phase_index = task.index
         if task.end_ns:
             self._last_tick = self.common.last_tick(task.end_ns, failed=task.failed)
         for event in self._plant.execute(task.commands):
             self._publish[GRASP_EVENT].publish(event_message(event))
             self.get_logger().info(f"{event.command.action.value}: {event.status.value}, {event.detail}")
+        if self.lockstep:  # of this very period: the trajectory waits for it
+            self._clearance.publish(self._plant, task.index)
 
     # What the services of the run's control ask for
 
@@ -336,6 +344,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self.membership.finished = False
         self._control.reset_run()
         self._plant.reset()
+        self._clearance.reset()
         self._inputs.reset_run()
         for order in self._orders.values():
             order.reset()

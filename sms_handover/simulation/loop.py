@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from sms_handover.clearance.monitor import PeriodClearance
 from sms_handover.control.law import Need
 from sms_handover.control.protocol import CheckedController, Controller, Guidance
 from sms_handover.control.registry import law_named
@@ -14,7 +15,7 @@ from sms_handover.ik.levenberg_marquardt import find_joints
 from sms_handover.model.conserved import ConservedQuantities
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.snapshot import Snapshot, controller_data, restore_controller
-from sms_handover.simulation.wiring import make_controller, make_plant
+from sms_handover.simulation.wiring import make_controller, make_monitor, make_plant
 from sms_handover.trajectory.generator import TrajectoryGenerator
 from sms_handover.types import (
     Array,
@@ -34,7 +35,7 @@ class Period:
 
     Tool poses and targets are in ``world``; ``work`` J is that of the joint efforts since the start;
     ``ik_status`` is None where no tool had a target. ``events`` has what came of grasp commands,
-    ``decisions`` what was decided about the task.
+    ``decisions`` what was decided about the task. ``clearance`` is None unless it is measured online.
     """
 
     phase: TaskPhase
@@ -47,6 +48,7 @@ class Period:
     ik_status: IkStatus | None
     events: tuple[GraspEvent, ...]
     decisions: tuple[RunEvent, ...]
+    clearance: PeriodClearance | None = None
 
 
 class Observation(NamedTuple):
@@ -106,7 +108,11 @@ class Loop:
         robot, schedule = self.scenario.model.robot, self.scenario.model.schedule
         self._common = parameters.common
         self._plant = make_plant(truth.robot, truth.schedule, self._common, parameters.plant)
-        self._generator = TrajectoryGenerator(robot, schedule, parameters.trajectory)
+        self._generator = TrajectoryGenerator(
+            robot, schedule, parameters.trajectory, abort_on_collision=self._common.aborts_on_collision
+        )
+        measured = self._common.measures_clearance
+        self._monitor = make_monitor(truth.robot, truth.schedule, self._common) if measured else None
         self._per_reference = self._common.ticks_per_reference
         self._controller: Controller
         if controller is not None:
@@ -132,6 +138,8 @@ class Loop:
         self._plant.reset()
         self._generator.reset()
         self._controller.reset()
+        if self._monitor:
+            self._monitor.reset()
         schedule, rest = self.scenario.model.schedule, self._plant.state
         phase = TaskPhase(0, 0, schedule.phases[0].name, end_ns=schedule.end_ns)
         reference = JointReference(0, rest.joint_position, rest.joint_velocity)
@@ -180,7 +188,10 @@ class Loop:
         """
         controller = controller_data(self._controller, self.law)
         plant, trajectory = self._plant.snapshot(), self._generator.snapshot()
-        return Snapshot(self.seed, plant, trajectory, self.law, controller, self._guidance, self.finished)
+        clearance = self._monitor.snapshot() if self._monitor else None
+        return Snapshot(
+            self.seed, plant, trajectory, self.law, controller, self._guidance, self.finished, clearance
+        )
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot: the rest of the run is the same bit for bit.
@@ -190,6 +201,8 @@ class Loop:
         """
         self._plant.restore(snapshot.plant)
         self._generator.restore(snapshot.trajectory)
+        if self._monitor and snapshot.clearance:
+            self._monitor.restore(snapshot.clearance)
         self._guidance, phase = snapshot.guidance, snapshot.guidance.phase
         self.last_tick = self._common.last_tick(phase.end_ns, failed=phase.failed)
         self.seed, self.finished = snapshot.seed, snapshot.finished
@@ -214,9 +227,16 @@ class Loop:
         self._controller.guide(self._guidance)
         events = plant.execute(phase.commands)
         generator.grasped(events)
+        clearance = None
+        if self._monitor:
+            pose, holder = deputy.deputy_in_world, plant.deputy.holder
+            clearance = self._monitor.measure(state.stamp_ns, state.q, pose, phase.index, holder)
+            generator.collided(clearance.collisions)
         status = solution.status if solution else None
         if status:
             generator.solved(converged=status is IkStatus.CONVERGED)
         self.last_tick = self._common.last_tick(phase.end_ns, failed=phase.failed)
         decisions = generator.take_decisions()
-        return Period(phase, reference, aims, tools, deputy, conserved, plant.work, status, events, decisions)
+        return Period(
+            phase, reference, aims, tools, deputy, conserved, plant.work, status, events, decisions, clearance
+        )

@@ -8,12 +8,13 @@ import pinocchio as pin
 import pytest
 
 from sms_handover.clearance.allowed_pairs import counted_pairs
-from sms_handover.clearance.bodies import read_geometry
+from sms_handover.clearance.solids import read_solids
 from sms_handover.cli.main import main
 from sms_handover.errors import RobotDescriptionError
 from sms_handover.export.robot_files import MJCF_FILE, SRDF_FILE, URDF_FILE, robot_files
 from sms_handover.model.mjcf import to_mjcf
 from sms_handover.model.robot_model import RobotModel
+from sms_handover.model.shapes import ContactPairs
 from sms_handover.model.urdf_tree import read_urdf
 
 from .bag_messages import made_up_run
@@ -29,8 +30,8 @@ def test_pinocchio_drops_the_pairs_that_clearance_does_not_count(
     robot: RobotModel, texts: dict[str, str]
 ) -> None:
     """Pinocchio's own reader of SRDF leaves exactly the pairs that clearance counts."""
-    solids = read_geometry(robot.pin, robot.urdf)
-    counted = set(counted_pairs(robot.pin, solids))
+    solids = read_solids(robot.pin, robot.urdf)
+    counted = set(counted_pairs(robot.pin, solids, ContactPairs()))
     links = [item.parentFrame for item in solids.geometryObjects]
     every = [(a, b) for a, b in combinations(range(solids.ngeoms), 2) if links[a] != links[b]]
     for pair in every:
@@ -95,6 +96,13 @@ def test_pairs_that_always_touch_are_said_to(robot: RobotModel) -> None:
     found = ET.fromstring(robot_files(ET.tostring(root, encoding="unicode")).texts[SRDF_FILE])
     always = [p for p in found.iter("disable_collisions") if p.get("reason") == "Always"]
     assert ("arm_a_link_6", "arm_a_gripper") in [(p.get("link1"), p.get("link2")) for p in always]
+
+
+def test_a_pair_that_the_description_allows_is_the_user_s(robot: RobotModel) -> None:
+    stated = '<sms_handover><allow first="arm_a_gripper" second="arm_b_gripper"/></sms_handover></robot>'
+    found = ET.fromstring(robot_files(robot.urdf.replace("</robot>", stated)).texts[SRDF_FILE])
+    reasons = {(p.get("link1"), p.get("link2")): p.get("reason") for p in found.iter("disable_collisions")}
+    assert reasons["arm_a_gripper", "arm_b_gripper"] == "User"
 
 
 def test_a_rotor_inertia_is_in_the_mjcf_alone(robot: RobotModel) -> None:

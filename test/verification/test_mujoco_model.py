@@ -5,6 +5,8 @@ equations of motion agrees to rounding, so what they simulate is one and the sam
 """
 
 from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
@@ -17,6 +19,7 @@ from sms_handover.export.robot_files import MJCF_FILE, robot_files
 from sms_handover.model.assembly import RobotDescription
 from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.description import load_robot
+from sms_handover.model.floating_model import floating_model
 from sms_handover.model.parts import Inertia, JointDescription, Origin
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import Array, Pose
@@ -25,6 +28,7 @@ from test.verification.conftest import Record, links_in_world
 _STATES = 100
 _GRAZING = 1e-4  # [m] from contact, within which two engines may disagree
 _TURN = (0.3, -0.5, 0.7)  # [rad] about all three axes, so that their order counts
+_FAR = Pose(np.array([9.0, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 1.0]))  # of the deputy, out of the way
 _EPS = float(np.finfo(float).eps)
 _ROUNDING = 10 * 12 * _EPS  # [-] ten frames in a chain, a dozen operations each
 _AGAINST = f"MuJoCo {mujoco.__version__}"
@@ -157,7 +161,6 @@ def test_the_exported_robot_is_the_same(description: RobotDescription, record: R
     data, mass = mujoco.MjData(theirs), np.zeros((theirs.nv, theirs.nv))
     clearance = ClearanceModel(robot.pin, robot.urdf, robot.arms, np.array([0.1, 0.34, 0.1]))
     counted = np.array([place for place, pair in enumerate(clearance.pairs) if pair[1].name != "deputy"])
-    far = Pose(np.array([9.0, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 1.0]))
     largest, compared, touched = 0.0, 0, 0
     for q, _, _ in _states(robot):
         data.qpos[:] = np.concatenate([q[:3], q[6:7], q[3:6], q[7:]])
@@ -167,7 +170,7 @@ def test_the_exported_robot_is_the_same(description: RobotDescription, record: R
         turn[:3, :3] = rotation_matrix(q[3:7])
         expected = pin.crba(robot.pin, robot.data, q, pin.Convention.WORLD)
         largest = max(largest, np.max(np.abs(turn.T @ mass @ turn - expected)) / np.max(np.abs(expected)))
-        distances = clearance.distances(q, far)[counted]
+        distances = clearance.distances(q, _FAR)[counted]
         if np.min(np.abs(distances)) < _GRAZING:
             continue
         geoms = data.contact.geom[: data.ncon]
@@ -178,6 +181,45 @@ def test_the_exported_robot_is_the_same(description: RobotDescription, record: R
     assert compared > 0.9 * _STATES and touched > 0.1 * _STATES
     name = "shipped" if description == load_robot() else "skewed"
     record(f"mass matrix of the exported {name} robot, relative", largest, 1e-10, against=_AGAINST)
+
+
+def test_exported_solids_are_those_of_clearance(tmp_path: Path, record: Record) -> None:
+    """A box, a sphere, a capsule and a convex mesh added to the cylinders: every distance of bodies apart."""
+    mesh = tmp_path / "wedge.obj"
+    mesh.write_text("v 0 0 0\nv 0.2 0 0\nv 0 0.1 0\nv 0 0 0.15\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
+    added = {
+        "arm_a_link_2": '<box size="0.3 0.1 0.2"/>',
+        "arm_a_link_5": '<sphere radius="0.08"/>',
+        "arm_b_link_4": '<cylinder radius="0.06" length="0.3"/>',
+        "arm_b_gripper": f'<mesh filename="{mesh}" scale="1 1 2"/>',
+    }
+    root = ET.fromstring(RobotModel(load_robot()).urdf)
+    for link in root.findall("link"):
+        if shape := added.get(link.get("name", "")):
+            place = '<origin xyz="0.05 -0.02 0.1" rpy="0.3 -0.5 0.7"/>'
+            text = f'<collision name="added">{place}<geometry>{shape}</geometry></collision>'
+            link.append(ET.fromstring(text))
+            if "cylinder" in shape:
+                text = '<collision_checking><capsule name="added"/></collision_checking>'
+                link.append(ET.fromstring(text))
+    urdf = ET.tostring(root, encoding="unicode")
+    model = floating_model(urdf)
+    clearance = ClearanceModel(model, urdf, ("arm_a", "arm_b"), np.array([0.1, 0.34, 0.1]))
+    theirs = mujoco.MjModel.from_xml_string(robot_files(urdf).texts[MJCF_FILE])
+    kinds = [int(theirs.geom_type[theirs.geom(f"{link}_2").id]) for link in added]
+    names = (mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE)
+    assert kinds == [*map(int, names), int(mujoco.mjtGeom.mjGEOM_MESH)]
+    data, worst, compared = mujoco.MjData(theirs), 0.0, 0
+    for q, _, _ in _states(RobotModel(load_robot()))[:20]:
+        data.qpos[:] = np.concatenate([q[:3], q[6:7], q[3:6], q[7:]])
+        mujoco.mj_forward(theirs, data)
+        for (one, other), distance in zip(clearance.pairs, clearance.distances(q, _FAR), strict=True):
+            if other.name != "deputy" and distance > 0.0:
+                geoms = theirs.geom(one.name).id, theirs.geom(other.name).id
+                measured = mujoco.mj_geomDistance(theirs, data, *geoms, 10.0, None)
+                worst, compared = max(worst, abs(measured - distance)), compared + 1
+    assert compared > 20 * 200
+    record("distance of solids in the exported model", worst, 1e-5, unit="m", against=_AGAINST)
 
 
 def _link(body: str) -> str:

@@ -12,6 +12,7 @@ _CONTENTS = {
     topics.JOINT_REFERENCE: "desired joint positions [rad] and velocities [rad/s]",
     topics.TASK_PHASE: "the phase of the schedule in force, and the grasp commands due at this instant",
     topics.DEPUTY_POSE: "pose of the CubeSat in world [m]",
+    topics.CLEARANCE: "least distances of bodies [m], their nearest points; only if clearance is online",
     topics.DEPUTY_MARKER: "the shape of the CubeSat, for viewers",
     topics.GRASP_EVENT: "result of a grasp command, with the errors at that instant [m, rad, m/s]",
     topics.LINEAR_MOMENTUM: "linear momentum of the whole robot in world axes [kg m/s]",
