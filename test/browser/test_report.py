@@ -97,12 +97,12 @@ def test_it_opens_whole_and_without_a_network(
     page = visit.page
     assert visit.errors == [] and visit.requests == []
     assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
-    assert page.locator(".plot .frame").count() == page.evaluate("report.plots.length") == 16
+    assert page.locator(".plot .frame").count() == page.evaluate("report.plots.length") == 17
     traces = page.evaluate(
         "plots.plots.map((plot) => plot.frame.querySelectorAll('.scatterlayer .trace').length)"
     )
-    # position and orientation error of two arms, torques and errors of their joints, base, conservation
-    per_run = [1, 1, 1, 1, 7, 7, 7, 7, 3, 3, 1, 1, 1, 1, 2, 1]
+    # position and orientation error of two arms, torques, errors of joints, base, conservation, clearance
+    per_run = [1, 1, 1, 1, 7, 7, 7, 7, 3, 3, 1, 1, 1, 1, 2, 1, 5]
     assert traces == [len(runs) * count for count in per_run]
 
 
