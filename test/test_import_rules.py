@@ -54,7 +54,7 @@ ALLOWED: dict[str, set[str]] = {
     "scene": {"messages", "model", "trajectory", "clearance", "bag"},
     "playback": {"messages", "bag"},
     "export": {"messages", "model", "clearance", "bag"},
-    "report": {"plant", "bag", "analysis", "scene"},
+    "report": {"plant", "clearance", "bag", "analysis", "scene"},
     "ros": CORE,
     "nodes": CORE | {"ros"},
     "external": CORE | {"ros", "nodes"},

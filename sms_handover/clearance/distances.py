@@ -64,18 +64,18 @@ class ClearanceModel:
         self.bodies: tuple[Body, ...] = (*robot_bodies, DEPUTY_BODY)
         self.pairs: tuple[tuple[Body, Body], ...] = tuple((self.bodies[a], self.bodies[b]) for a, b in pairs)
         self._geometry, self._results = geometry, _results_without_memory(geometry)
+        self._found = list(self._results.distanceResults)  # views: asking for them each time takes longest
 
     def distances(self, q: Array, deputy_in_world: Pose) -> Array:
         """Return the signed distance (pairs,) m of every pair at a configuration (7 + n,)."""
         pin.updateGeometryPlacements(self._model, self._data, self._geometry, self._results, q)
         self._results.oMg[self._deputy] = se3_of(deputy_in_world)
         pin.computeDistances(self._geometry, self._results)
-        results = self._results.distanceResults
-        return np.fromiter((result.min_distance for result in results), float, len(self.pairs))
+        return np.array([found.min_distance for found in self._found])
 
     def nearest_points(self, pair: int) -> NearestPoints:
         """Return where a pair is nearest, at the configuration of the last call of :meth:`distances`."""
-        result = self._results.distanceResults[pair]
+        result = self._found[pair]
         points = np.array([result.getNearestPoint1(), result.getNearestPoint2()])
         return NearestPoints(points, np.array(result.normal))
 

@@ -92,7 +92,7 @@ class ClearanceMonitor:
         """
         distances = self._model.distances(q, deputy_in_world)
         least = {group: int(pairs[distances[pairs].argmin()]) for group, pairs in self._fixed.items()}
-        aims = self._grasping[phase]
+        aims = self._grasping[phase] if phase < len(self._grasping) else frozenset()
         for pair, contact in self._contacts.items():
             arm, distance = contact.arm, float(distances[pair])
             group = contact.advance(distance, aims=arm in aims, holds=arm == holder)

@@ -70,7 +70,10 @@ def package_folders() -> tuple[Path, ...]:
 
 def _require(uri: str) -> None:
     """Raise MissingMeshError unless the file of a mesh is there."""
-    parts = urlsplit(uri)
+    try:
+        parts = urlsplit(uri)
+    except ValueError as error:
+        raise MissingMeshError(f"there is no mesh file {uri!r}: {error}") from error
     name = unquote(f"{parts.netloc}{parts.path}")
     if parts.scheme == "package":
         folders = package_folders()

@@ -65,7 +65,12 @@ def _geometry(section: Section, kind: str) -> Geometry:
 def _uri(section: Section) -> str:
     """Return the URI of a mesh file, which must be there unless it is of a package."""
     uri = section.text("file")
-    parts = urlsplit(uri)
+    try:
+        parts = urlsplit(uri)
+    except ValueError as error:
+        raise section.error(
+            f"{section.path('file')} is {uri!r}, must be a path or a URI: {error}", "file"
+        ) from error
     if parts.scheme == "file" and not Path(unquote(parts.path)).is_file():
         raise section.error(f"{section.path('file')}: there is no mesh file {unquote(parts.path)}", "file")
     return uri

@@ -198,7 +198,6 @@ class PlantNode(GraphNode[PlantParameters]):
         """Wait at the start of a run until every other node is ready."""
         self._waiting_for = set(self.common.peers) - {PLANT}
         self._last_tick, self._failed_phase = self.common.last_tick(self._end_ns), ""
-        self._phase_index = 0
         self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
         self._command_watchdog.reset()
         self._needed: tuple[str, ...] = _PHASE_AND_COMMAND  # what completes this tick, by arrival
@@ -217,8 +216,8 @@ class PlantNode(GraphNode[PlantParameters]):
         self._outputs.publish_loop(self._plant, with_reference=with_reference)
         self._loop_clock.published()
         self._outputs.publish_rest(self._plant, with_reference=with_reference)
-        if with_reference and not self.lockstep:
-            self._clearance.publish(self._plant, self._phase_index)
+        if with_reference:
+            self._clearance.state_published(self._plant)
 
     def _resend(self) -> None:
         """Publish the state of this tick again if nothing has answered it for a while (lock step).
@@ -315,14 +314,13 @@ class PlantNode(GraphNode[PlantParameters]):
     def _execute(self, task: TaskPhase) -> None:
         """Carry out the grasp commands of a phase, publish the results, and note when the task ends."""
         self._failed_phase = task.name if task.failed else ""
-        self._phase_index = task.index
         if task.end_ns:
             self._last_tick = self.common.last_tick(task.end_ns, failed=task.failed)
+        self._clearance.phase_begins(self._plant, task.index)
         for event in self._plant.execute(task.commands):
             self._publish[GRASP_EVENT].publish(event_message(event))
             self.get_logger().info(f"{event.command.action.value}: {event.status.value}, {event.detail}")
-        if self.lockstep:  # of this very period: the trajectory waits for it
-            self._clearance.publish(self._plant, task.index)
+        self._clearance.commands_executed(self._plant)
 
     # What the services of the run's control ask for
 

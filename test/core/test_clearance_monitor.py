@@ -2,7 +2,9 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from unittest.mock import patch
 
+import pinocchio as pin
 import pytest
 
 from sms_handover.analysis.clearance import TaskTexts, run_clearance
@@ -148,6 +150,15 @@ def test_a_dry_run_foretells_the_collisions_of_the_run(online: Scenario, make_sc
     clear = replace(foretold, collisions=())
     clear.require_clear()
     assert str(clear) == "" and clear.worst is None
+
+
+def test_a_period_takes_one_call(online: Scenario) -> None:
+    """Of Pinocchio's loop over all pairs, whatever collides."""
+    loop = Loop(online)
+    with patch.object(pin, "computeDistances", side_effect=pin.computeDistances) as counted:
+        for _ in range(10):
+            loop.advance_period()
+    assert counted.call_count == 10
 
 
 def test_collisions_are_told_in_one_line() -> None:

@@ -160,3 +160,16 @@ def test_help_teaches(command: list[str], tmp_path: Path, called: Command) -> No
 def test_a_command_must_be_whole(arguments: list[str], tmp_path: Path, called: Command) -> None:
     done = called(*arguments, cwd=tmp_path)
     assert (done.code, len(done.errors)) == (2, 1)
+
+
+def test_collisions_are_told_before_a_run_and_may_be_rejected(
+    schedule: Path, tmp_path: Path, called: Command
+) -> None:
+    """The gripper that has let go of the deputy comes back into it; nothing is started or made."""
+    worst = "at worst arm_a_gripper and deputy overlap by 1.72 mm at 1.02 s"
+    done = called("run", "--reject-collisions", "--schedule", schedule, "-o", "out", cwd=tmp_path)
+    assert done.code == 2 and f"error: bodies collide from 0.86 s on, {worst}" in done.err
+    assert tree(tmp_path) == {}
+    for options, code in (((), 0), (("--reject-collisions",), 1)):
+        done = called("simulate", *options, "--schedule", schedule, cwd=tmp_path)
+        assert done.code == code and f"warning: bodies collide, {worst}" in done.err

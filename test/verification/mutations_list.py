@@ -675,6 +675,13 @@ BREAKS: tuple[Break, ...] = (
         "clearance_monitor",
     ),
     _core(
+        "restarts of inverse kinematics among overlapping bodies",
+        "simulation/feasibility",
+        "if self._is_free(best.base_in_world, seed):",
+        "if True:",
+        "feasibility",
+    ),
+    _core(
         "contact declared for ever after a release",
         "clearance/contacts",
         "(self.declared and distance <= 0.0)",
