@@ -7,10 +7,10 @@ from pathlib import Path
 from sms_handover.analysis.figure_catalogue import FIGURES, chosen_figures, chosen_formats
 from sms_handover.cli.recorded_runs import read_all
 from sms_handover.control.registry import SHIPPED
-from sms_handover.errors import BagError, ConfigurationError, SmsHandoverError
+from sms_handover.errors import ConfigurationError, SmsHandoverError
+from sms_handover.report.animation import recorded_scene
 from sms_handover.report.recorded_run import RecordedRun
-from sms_handover.scene.recorded_scene import deputy_size_in
-from sms_handover.scene.scene import Scene, make_scene
+from sms_handover.scene.scene import Scene
 
 _SNAPSHOTS = "snapshots"  # the one figure that needs a scene
 _FRAME_RATE = 10.0  # [1/s] of the scene that snapshots are taken from
@@ -93,9 +93,7 @@ def _label(name: str) -> str:
 def _scene(run: RecordedRun) -> Scene | None:
     """Return the moving scene of a run, None if its bag does not describe all that there is to see."""
     try:
-        if run.info.urdf_text is None:
-            raise BagError("its bag carries no robot description")
-        return make_scene(run.data, run.info.urdf_text, deputy_size_in(run.info), _FRAME_RATE)
+        return recorded_scene(run, None, _FRAME_RATE)
     except SmsHandoverError as error:
         print(f"no snapshots of {run.name}: {error}", file=sys.stderr)
         return None

@@ -6,12 +6,16 @@ import webbrowser
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from pathlib import Path
 
+from sms_handover.analysis.clearance import run_clearance
+from sms_handover.bag.info import read_info
+from sms_handover.bag.run.reader import read_run
 from sms_handover.cli.recorded_runs import named
 from sms_handover.cli.text_files import write_text
 from sms_handover.errors import BagError, ConfigurationError
 from sms_handover.launcher.run_folder import bag_of
+from sms_handover.report.animation import recorded_scene
+from sms_handover.report.recorded_run import RecordedRun
 from sms_handover.scene.page import animation_html
-from sms_handover.scene.recorded_scene import read_scene
 from sms_handover.scene.scene import FRAME_RATE, Scene
 
 
@@ -84,10 +88,17 @@ def _follow(options: Namespace) -> int:
 
 def _scenes(options: Namespace) -> dict[str, Scene]:
     frame_rate = FRAME_RATE if options.frame_rate is None else options.frame_rate
+    scenes = {}
     try:
-        return {name: read_scene(path, frame_rate) for name, path in named(map(bag_of, options.runs)).items()}
+        for name, path in named(map(bag_of, options.runs)).items():
+            run = RecordedRun(name, read_run(path), read_info(path))
+            clearance = run_clearance(run.data, run.texts) if run.texts else None
+            scenes[name] = recorded_scene(run, clearance, frame_rate)
     except BagError as error:
-        raise ConfigurationError(str(error)) from error  # exit code 2: what was given cannot be used
+        text = str(error)
+        place = "" if str(path) in text else f"{path}: "
+        raise ConfigurationError(f"{place}{text}") from error  # exit code 2: it cannot be used
+    return scenes
 
 
 def _temporary_file() -> Path:

@@ -1,4 +1,4 @@
-"""``sms-handover bag``: inspect, check, recover and export recordings."""
+"""``sms-handover bag``: inspect, check, recover and export recordings, and the robot of a run."""
 
 from argparse import ArgumentParser, Namespace
 from importlib import import_module
@@ -8,6 +8,7 @@ _COMMANDS = {
     "check": "check whether a bag is complete, and what is missing",
     "recover": "recover a truncated or damaged bag",
     "export": "export tables as CSV, Parquet or MATLAB files",
+    "robot": "write the robot of a run as URDF, SRDF (MoveIt) and MJCF (MuJoCo)",
 }
 
 
