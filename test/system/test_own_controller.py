@@ -80,7 +80,7 @@ def test_by_its_name_it_runs_in_our_node_and_is_reproduced(
     assert ended.code == 0, ended
     assert compare_runs(read_run(tmp_path / "named" / "bag"), in_one_process) == ()
     assert read_info(tmp_path / "named" / "bag").parameters["controller"]["stiffness"] == 5.0
-    assert sms_handover("reproduce", "named", cwd=tmp_path).code == 0
+    assert sms_handover("verify", "named", cwd=tmp_path).code == 0
 
 
 def test_a_bare_node_does_the_same(own: dict[str, tuple[Path, Ended]], in_one_process: RunData) -> None:
@@ -130,10 +130,10 @@ def test_its_commands_can_be_played_into_a_plant_but_not_made_again(
     own: dict[str, tuple[Path, Ended]], tmp_path: Path, called: Command
 ) -> None:
     folder, _ = own["helped"]
-    again = called("reproduce", folder, cwd=tmp_path)
+    again = called("verify", folder, cwd=tmp_path)
     assert again.code == 2
-    assert again.errors[0].endswith("check a recording with 'sms-handover play --closed-loop'")
-    played = sms_handover("play", folder, "--closed-loop", cwd=tmp_path)
+    assert again.errors[0].endswith("check a recording with 'sms-handover verify --with plant'")
+    played = sms_handover("verify", folder, "--with", "plant", cwd=tmp_path)
     assert played.code == 0, played
     assert f"the same bit for bit as recorded: {TICKS} states" in played.out
 

@@ -147,7 +147,7 @@ def test_numbers_are_read_as_ros_reads_them(schedule: Path, tmp_path: Path, call
     assert done.code == 0, done
 
 
-@pytest.mark.parametrize("command", [[], ["run"], ["simulate"], ["compare"], ["reproduce"]])
+@pytest.mark.parametrize("command", [[], ["run"], ["simulate"], ["compare"], ["verify"]])
 def test_help_teaches(command: list[str], tmp_path: Path, called: Command) -> None:
     """Every command tells what it does and exits with 0."""
     done = called(*command, "--help", cwd=tmp_path)
@@ -156,7 +156,7 @@ def test_help_teaches(command: list[str], tmp_path: Path, called: Command) -> No
     assert done.err == ""
 
 
-@pytest.mark.parametrize("arguments", [[], ["fly"], ["compare"], ["reproduce"]])
+@pytest.mark.parametrize("arguments", [[], ["fly"], ["compare"], ["verify"]])
 def test_a_command_must_be_whole(arguments: list[str], tmp_path: Path, called: Command) -> None:
     done = called(*arguments, cwd=tmp_path)
     assert (done.code, len(done.errors)) == (2, 1)
