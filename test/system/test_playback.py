@@ -146,15 +146,14 @@ def test_record_ends_by_itself_and_takes_what_was_asked_for(tmp_path: Path) -> N
     foreign_bag(tmp_path / "robot")
     with running("bag", "play", "robot", "--loop", cwd=tmp_path) as player:
         player.until(lambda: "rate 1.00" in player.text, "the player")
-        done = sms_handover(
-            "bag", "record", "--topics", "imu", "-o", "again", "--duration", "8", cwd=tmp_path
-        )
+        words = ("--topics", "imu", "-o", "again", "--duration", "8", "--max-bag-duration", "3")
+        done = sms_handover("bag", "record", *words, cwd=tmp_path)
         assert done.code == 0, done
         assert player.process.poll() is None
     assert list(by_topic(tmp_path / "again")) == ["/imu"]
-    done = sms_handover(
-        "bag", "record", "--regex", "^/nothing", "-o", "none", "--duration", "1", cwd=tmp_path
-    )
+    assert len([*(tmp_path / "again").glob("*.mcap")]) in (2, 3), "a new file every 3 s"
+    words = ("--regex", "^/nothing", "-o", "none", "--duration", "1")
+    done = sms_handover("bag", "record", *words, cwd=tmp_path)
     assert done.code == 1
 
 
