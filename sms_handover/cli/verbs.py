@@ -14,6 +14,10 @@ BAG = "bag"  # the verb that has verbs of its own
 
 GROUPS: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
+        "find": {
+            "list": "list what has a name: control laws, metrics",
+            "show": "print the parameters of a control law",
+        },
         "run": {
             "run": "run the handover as a graph of ROS 2 nodes and record it",
             "simulate": "run it in one process, without ROS",
