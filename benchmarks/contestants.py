@@ -22,7 +22,11 @@ class Ours:
 
     def __init__(self, task: HandoverTask, tableau: Tableau, dynamics: str, steps: int = 1) -> None:
         """Integrate each tick by a scheme in some steps."""
-        parameters, robot, schedule = task.scenario.parameters, task.scenario.robot, task.scenario.schedule
+        parameters, robot, schedule = (
+            task.scenario.parameters,
+            task.scenario.truth.robot,
+            task.scenario.truth.schedule,
+        )
         common = replace(parameters.common, dynamics=dynamics)
         short = replace(common, tick=task.tick_s / steps)
         self._plant = make_plant(robot, schedule, short, parameters.plant)
@@ -52,7 +56,7 @@ class InMujoco:
 
     def __init__(self, task: HandoverTask, integrator: str, steps: int = 1) -> None:
         """Integrate each tick by an integrator of MuJoCo in some steps."""
-        self._robot = MujocoRobot(task.scenario.robot.description)
+        self._robot = MujocoRobot(task.scenario.truth.robot.description)
         self._robot.model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator}")
         self._robot.model.opt.timestep = task.tick_s / steps
         self._robot.place(*task.start)
@@ -88,7 +92,7 @@ class InDrake:
 
     def __init__(self, task: HandoverTask, scheme: str, steps: int = 1) -> None:
         """Integrate each tick by a scheme of Drake in some steps."""
-        robot = task.scenario.robot
+        robot = task.scenario.truth.robot
         self._plant: Any = MultibodyPlant(0.0)
         Parser(self._plant).AddModelsFromString(robot.urdf, "urdf")
         self._plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, 0.0])

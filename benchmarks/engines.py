@@ -106,7 +106,8 @@ def precision(task: HandoverTask, course: Course, exact: Course) -> tuple[float,
     """Return the largest error of the joints in rad and of the base in m or rad, and the momentum gained."""
     errors = np.array([apart(a, b) for a, b in zip(course.states, exact.states, strict=True)])
     momenta = [
-        conserved_quantities(task.scenario.robot, *state).angular_momentum for state in course.states[::10]
+        conserved_quantities(task.scenario.truth.robot, *state).angular_momentum
+        for state in course.states[::10]
     ]
     return float(errors[:, 0].max()), float(errors[:, 1:].max()), float(np.linalg.norm(momenta, axis=1).max())
 
@@ -161,8 +162,8 @@ def timed(scenario: Scenario) -> tuple[RunData, float]:
 def main() -> None:
     """Measure and publish."""
     matplotlib.rcParams.update({"svg.hashsalt": "sms_handover", "svg.fonttype": "none"})
-    scenario = load_scenario({"controller": {"law": "nmpc"}})
-    compiled = load_scenario({"controller": {"law": "nmpc"}, "common": {"dynamics": COMPILED}})
+    scenario = load_scenario(values={"controller": {"law": "nmpc"}})
+    compiled = load_scenario(values={"controller": {"law": "nmpc"}, "common": {"dynamics": COMPILED}})
     check_scenario(compiled)  # which makes the library
     run, whole = timed(scenario)
     _, whole_compiled = timed(compiled)

@@ -33,7 +33,7 @@ class HandoverTask:
     def of(cls, scenario: Scenario, run: RunData) -> "HandoverTask":
         """Return the task of a run of a scenario under NMPC."""
         rows = zip(run.reference_ns.tolist(), run.reference_position, run.reference_velocity, strict=True)
-        gains = gains_by_phase(scenario.schedule, scenario.parameters.controller)
+        gains = gains_by_phase(scenario.truth.schedule, scenario.parameters.controller)
         nmpc = tuple(item for item in gains if isinstance(item, NmpcGains))
         return cls(scenario, run, tuple(JointReference(*row) for row in rows), nmpc)
 
@@ -69,7 +69,7 @@ class NmpcTracker:
         self._task = task
         self._track = ReferenceTrack()
         self._phase = 0
-        self._limit = task.scenario.robot.effort_limit
+        self._limit = task.scenario.truth.robot.effort_limit
         self._use(task.gains[0])
 
     def take(self, index: int) -> int:

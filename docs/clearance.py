@@ -75,8 +75,10 @@ torque-speed line. A negative position is the distance from the nearest limit.
 
 
 def _measured(law: str, time_law: str) -> RunMetrics:
-    scenario = load_scenario({"controller": {"law": law}, "trajectory": {"time_law": time_law}})
-    return measure(simulate(scenario), texts=TaskTexts(scenario.robot.urdf, scenario.schedule.text))
+    scenario = load_scenario(values={"controller": {"law": law}, "trajectory": {"time_law": time_law}})
+    return measure(
+        simulate(scenario), texts=TaskTexts(scenario.truth.robot.urdf, scenario.truth.schedule.text)
+    )
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ def main() -> None:
     """Run the shipped handover under both laws and print the results side by side."""
     scenario = load_scenario()
     runs = {
-        "joint_pd": simulate(scenario, controller=JointPd(scenario.robot)),
+        "joint_pd": simulate(scenario, controller=JointPd(scenario.truth.robot)),
         "nmpc": simulate(scenario),
     }
     print(comparison_table(runs, tolerance=scenario.parameters.plant.grasp_tolerance))

@@ -16,13 +16,14 @@ from my_controller.task_space_pd import TaskSpaceGains
 
 from sms_handover.cli import bag
 from sms_handover.cli.verbs import BAG, VERBS, call_of
+from sms_handover.configuration.scenario_file import COMMON
 from sms_handover.configuration.values import DOCUMENTS as DOCUMENTS_WITH_VALUES
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.services import SERVICES
 from sms_handover.graph.topics import CONTROLLER, TF, graph_topics
 from sms_handover.ros.launching.launch_arguments import ARGUMENTS
 from sms_handover.ros.reference.interfaces import COMMON_GROUP, OWN_GROUPS, groups_of
-from sms_handover.simulation.scenario import COMMON, load_scenario
+from sms_handover.simulation.scenario import load_scenario
 
 from .documents import DOCUMENTS, SHELL, Block, anchors, blocks, commands, inline_code, links
 from .workspace import PACKAGE, ROOT, executables
@@ -97,7 +98,7 @@ def check_ours(words: list[str]) -> None:
     for text in getattr(options, "param", []):
         node, _, name = text.partition(":=")[0].partition(".")
         if node in DOCUMENTS_WITH_VALUES:
-            load_scenario({COMMON: {"values": [text]}})
+            load_scenario(values={COMMON: {"values": [text]}})
             continue
         groups = {"common": COMMON_GROUP, **OWN_GROUPS}
         require([node], groups, "node")

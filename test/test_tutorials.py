@@ -27,7 +27,7 @@ def scenario_of(text: str, folder: Path) -> Scenario:
     """Return what `simulate --schedule my_task.yaml --time-law quintic` runs."""
     file = folder / "my_task.yaml"
     file.write_text(text, encoding="utf-8")
-    return load_scenario({"common": {"schedule": str(file)}, "trajectory": {"time_law": "quintic"}})
+    return load_scenario(values={"common": {"schedule": str(file)}, "trajectory": {"time_law": "quintic"}})
 
 
 def test_the_schedule_of_the_tutorial_runs(tmp_path: Path) -> None:

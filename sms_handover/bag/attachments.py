@@ -7,6 +7,7 @@ from sms_handover.errors import BagError
 
 ROBOT_FILE = "robot.urdf"  # names of the attachments
 SCHEDULE_FILE = "schedule.yaml"
+SCENARIO_FILE = "scenario.yaml"  # robot and schedule as they are and as they are known
 PARAMETERS_FILE = "parameters.json"
 
 

@@ -7,7 +7,13 @@ from types import MappingProxyType
 
 from mcap.records import Schema
 
-from sms_handover.bag.attachments import PARAMETERS_FILE, ROBOT_FILE, SCHEDULE_FILE, parameters_from_json
+from sms_handover.bag.attachments import (
+    PARAMETERS_FILE,
+    ROBOT_FILE,
+    SCENARIO_FILE,
+    SCHEDULE_FILE,
+    parameters_from_json,
+)
 from sms_handover.bag.files import check_ends, damage_reported, files_of
 from sms_handover.bag.ledger import LEDGER_RECORD, Ledger
 from sms_handover.bag.mcap.scan import Source
@@ -89,6 +95,11 @@ class BagInfo:
     def schedule_text(self) -> str | None:
         """Return the YAML text of the task schedule, None without the attachment."""
         return self._text(SCHEDULE_FILE)
+
+    @property
+    def scenario_text(self) -> str | None:
+        """Return the YAML text of the scenario, None without the attachment, as in older recordings."""
+        return self._text(SCENARIO_FILE)
 
     @property
     def urdf_text(self) -> str | None:

@@ -4,7 +4,13 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from sms_handover.bag.attachments import PARAMETERS_FILE, ROBOT_FILE, SCHEDULE_FILE, parameters_json
+from sms_handover.bag.attachments import (
+    PARAMETERS_FILE,
+    ROBOT_FILE,
+    SCENARIO_FILE,
+    SCHEDULE_FILE,
+    parameters_json,
+)
 from sms_handover.bag.ledger import LEDGER_RECORD, PERIODS_RECORD, Ledger
 from sms_handover.bag.ledger_keeper import LedgerKeeper
 from sms_handover.bag.provenance import PROVENANCE_RECORD
@@ -76,6 +82,7 @@ class Recording:
         *,
         urdf: str | None = None,
         schedule: str | None = None,
+        scenario: str | None = None,
         parameters: Mapping[str, Mapping[str, object]] | None = None,
         provenance: Mapping[str, str] | None = None,
     ) -> None:
@@ -84,6 +91,8 @@ class Recording:
             self.writer.attach(ROBOT_FILE, "application/xml", urdf.encode())
         if schedule is not None:
             self.writer.attach(SCHEDULE_FILE, "application/yaml", schedule.encode())
+        if scenario is not None:
+            self.writer.attach(SCENARIO_FILE, "application/yaml", scenario.encode())
         if parameters is not None:
             self.writer.attach(PARAMETERS_FILE, "application/json", parameters_json(parameters).encode())
         if provenance is not None:

@@ -8,12 +8,13 @@ from pathlib import Path
 from sms_handover.bag.parameters import RecorderParameters
 from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.parameters import build, read_parameter_files
+from sms_handover.configuration.scenario_file import COMMON, SHORT
 from sms_handover.configuration.yaml_reader import load_value
 from sms_handover.control.registry import require_law
 from sms_handover.errors import ConfigurationError, UnknownNameError
 from sms_handover.graph.topics import CONTROLLER, RECORDER, TRAJECTORY
 from sms_handover.simulation.parameters import DYNAMICS, MODES
-from sms_handover.simulation.scenario import COMMON, Scenario, load_scenario
+from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.trajectory.time_law import TIME_LAWS
 
 Overrides = dict[str, dict[str, object]]
@@ -23,17 +24,30 @@ def add_scenario_options(parser: ArgumentParser) -> None:
     """Add the options that choose robot, schedule, controller and parameters."""
     group = parser.add_argument_group("scenario")
     group.add_argument(
+        "scenario",
+        nargs="?",
+        metavar="SCENARIO",
+        help="name of a shipped scenario ('sms-handover list'), or a scenario file (default: paper); "
+        "what the options say lies over it",
+    )
+    group.add_argument(
         "--controller",
         type=_law,
         metavar="LAW",
-        help="control law: nmpc, pid, or one of another package (default: nmpc)",
+        help="control law: nmpc, pid, or one of another package (default: that of the scenario)",
     )
-    group.add_argument("--schedule", type=Path, metavar="FILE", help="task schedule (default: handover.yaml)")
-    group.add_argument("--robot", type=Path, metavar="FILE", help="robot description (default: robot.yaml)")
+    group.add_argument(
+        "--schedule", type=Path, metavar="FILE", help="task schedule (default: that of the scenario)"
+    )
+    group.add_argument(
+        "--robot", type=Path, metavar="FILE", help="robot description (default: that of the scenario)"
+    )
     group.add_argument(
         "--duration", type=float, metavar="S", help="simulated time in s (default: the schedule's)"
     )
-    group.add_argument("--time-law", choices=tuple(TIME_LAWS), help="approach of targets (default: step)")
+    group.add_argument(
+        "--time-law", choices=tuple(TIME_LAWS), help="approach of targets (default: that of the scenario)"
+    )
     group.add_argument(
         "--dynamics",
         choices=DYNAMICS,
@@ -53,9 +67,10 @@ def add_scenario_options(parser: ArgumentParser) -> None:
         "--param",
         action="append",
         default=[],
-        metavar="NODE.NAME:=VALUE",
+        metavar="PATH:=VALUE",
         help="one parameter, e.g. plant.integrator:=midpoint, where the node 'common' is for all of "
-        "them; or a value of robot, deputy or schedule by path, e.g. robot.arms.arm_a.gripper.mass:=0.9",
+        "them; or a value of robot, deputy or schedule, e.g. robot.arms.arm_a.gripper.mass:=0.9, with truth "
+        "before it for the plant alone, with model for all others: truth.robot.base.mass:=264",
     )
 
 
@@ -75,6 +90,7 @@ def overrides_of(options: Namespace) -> Overrides:
         node, name, value = _parse(text)
         overrides.setdefault(node, {})[name] = value
     shortcuts = (
+        (COMMON, "scenario", options.scenario and str(_found(Path(options.scenario)))),
         (CONTROLLER, "law", options.controller),
         (TRAJECTORY, "time_law", options.time_law),
         (COMMON, "schedule", options.schedule and str(_found(options.schedule))),
@@ -102,18 +118,18 @@ def scenario_of(
         overrides[COMMON]["external"] = list(external)
     of_recorder = overrides.pop(RECORDER, {}) if recorded else {}
     files = [_found(path) for path in options.params_file]
-    scenario = load_scenario(overrides, files)
+    scenario = load_scenario(values=overrides, files=files)
     if not recorded:
         return scenario
     values = read_parameter_files([config_file("recorder.yaml"), *files], RECORDER)
     build(RecorderParameters, {**values, **of_recorder}, RECORDER)
-    return replace(scenario, overrides={**overrides, RECORDER: of_recorder})
+    return replace(scenario, overrides={**scenario.overrides, RECORDER: of_recorder})
 
 
 def _parse(text: str) -> tuple[str, str, object]:
     """Return node, name and value of ``node.name:=value``."""
     target, assigned, value = text.partition(":=")
-    node, dot, name = target.partition(".")
+    node, dot, name = (SHORT[target], ".", target) if target in SHORT else target.partition(".")
     if not (assigned and dot and node and name):
         raise ConfigurationError(f"parameter {text!r} is not of the form NODE.NAME:=VALUE")
     return node, name, load_value(value, text)

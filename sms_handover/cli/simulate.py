@@ -34,7 +34,7 @@ def command(options: Namespace) -> int:
     scenario = scenario_of(options)
     check_scenario(scenario)
     common = scenario.parameters.common
-    with Display(common.last_tick(scenario.schedule.end_ns) * common.tick_ns) as display:
+    with Display(common.last_tick(scenario.end_ns) * common.tick_ns) as display:
 
         def show(stamp_ns: int, phase: TaskPhase) -> None:
             display.lasts_until(common.last_tick(phase.end_ns, failed=phase.failed) * common.tick_ns)
@@ -43,7 +43,7 @@ def command(options: Namespace) -> int:
         run = simulate(scenario, progress=show)
         display.show_run(int(run.tick_ns[-1]), run.phases[-1].name, last=True)
     name, tolerance = scenario.parameters.controller.law, scenario.parameters.plant.grasp_tolerance
-    texts = TaskTexts(scenario.robot.urdf, scenario.schedule.text)
+    texts = TaskTexts(scenario.truth.robot.urdf, scenario.truth.schedule.text)
     for event in run.run_events:
         print(event)
     print(comparison_table({name: run}, tolerance=tolerance, texts={name: texts}))

@@ -18,7 +18,7 @@ class Section:
     def __init__(
         self, values: Mapping, file: Path, kind: type[ConfigurationError] = ConfigurationError, path: str = ""
     ) -> None:
-        self._values, self._file, self._kind, self._path = values, file, kind, path
+        self._values, self._file, self._kind, self._path = values, values.file or file, kind, path
         for key in values:
             if not isinstance(key, str):
                 raise self.error(f"key {key!r} must be text", key)

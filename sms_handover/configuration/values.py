@@ -2,8 +2,8 @@
 
 import json
 import re
+from collections.abc import Iterator, Sequence
 from collections.abc import Mapping as AnyMapping
-from collections.abc import Sequence
 from copy import copy
 from reprlib import repr as shortened
 from typing import Any
@@ -13,33 +13,50 @@ from sms_handover.errors import ConfigurationError, UnknownNameError
 
 ROBOT, DEPUTY, SCHEDULE = "robot", "deputy", "schedule"
 DOCUMENTS = (ROBOT, DEPUTY, SCHEDULE)  # the deputy is a section of the schedule
+TRUTH, MODEL = "truth", "model"
+ROLES = (TRUTH, MODEL)  # what the plant has, and what every other node has
+_OF_ROLES = (ROBOT, DEPUTY)
 _STEP = re.compile(r"[^.\[\]]+")
 
 
-def written(document: str, values: AnyMapping[str, object]) -> list[str]:
-    """Return values of a document by path as texts that :func:`with_values` takes."""
-    return [f"{document}.{path}:={json.dumps(value, default=str)}" for path, value in values.items()]
+def written(first: str, values: AnyMapping[str, object]) -> list[str]:
+    """Return values below the first step of their path as texts that :func:`with_values` takes."""
+    return [f"{first}.{path}:={json.dumps(value, default=str)}" for path, value in values.items()]
 
 
-def with_values(content: Mapping, document: str, values: Sequence[str]) -> Mapping:
+def with_values(content: Mapping, document: str, values: Sequence[str], role: str = "") -> Mapping:
     """Return the content of a document with those of the values set that are its own.
 
-    An item of a list is named by its ``name`` or its index; ``null`` removes a key. Raises
+    These are the values that hold for everybody, or those of one role, whose paths begin with its name. An
+    item of a list is named by its ``name`` or its index; ``null`` removes a key or an item. Raises
     ConfigurationError; keys and values that a document may not have are left to its own checks.
     """
     for text in values:
-        path, assigned, value = text.partition(":=")
-        first, *steps = _STEP.findall(path)
-        if not assigned or not steps or first not in DOCUMENTS:
-            known = ", ".join(DOCUMENTS)
-            raise ConfigurationError(
-                f"value {text!r} must be of the form PATH:=VALUE, PATH beginning with {known}"
-            )
-        if first == DEPUTY:
-            first, steps = SCHEDULE, [DEPUTY, *steps]
-        if first == document:
-            content = _set(content, steps, load_value(value, text), text)
+        of_role, of_document, steps = _path(text)
+        if (of_role, of_document) == (role, document):
+            content = _set(content, steps, load_value(text.partition(":=")[2], text), text)
     return content
+
+
+def roles_of(values: Sequence[str]) -> Iterator[str]:
+    """Yield the roles of the values that are set for one role alone; raises ConfigurationError."""
+    yield from (role for role, _, _ in map(_path, values) if role)
+
+
+def _path(text: str) -> tuple[str, str, list[str]]:
+    """Return role ('' for everybody), document, and the steps below it, of an assignment."""
+    path, assigned, _ = text.partition(":=")
+    role, steps = "", _STEP.findall(path)
+    if steps and steps[0] in ROLES:
+        role, *steps = steps
+    known = _OF_ROLES if role else DOCUMENTS
+    if not assigned or len(steps) < 2 or steps[0] not in known:  # a document and something in it
+        begin = " or ".join(f"{role}.{name}" if role else name for name in known)
+        raise ConfigurationError(
+            f"value {text!r} must be of the form PATH:=VALUE, PATH beginning with {begin}"
+        )
+    first, *rest = steps
+    return (role, SCHEDULE, [DEPUTY, *rest]) if first == DEPUTY else (role, first, rest)
 
 
 def _set(node: Any, steps: Sequence[str], value: object, text: str) -> Any:
@@ -49,7 +66,8 @@ def _set(node: Any, steps: Sequence[str], value: object, text: str) -> Any:
     step, *rest = steps
     if isinstance(node, list):
         index = _index(node, step, text)
-        return [*node[:index], _set(node[index], rest, value, text), *node[index + 1 :]]
+        inner = [] if not rest and value is None else [_set(node[index], rest, value, text)]
+        return [*node[:index], *inner, *node[index + 1 :]]
     if not isinstance(node, Mapping):
         raise ConfigurationError(f"{text}: {shortened(node)} has no {step!r}")
     changed = copy(node)

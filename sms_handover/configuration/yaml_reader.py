@@ -28,11 +28,14 @@ _FLOAT = re.compile(
 
 
 class Mapping(dict[Any, Any]):
-    """A mapping that knows its line and those of its keys, counted from 1."""
+    """A mapping that knows its line and those of its keys, counted from 1.
 
-    def __init__(self, line: int = 0) -> None:
+    ``file`` is None where it is that of the mapping around it.
+    """
+
+    def __init__(self, line: int = 0, file: Path | None = None) -> None:
         super().__init__()
-        self.line = line
+        self.line, self.file = line, file
         self.lines: dict[Any, int] = {}
         self.origins: dict[Any, str] = {}  # of values that were set from elsewhere
 
@@ -157,6 +160,7 @@ def load_mapping(text: str, path: Path) -> Mapping:
         raise ConfigurationError(f"{path}: not valid YAML: {_reason(error)}") from error
     if not isinstance(document, Mapping):
         raise ConfigurationError(f"{path}: must be a mapping at the top level")
+    document.file = path
     return document
 
 

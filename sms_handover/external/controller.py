@@ -13,7 +13,6 @@ from sms_handover.nodes.controller import AnsweringNode
 from sms_handover.ros.node.graph_node import P
 from sms_handover.ros.process.main import EXIT_OK, run_node
 from sms_handover.ros.reference.help import own_parameters_help
-from sms_handover.trajectory.schedule import Schedule
 
 Make = Callable[[RobotModel, P], Controller]  # a controller for a robot, from its parameters
 
@@ -52,6 +51,6 @@ class OwnControllerNode(AnsweringNode[P]):
         """True: any controller may follow the tools."""
         return True
 
-    def make_controller(self, schedule: Schedule) -> Controller:
+    def make_controller(self) -> Controller:
         """Return the controller, its efforts checked."""
         return CheckedController(self._make(self.robot, self.parameters), self.robot.joint_names)

@@ -10,6 +10,7 @@ from rclpy.executors import Executor
 from sms_handover.analysis.deviation import LargestDeviation, StateDeviation
 from sms_handover.bag.info import read_info
 from sms_handover.bag.run.ticks import recorded_ticks
+from sms_handover.configuration.scenario_file import COMMON
 from sms_handover.errors import BagError, ConfigurationError, GraphError
 from sms_handover.graph.topics import CONTROLLER, PLANT
 from sms_handover.launcher.command_replay import PEERS, CommandReplay
@@ -22,7 +23,7 @@ from sms_handover.model.robot_model import RobotModel
 from sms_handover.ros.parameters import as_arguments
 from sms_handover.ros.process.network_scope import network_scope_to
 from sms_handover.simulation.parameters import LOCKSTEP
-from sms_handover.simulation.scenario import COMMON, Scenario
+from sms_handover.simulation.scenario import Scenario
 from sms_handover.units import ns_to_seconds
 
 EXIT_SAME, EXIT_DEVIATES = 0, 1
@@ -47,7 +48,9 @@ def closed_loop(bag: Path, domain_id: int | None) -> int:
             for number in (signal.SIGTERM, signal.SIGHUP):
                 signal.signal(number, signal.default_int_handler)
             with joined_graph(plan, CONTROLLER) as (node, executor):
-                replay = CommandReplay(node, ticks, scenario.robot, scenario.parameters.common.reference_ns)
+                replay = CommandReplay(
+                    node, ticks, scenario.truth.robot, scenario.parameters.common.reference_ns
+                )
                 with NodeProcesses(folder, graph_environment(plan)) as processes:
                     processes.start(PLANT, ["--ros-args", *_plant_arguments(scenario)])
                     with Display(info.end_ns) as display:
@@ -55,7 +58,7 @@ def closed_loop(bag: Path, domain_id: int | None) -> int:
     print(f"{replay.deviation.compared} states, wall time {monotonic() - begin:.1f} s")
     if replay.held:
         print(f"{replay.held} ticks without a recorded command: the last one was held")
-    print("\n".join(deviation_lines(replay.deviation, scenario.robot)))
+    print("\n".join(deviation_lines(replay.deviation, scenario.truth.robot)))
     return EXIT_SAME if replay.deviation.first is None and replay.deviation.compared else EXIT_DEVIATES
 
 

@@ -14,6 +14,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from sms_handover_interfaces.msg import RunState
 
+from sms_handover.configuration.scenario_file import COMMON
 from sms_handover.errors import GraphError
 from sms_handover.graph.topics import NODES, PLANT, RECORDER
 from sms_handover.launcher.display import Display
@@ -27,7 +28,7 @@ from sms_handover.ros.launching.composition import ProcessArguments, nodes_toget
 from sms_handover.ros.node.node_inputs import INPUTS
 from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK
 from sms_handover.ros.process.network_scope import THIS_MACHINE, NetworkScope
-from sms_handover.simulation.scenario import COMMON, Scenario
+from sms_handover.simulation.scenario import Scenario
 from sms_handover.units import ns_to_seconds
 
 _LOG_FOLDER = "ROS_LOG_DIR"  # environment variable that ROS reads
@@ -97,11 +98,11 @@ def launch(plan: LaunchPlan) -> Outcome:
 
 def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outcome:
     common = plan.scenario.parameters.common
-    end_ns = common.last_tick(plan.scenario.schedule.end_ns) * common.tick_ns
+    end_ns = common.last_tick(plan.scenario.end_ns) * common.tick_ns
     with joined_graph(plan, "launcher") as (node, executor), ExitStack() as stack:
         inputs = INPUTS[common.transport](node)
         stack.callback(inputs.destroy)
-        monitor = RunMonitor(node, plan.scenario.robot.arms, inputs)
+        monitor = RunMonitor(node, plan.scenario.model.robot.arms, inputs)
         processes = stack.enter_context(
             NodeProcesses(plan.log_folder, graph_environment(plan), plan.inherited)
         )

@@ -1,11 +1,9 @@
 """Arm file: the description of one arm, its joints and links from the mount to the flange."""
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from sms_handover.configuration.sections import Section
-from sms_handover.errors import RobotDescriptionError
 from sms_handover.frames import joint_name
 from sms_handover.model.assembly import link_name
 from sms_handover.model.parts import Inertia, JointDescription, LinkDescription, Origin
@@ -13,9 +11,8 @@ from sms_handover.model.parts import Inertia, JointDescription, LinkDescription,
 _LIMITS = ("position", "velocity", "effort")
 
 
-def read_arm_file(file: Path, arm: str) -> tuple[list[JointDescription], list[LinkDescription], Origin]:
-    """Return joints, links and flange of an arm's description file, named for one arm."""
-    root = Section.read(file, RobotDescriptionError)
+def read_arm(root: Section, arm: str) -> tuple[list[JointDescription], list[LinkDescription], Origin]:
+    """Return joints, links and flange of an arm's description, named for one arm."""
     root.only(("joints", "flange"))
     joints, links = [], []
     for number_from_1, section in enumerate(root.sections("joints"), start=1):

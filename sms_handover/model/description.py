@@ -1,34 +1,39 @@
 """Description of a robot, read from its YAML files."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from sms_handover.configuration.package_files import config_file
+from sms_handover.configuration.robot_content import read_robot_content
 from sms_handover.configuration.sections import Section
-from sms_handover.configuration.values import ROBOT, with_values
-from sms_handover.configuration.yaml_reader import read_yaml
+from sms_handover.configuration.yaml_reader import Mapping
 from sms_handover.errors import RobotDescriptionError
 from sms_handover.frames import BASE
-from sms_handover.model.arm_file import override_limits, read_arm_file, read_origin
+from sms_handover.model.arm_file import override_limits, read_arm, read_origin
 from sms_handover.model.assembly import ArmDescription, Base, Panel, RobotDescription, gripper_name
 from sms_handover.model.parts import Floats, Gripper, Inertia, box_moments
 
 _UNIFORM_BOX = "uniform_box"
 
 
-def load_robot(path: Path | None = None, values: Sequence[str] = ()) -> RobotDescription:
+def load_robot(path: Path | None = None) -> RobotDescription:
     """Return the checked robot that a file describes, by default the shipped ``config/robot.yaml``.
 
-    ``values`` of it are set by dotted path, e.g. ``robot.base.mass:=300``. The path of an arm's own
-    description file is relative to the robot file. Raises RobotDescriptionError on a key or value that
-    no robot can have and ConfigurationError on a file that cannot be read; each names file and line.
+    The path of an arm's own description file is relative to the robot file. Raises what :func:`robot_of`
+    does, and ConfigurationError on a file that cannot be read.
     """
-    path = config_file("robot.yaml") if path is None else path
-    root = Section(with_values(read_yaml(path), ROBOT, values), path, RobotDescriptionError)
+    return robot_of(read_robot_content(config_file("robot.yaml") if path is None else path))
+
+
+def robot_of(content: Mapping) -> RobotDescription:
+    """Return the checked robot that the content of a robot file describes.
+
+    Raises RobotDescriptionError on a key or value that no robot can have, with file and line.
+    """
+    root = Section(content, Path(), RobotDescriptionError)
     root.only(("name", "base", "arms"))
     name, base = root.text("name"), _base(root.section("base"))
-    arms = tuple(_arm(item, path.parent) for item in root.sections("arms"))
+    arms = tuple(map(_arm, root.sections("arms")))
     with root.located("arms"):
         return RobotDescription(name, base, arms)
 
@@ -58,11 +63,11 @@ def _panel(section: Section) -> Panel:
     return Panel(section.vector("xyz", 3, "m"), section.vector("size", 3, "m", above=0.0))
 
 
-def _arm(section: Section, folder: Path) -> ArmDescription:
+def _arm(section: Section) -> ArmDescription:
     """Return one arm: its own description file, with what the robot file adds or overrides."""
     section.only(("name", "description", "mount", "gripper", "rotor_inertia"), optional=("limits",))
     name = section.text("name")
-    joints, links, flange = read_arm_file(folder / section.text("description"), name)
+    joints, links, flange = read_arm(section.section("description"), name)
     rotor = section.vector("rotor_inertia", len(joints), "kg m^2")
     with section.located("rotor_inertia"):
         joints = [replace(joint, rotor_inertia=kg_m2) for joint, kg_m2 in zip(joints, rotor, strict=True)]

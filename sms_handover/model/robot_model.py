@@ -1,6 +1,6 @@
 """Robot model: the free-floating robot in Pinocchio, with maps from names to indices."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
@@ -51,9 +51,9 @@ class RobotModel:
         self._apply_rotor_inertia()
 
     @classmethod
-    def load(cls, path: Path | None = None, values: Sequence[str] = ()) -> "RobotModel":
+    def load(cls, path: Path | None = None) -> "RobotModel":
         """Return the model of a robot description file, by default the shipped one (see load_robot)."""
-        return cls(load_robot(path, values))
+        return cls(load_robot(path))
 
     @property
     def mass(self) -> float:

@@ -1,12 +1,13 @@
 """Controller node: answers every state with a joint command."""
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from sms_handover.configuration.scenario_file import LAW
 from sms_handover.control.law import Need
 from sms_handover.control.parameters import ControllerParameters, parameters_with
 from sms_handover.control.protocol import Controller
@@ -30,9 +31,7 @@ from sms_handover.ros.node.message_filter import Decode
 from sms_handover.ros.process.main import run_node
 from sms_handover.ros.transport.stamp_sync import StampOrder, StampSync
 from sms_handover.simulation.parameters import LOCKSTEP
-from sms_handover.simulation.scenario import load_task
 from sms_handover.simulation.wiring import longest_reference_ns, make_controller
-from sms_handover.trajectory.schedule import Schedule
 from sms_handover.units import NS_PER_S
 
 _STATE = (JOINT_STATES, BASE_ODOMETRY)
@@ -50,8 +49,7 @@ class AnsweringNode(GraphNode[P]):
 
     def prepare(self) -> None:
         """Set up the controller; raises what :meth:`make_controller` does."""
-        schedule = load_task(self.common, self.robot)
-        self._controller = self.make_controller(schedule)
+        self._controller = self.make_controller()
         self._no_effort = np.zeros(self.robot.n_joints)  # N m
         self._parts = GuidanceParts(self.robot.arms if self.follows_tools else ())
         self._lockstep = self.common.mode == LOCKSTEP
@@ -59,7 +57,7 @@ class AnsweringNode(GraphNode[P]):
         self._state_codec = StateCodec(self.robot.joint_names, WORLD, BASE)
         self._reference_codec = JointStateCodec(self.robot.joint_names, ("position", "velocity"))
         self._command_codec = JointStateCodec(self.robot.joint_names, ("effort",))
-        self._phase_codec = PhaseCodec(self.robot.arms, schedule.deputy.grasp_frames)
+        self._phase_codec = PhaseCodec(self.robot.arms, self.schedule.deputy.grasp_frames)
         guidance: dict[str, Decode[Stamped[Any]]] = dict.fromkeys(
             self._parts.topics, PoseCodec(WORLD).checked
         )
@@ -91,7 +89,7 @@ class AnsweringNode(GraphNode[P]):
         """Whether the controller is given the targets of the tools."""
 
     @abstractmethod
-    def make_controller(self, schedule: Schedule) -> Controller:
+    def make_controller(self) -> Controller:
         """Return what answers the states of the robot."""
 
     def begin(self) -> None:
@@ -187,12 +185,14 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
     def __init__(self) -> None:
         super().__init__(ControllerParameters)
 
-    def parameter_group(self, group: type[ControllerParameters]) -> type[ControllerParameters]:
+    def parameter_group(
+        self, group: type[ControllerParameters], scenario: Mapping[str, object]
+    ) -> type[ControllerParameters]:
         """Return the parameters of the controller with those of the law that was given."""
-        if not self.has_parameter("law"):
+        name = self.get_parameter(LAW).value if self.has_parameter(LAW) else scenario.get(LAW)
+        if name is None:
             return group
-        name = str(self.get_parameter("law").value)
-        return parameters_with(law_named(name, f"{CONTROLLER}: parameter 'law'"))
+        return parameters_with(law_named(str(name), f"{CONTROLLER}: parameter {LAW!r}"))
 
     def prepare(self) -> None:
         """Set up the law; raises UnstableLoopError if its gains cannot work at this tick."""
@@ -209,9 +209,9 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
         """Whether the law needs the targets of the tools."""
         return Need.TOOL_TARGETS in law_named(self.law).needs
 
-    def make_controller(self, schedule: Schedule) -> Controller:
+    def make_controller(self) -> Controller:
         """Return the controller that the parameters ask for; raises ConfigurationError."""
-        return make_controller(self.robot, schedule, self.common, self.parameters)
+        return make_controller(self.robot, self.schedule, self.common, self.parameters)
 
     def begin(self) -> None:
         """Go back to the start of a run."""

@@ -23,7 +23,6 @@ from sms_handover.ros.node.diagnostics import NodeReport
 from sms_handover.ros.node.graph_node import GraphNode
 from sms_handover.ros.process.main import run_node
 from sms_handover.simulation.feasibility import check_feasibility
-from sms_handover.simulation.scenario import load_task
 from sms_handover.types import IkRequest, IkStatus, Pose
 
 
@@ -39,7 +38,7 @@ class IkNode(GraphNode[IkParameters]):
         The check is made here because its outcome depends on the parameters of this node; what a grasp
         tolerates is for the plant to say. Raises ScheduleError.
         """
-        check_feasibility(self.robot, load_task(self.common, self.robot), self.parameters)
+        check_feasibility(self.robot, self.schedule, self.parameters)
         self.reset_run()
         self._names = list(self.robot.joint_names)
         self._response = SolveIK.Response(valid=True)  # refilled each time: most of it never changes

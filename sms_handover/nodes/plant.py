@@ -39,7 +39,6 @@ from sms_handover.ros.process.main import run_node
 from sms_handover.ros.transport.loop_clock import LoopClock
 from sms_handover.ros.transport.stamp_sync import StampOrder, StampSync
 from sms_handover.simulation.parameters import LOCKSTEP
-from sms_handover.simulation.scenario import load_task
 from sms_handover.simulation.wiring import make_plant
 from sms_handover.types import JointCommand, TaskPhase
 
@@ -65,7 +64,7 @@ class PlantNode(GraphNode[PlantParameters]):
 
     def prepare(self) -> None:
         """Place robot and deputy at the start of the schedule."""
-        schedule = load_task(self.common, self.robot)
+        schedule = self.schedule
         self._plant = make_plant(self.robot, schedule, self.common, self.parameters)
         self._deputy_size = schedule.deputy.size
         self._end_ns = schedule.end_ns

@@ -49,7 +49,7 @@ from sms_handover.ros.transport.inputs import OnSerialized
 from sms_handover.ros.transport.publisher_identity import PublisherIdentity
 from sms_handover.ros.transport.stamp_sync import StampSync
 from sms_handover.simulation.parameters import LOCKSTEP
-from sms_handover.simulation.scenario import load_task
+from sms_handover.simulation.scenario import scenario_text
 
 _POLL_S = 0.005  # [s] of wall time between two batches: long enough to be cheap, short enough to lose little
 _LOCKSTEP_POLL_S = 0.002  # [s] where the plant would run out of what it may be ahead, and wait
@@ -75,7 +75,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
 
     def prepare(self) -> None:
         """Create the bag; raises ConfigurationError if it cannot."""
-        self._schedule_text = load_task(self.common, self.robot).text
+        self._scenario_text = scenario_text(self.common)
         folder = self.parameters.folder or datetime.now().strftime("handover_%Y_%m_%d-%H_%M_%S")
         try:
             self._recordings = RunRecordings(Path(folder), self._describe, self.parameters.split)
@@ -164,8 +164,8 @@ class RecorderNode(GraphNode[RecorderParameters]):
 
     def _describe(self, recording: Recording) -> None:
         """Describe in a bag what it is made with."""
-        urdf, schedule = self.robot.urdf, self._schedule_text
-        recording.describe(urdf=urdf, schedule=schedule, provenance=provenance())
+        urdf, schedule, made = self.robot.urdf, self.schedule.text, provenance(self.common.seed)
+        recording.describe(urdf=urdf, schedule=schedule, scenario=self._scenario_text, provenance=made)
 
     def _take_over(self, recording: Recording) -> None:
         """Record into a bag that is open from now on."""

@@ -40,7 +40,6 @@ from sms_handover.ros.node.graph_node import GraphNode
 from sms_handover.ros.process.main import run_node
 from sms_handover.ros.transport.stamp_sync import StampSync
 from sms_handover.simulation.parameters import LOCKSTEP
-from sms_handover.simulation.scenario import load_task
 from sms_handover.trajectory.generator import Targets, TrajectoryGenerator
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.types import Array, RobotState, TaskPhase
@@ -59,9 +58,8 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         super().__init__(TRAJECTORY, TrajectoryParameters)
 
     def prepare(self) -> None:
-        """Read the schedule; raises ScheduleError. That its targets are in reach, the IK node checks."""
-        schedule = load_task(self.common, self.robot)
-        self._generator = TrajectoryGenerator(self.robot, schedule, self.parameters)
+        """Set up the generator; that its targets are in reach, the IK node checks."""
+        self._generator = TrajectoryGenerator(self.robot, self.schedule, self.parameters)
         self._reference_codec = JointStateCodec(self.robot.joint_names, ("position", "velocity"))
         self._pose_codec, self._phase_codec = PoseCodec(WORLD), PhaseCodec()
         self._lockstep = self.common.mode == LOCKSTEP

@@ -12,31 +12,45 @@ from rclpy.parameter import Parameter
 
 from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.parameters import (
+    EVERY_NODE,
     ParameterSpec,
     build,
     defaults_of,
     read_parameter_files,
     spec_of,
 )
+from sms_handover.configuration.scenario_file import ScenarioFile, load_scenario_file
 from sms_handover.errors import ConfigurationError, UnknownNameError
 
 T = TypeVar("T")
 
 _LARGEST = 1.7976931348623157e308  # [-] stands for "no upper bound" in a range message
 _LARGEST_INT = 2**63 - 1  # [-]
+_SCENARIO = "scenario"
 _SIMULATED_TIME = "use_sim_time"
 _ROS_OWN = (_SIMULATED_TIME, "start_type_description_service")
 
 
-def declare(node: Node, cls: type[T], file: str | None, section: str) -> T:
+def named_scenario(node: Node) -> ScenarioFile:
+    """Return the scenario that a node was given, by default the shipped one; raises ConfigurationError."""
+    name = read_parameter_files([config_file("common.yaml")], EVERY_NODE)[_SCENARIO]
+    if node.has_parameter(_SCENARIO):
+        name = node.get_parameter(_SCENARIO).value
+    return load_scenario_file(str(name))
+
+
+def declare(
+    node: Node, cls: type[T], file: str | None, section: str, scenario: Mapping[str, object] | None = None
+) -> T:
     """Declare the fields of ``cls`` as read-only parameters of ``node`` and return them checked.
 
     The defaults are those of the fields, then of a section of a file in the package's ``config/`` if there is
-    one; what was given on the command line comes on top. Raises ConfigurationError.
+    one, then of a ``scenario``; what was given on the command line comes on top. Raises ConfigurationError.
     """
     values = defaults_of(cls)
     if file is not None:
         values.update(read_parameter_files([config_file(file)], section))
+    values.update(scenario or {})
     given = [item.name for item in fields(cls) if node.has_parameter(item.name)]  # type: ignore[arg-type]
     values.update({name: node.get_parameter(name).value for name in given})
     checked = build(cls, values, node.get_name())  # before ROS checks the range with errors of its own

@@ -14,10 +14,12 @@ def check_scenario(scenario: Scenario) -> tuple[PhasePrediction, ...]:
 
     Beyond what making the parts of the loop checks, every target must be in reach, every grasp must
     meet its frame, and the sampled loop must be stable where each phase ends, not only at the start: the
-    reduced inertia falls where wrist axes come into line. Of an external controller nothing is known.
+    reduced inertia falls where wrist axes come into line. Of an external controller nothing is known. What is
+    checked is the model: how far the truth is from it, nobody knows before a run.
     """
-    parameters, robot, schedule = scenario.parameters, scenario.robot, scenario.schedule
-    make_plant(robot, schedule, parameters.common, parameters.plant)
+    parameters, truth = scenario.parameters, scenario.truth
+    robot, schedule = scenario.model.robot, scenario.model.schedule
+    make_plant(truth.robot, truth.schedule, parameters.common, parameters.plant)
     ours = CONTROLLER not in parameters.common.external
     if ours:
         make_controller(robot, schedule, parameters.common, parameters.controller)

@@ -102,9 +102,10 @@ class Loop:
         none is given.
         """
         self.scenario = scenario or load_scenario()
-        parameters, robot, schedule = self.scenario.parameters, self.scenario.robot, self.scenario.schedule
+        parameters, truth = self.scenario.parameters, self.scenario.truth
+        robot, schedule = self.scenario.model.robot, self.scenario.model.schedule
         self._common = parameters.common
-        self._plant = make_plant(robot, schedule, self._common, parameters.plant)
+        self._plant = make_plant(truth.robot, truth.schedule, self._common, parameters.plant)
         self._generator = TrajectoryGenerator(robot, schedule, parameters.trajectory)
         self._per_reference = self._common.ticks_per_reference
         self._controller: Controller
@@ -122,13 +123,16 @@ class Loop:
             self._controller = make_controller(robot, schedule, self._common, parameters.controller)
         self.reset()
 
-    def reset(self, seed: int = 0) -> None:
-        """Go back to the start; ``seed`` is that of every random stream and is kept by snapshots."""
-        self.seed = seed
+    def reset(self, seed: int | None = None) -> None:
+        """Go back to the start.
+
+        ``seed`` is that of every random stream, by default that of the scenario, and is kept by snapshots.
+        """
+        self.seed = self._common.seed if seed is None else seed
         self._plant.reset()
         self._generator.reset()
         self._controller.reset()
-        schedule, rest = self.scenario.schedule, self._plant.state
+        schedule, rest = self.scenario.model.schedule, self._plant.state
         phase = TaskPhase(0, 0, schedule.phases[0].name, end_ns=schedule.end_ns)
         reference = JointReference(0, rest.joint_position, rest.joint_velocity)
         self._guidance = Guidance(phase, reference, {})  # until the first one comes
@@ -197,7 +201,7 @@ class Loop:
 
     def _begin_period(self) -> Period:
         """Guide the controller and execute the grasp commands of this instant."""
-        plant, generator, robot = self._plant, self._generator, self.scenario.robot
+        plant, generator, robot = self._plant, self._generator, self.scenario.model.robot
         state, deputy = plant.state, plant.deputy
         tools, conserved = plant.tools_in_world, plant.conserved
         phase, targets = generator.targets(state, deputy.deputy_in_world)

@@ -27,13 +27,15 @@ class CommonParameters:
     duration: float = parameter(
         "simulated time of the run; 0: to the end of the schedule", unit="s", minimum=0.0
     )
-    robot: str = parameter("path of the robot description; empty: the package's robot.yaml")
-    schedule: str = parameter("path of the task schedule; empty: the package's handover.yaml")
+    scenario: str = parameter("name of a shipped scenario, or path of a scenario file")
+    robot: str = parameter("path of a robot description; empty: that of the scenario")
+    schedule: str = parameter("path of a task schedule; empty: that of the scenario")
     values: tuple[str, ...] = parameter(
-        "values of robot, deputy and schedule by dotted path that replace those of the files, such as "
-        "robot.base.mass:=300 or schedule.phases.carry.duration:=12"
+        "values of robot, deputy and schedule by dotted path on top of the files, such as "
+        "robot.base.mass:=300 or schedule.phases.carry.duration:=12; those of the plant alone begin with "
+        "truth, as in truth.robot.base.mass:=264, those of every other node with model"
     )
-
+    seed: int = parameter("what every random number of the run follows from", minimum=0, maximum=2**53)
     dynamics: str = parameter(
         "equations of motion; pinocchio: its algorithms; compiled: the same equations as C code, generated "
         "once for this robot: several times faster, needs CasADi and a C compiler",

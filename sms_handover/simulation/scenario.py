@@ -1,4 +1,4 @@
-"""A scenario: parameters, robot and schedule of a run, read from files and checked."""
+"""A scenario: parameters of a run, and its robot and schedule as they are and as they are known."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -6,19 +6,22 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TypeVar
 
+from sms_handover.configuration.documents import Replacements, as_yaml, documents_of, resolved, truth_is_model
 from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.parameters import EVERY_NODE, build, read_parameter_files
+from sms_handover.configuration.scenario_file import COMMON, SHORT, ScenarioFile, load_scenario_file
 from sms_handover.configuration.sections import Section
-from sms_handover.configuration.values import DOCUMENTS, written
+from sms_handover.configuration.values import DOCUMENTS, MODEL, ROLES, TRUTH, written
 from sms_handover.control.parameters import ControllerParameters, parameters_with
 from sms_handover.control.registry import law_named
-from sms_handover.errors import UnknownNameError
+from sms_handover.errors import ConfigurationError, UnknownNameError
 from sms_handover.graph.topics import CONTROLLER, IK, NODES, PLANT, PLAYER, TOPIC_RECORDER, TRAJECTORY, VIEWER
 from sms_handover.ik.parameters import IkParameters
+from sms_handover.model.description import robot_of
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.simulation.parameters import CommonParameters
-from sms_handover.trajectory.load import load_schedule
+from sms_handover.trajectory.load import schedule_of
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.schedule import Schedule
 
@@ -27,9 +30,8 @@ T = TypeVar("T")
 _SECTIONS = (EVERY_NODE, *NODES, PLAYER, TOPIC_RECORDER, VIEWER)  # of parameter files
 _SLIP = 0.8  # [-] similarity of names, by difflib, from which one is a misspelling
 
-COMMON = "common"  # prefix of an override for every node
 
-Overrides = Mapping[str, Mapping[str, object]]
+Overrides = Mapping[str, Mapping[str, object]]  # by node, or by document and path
 
 
 @dataclass(frozen=True)
@@ -44,17 +46,35 @@ class ParameterSet:
 
 
 @dataclass(frozen=True, eq=False)
-class Scenario:
-    """Parameters, robot and schedule of one run."""
+class World:
+    """Robot and schedule, the deputy in it, as they are or as they are known."""
 
-    parameters: ParameterSet
     robot: RobotModel
     schedule: Schedule
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """Parameters of one run, and its world: the ``truth`` that the plant has, the ``model`` of all others.
+
+    The two are the same object unless the scenario makes a difference between them.
+    """
+
+    parameters: ParameterSet
+    truth: World
+    model: World
     overrides: Overrides = field(default_factory=dict)
 
+    @property
+    def end_ns(self) -> int:
+        """When the last phase ends, in ns of simulation time."""
+        return self.model.schedule.end_ns
 
-def load_parameters(overrides: Overrides | None = None, files: Sequence[Path] = ()) -> ParameterSet:
-    """Return the default parameters, overridden by ``files`` and then by ``overrides``.
+
+def load_parameters(
+    overrides: Overrides | None = None, files: Sequence[Path] = (), scenario: ScenarioFile | None = None
+) -> ParameterSet:
+    """Return the default parameters, overridden by a scenario, by ``files`` and then by ``overrides``.
 
     ``overrides`` maps a node name, or ``common``, to parameters. Raises ConfigurationError.
     """
@@ -62,16 +82,17 @@ def load_parameters(overrides: Overrides | None = None, files: Sequence[Path] = 
     known = (COMMON, PLANT, TRAJECTORY, IK, CONTROLLER)
     for node in overrides:
         if node not in known:
-            raise UnknownNameError("node", node, (*known, *DOCUMENTS), "parameter overrides")
+            raise UnknownNameError("node", node, (*known, *DOCUMENTS, *ROLES), "parameter overrides")
 
     for path in files:
         _reject_misspelt(path)
 
     def given(node: str, section: str) -> tuple[dict[str, object], dict[str, str]]:
-        values, over = (
-            read_parameter_files([config_file(f"{node}.yaml"), *files], section),
-            overrides.get(node, {}),
-        )
+        values, over = read_parameter_files([config_file(f"{node}.yaml")], section), overrides.get(node, {})
+        for more in (scenario and scenario.parameters[node], read_parameter_files(files, section)):
+            if more:
+                values.update(more)
+                values.places.update(more.places)
         return {**values, **over}, {name: place for name, place in values.places.items() if name not in over}
 
     def group(cls: type[T], node: str, section: str) -> T:
@@ -106,28 +127,73 @@ def _reject_misspelt(path: Path) -> None:
             raise UnknownNameError("node", section, _SECTIONS, document.where(section))
 
 
-def load_scenario(overrides: Overrides | None = None, files: Sequence[Path] = ()) -> Scenario:
-    """Return the scenario that parameters, robot description and schedule make, all checked.
+def load_scenario(
+    name: str | Path = "", values: Mapping[str, object] | None = None, files: Sequence[Path] = ()
+) -> Scenario:
+    """Return a shipped scenario, or that in a file, by default the one of ``config/common.yaml``, checked.
 
-    ``overrides`` maps ``robot``, ``deputy`` and ``schedule`` to values by dotted path too, such as
-    ``{"robot": {"arms.arm_a.gripper.mass": 0.9}}``.
+    ``values`` are by dotted path, such as ``{"law": "pid", "robot.base.mass": 300}``, where a common
+    beginning may be a key of its own: ``{"controller": {"law": "pid"}}``. ``files`` are parameters in ROS 2
+    form. Both lie over the scenario, the values on top. Raises ConfigurationError.
     """
-    of_nodes = {node: dict(values) for node, values in (overrides or {}).items()}
-    values = [text for document in DOCUMENTS for text in written(document, of_nodes.pop(document, {}))]
-    if values:
-        of_nodes.setdefault(COMMON, {})["values"] = values
-    parameters = load_parameters(of_nodes, files)
-    robot = load_robot_model(parameters.common)
-    schedule = load_task(parameters.common, robot)
-    return Scenario(parameters, robot, schedule, of_nodes)
+    of_nodes = _by_node(values or {})
+    if name:
+        of_nodes.setdefault(COMMON, {})["scenario"] = str(name)
+    texts = [text for first in (*DOCUMENTS, *ROLES) for text in written(first, of_nodes.pop(first, {}))]
+    if texts:
+        of_nodes.setdefault(COMMON, {})["values"] = texts
+    scenario = load_scenario_file(_scenario_name(of_nodes, files))
+    parameters = load_parameters(of_nodes, files, scenario)
+    truth = load_world(parameters.common, TRUTH, scenario)
+    same = truth_is_model(scenario, _replacements(parameters.common))
+    model = truth if same else load_world(parameters.common, MODEL, scenario)
+    if model.robot.joint_names != truth.robot.joint_names:
+        raise ConfigurationError(
+            f"truth has the joints {', '.join(truth.robot.joint_names)}, "
+            f"the model has {', '.join(model.robot.joint_names)}: they must be the same"
+        )
+    return Scenario(parameters, truth, model, of_nodes)
 
 
-def load_robot_model(common: CommonParameters) -> RobotModel:
-    """Return the model of the robot that the parameters name."""
-    return RobotModel.load(Path(common.robot) if common.robot else None, common.values)
+def load_world(common: CommonParameters, role: str, scenario: ScenarioFile | None = None) -> World:
+    """Return robot and schedule that the parameters name, for a role, ``truth`` or ``model``.
+
+    ``scenario`` is the one that they name, if it has been read. Raises ConfigurationError.
+    """
+    scenario = scenario or load_scenario_file(common.scenario)
+    documents = documents_of(scenario, _replacements(common), role)
+    robot = RobotModel(robot_of(documents.robot))
+    text = documents.schedule_text
+    return World(robot, schedule_of(documents.schedule, text, robot, common.reference_ns))
 
 
-def load_task(common: CommonParameters, robot: RobotModel) -> Schedule:
-    """Return the schedule named by the parameters, checked against the robot."""
-    path = Path(common.schedule) if common.schedule else config_file("handover.yaml")
-    return load_schedule(path, robot, common.reference_ns, common.values)
+def scenario_text(common: CommonParameters) -> str:
+    """Return the scenario that the parameters name as YAML that needs no other file, for the record."""
+    return as_yaml(resolved(load_scenario_file(common.scenario), _replacements(common)))
+
+
+def _replacements(common: CommonParameters) -> Replacements:
+    return Replacements(common.robot, common.schedule, common.values)
+
+
+def _scenario_name(of_nodes: Overrides, files: Sequence[Path]) -> str:
+    """Return the scenario that parameters name."""
+    paths = [config_file("common.yaml"), *files]
+    given = {**read_parameter_files(paths, EVERY_NODE), **of_nodes.get(COMMON, {})}
+    return str(given["scenario"])
+
+
+def _by_node(values: Mapping[str, object]) -> dict[str, dict[str, object]]:
+    """Return values by the first step of their paths; raises ConfigurationError on one without any."""
+    result: dict[str, dict[str, object]] = {}
+    for path, value in values.items():
+        first, dot, rest = path.partition(".")
+        if first in SHORT and not dot:
+            result.setdefault(SHORT[first], {})[first] = value
+        elif dot:
+            result.setdefault(first, {})[rest] = value
+        elif isinstance(value, Mapping):
+            result.setdefault(first, {}).update(value)
+        else:
+            raise ConfigurationError(f"value {path!r} must have a path with a dot, or be a mapping")
+    return result

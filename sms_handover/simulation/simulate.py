@@ -24,7 +24,7 @@ def simulate(
     period with the time in ns and the phase. Raises what :class:`~sms_handover.simulation.loop.Loop` does.
     """
     loop = Loop(scenario, controller)
-    robot = loop.scenario.robot
+    robot = loop.scenario.model.robot
     recorder = RunRecorder(robot.joint_names, robot.arms, loop.last_tick + 1)
     while not loop.finished:
         tick = loop.advance()

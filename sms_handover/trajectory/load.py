@@ -4,12 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from sms_handover.configuration.checks import check_number
 from sms_handover.configuration.sections import Section
-from sms_handover.configuration.values import SCHEDULE, with_values
-from sms_handover.configuration.yaml_reader import load_mapping, read_file
+from sms_handover.configuration.yaml_reader import Mapping, load_mapping, read_file
 from sms_handover.errors import ScheduleError
 from sms_handover.model.deputy import DeputyDescription
 from sms_handover.model.poses import pose_from_xyz_rpy
@@ -34,19 +32,18 @@ _TARGET_KINDS = ("joints", "tool_in_world", "grasp_frame")
 _SHORTEST = 1e-9  # [s]
 
 
-def load_schedule(
-    path: Path, robot: RobotModel, reference_period_ns: int, values: Sequence[str] = ()
-) -> Schedule:
-    """Return the schedule in a file with values set by path, e.g. ``schedule.phases.carry.duration:=12``.
-
-    Raises ScheduleError with line and phase of what is wrong, ConfigurationError on what is not readable.
-    """
+def load_schedule(path: Path, robot: RobotModel, reference_period_ns: int) -> Schedule:
+    """Return the schedule in a file; raises what :func:`schedule_of` does, or ConfigurationError."""
     text = read_file(path)
-    read = load_mapping(text, path)
-    content = with_values(read, SCHEDULE, values)
-    if content is not read:
-        text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
-    root = Section(content, path, ScheduleError)
+    return schedule_of(load_mapping(text, path), text, robot, reference_period_ns)
+
+
+def schedule_of(content: Mapping, text: str, robot: RobotModel, reference_period_ns: int) -> Schedule:
+    """Return the schedule that the content of a file says, with its ``text`` for the record.
+
+    Raises ScheduleError with line and phase of what is wrong.
+    """
+    root = Section(content, Path(), ScheduleError)
     root.only(("initial", "deputy", "phases"))
     initial = root.section("initial")
     initial.only(("base_in_world", "joints"))

@@ -32,8 +32,10 @@ def scenes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Scene]:
     schedule.write_text(short_handover(stretch=3.0), encoding="utf-8")
     made = {}
     for law in ("nmpc", "pid"):
-        scenario = load_scenario({"common": {"schedule": str(schedule)}, "controller": {"law": law}})
-        made[law] = make_scene(simulate(scenario), scenario.robot.urdf, scenario.schedule.deputy.size)
+        scenario = load_scenario(values={"common": {"schedule": str(schedule)}, "controller": {"law": law}})
+        made[law] = make_scene(
+            simulate(scenario), scenario.truth.robot.urdf, scenario.truth.schedule.deputy.size
+        )
     return made
 
 

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.browser
 def scenario(tmp_path_factory: pytest.TempPathFactory) -> Scenario:
     schedule = tmp_path_factory.mktemp("schedule") / "short.yaml"
     schedule.write_text(short_handover(stretch=3.0), encoding="utf-8")
-    return load_scenario({"common": {"schedule": str(schedule)}})
+    return load_scenario(values={"common": {"schedule": str(schedule)}})
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def run(scenario: Scenario) -> RunData:
 @pytest.fixture(scope="module")
 def scene(scenario: Scenario, run: RunData) -> Scene:
     """The last frame comes too soon after the one before for a live scene to take it, so it is left out."""
-    whole = make_scene(run, scenario.robot.urdf, scenario.schedule.deputy.size)
+    whole = make_scene(run, scenario.truth.robot.urdf, scenario.truth.schedule.deputy.size)
     return replace(
         whole,
         stamp_ns=whole.stamp_ns[:-1],
@@ -55,7 +55,7 @@ def found(scenario: Scenario) -> list[LiveScene | str]:
 
 @pytest.fixture
 def live(scenario: Scenario) -> LiveScene:
-    return LiveScene(scenario.robot.urdf, scenario.schedule.deputy.size)
+    return LiveScene(scenario.truth.robot.urdf, scenario.truth.schedule.deputy.size)
 
 
 @pytest.fixture

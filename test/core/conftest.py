@@ -195,7 +195,7 @@ def make_scenario(tmp_path: Path) -> MakeScenario:
         path = tmp_path / "schedule.yaml"
         path.write_text(text, encoding="utf-8")
         common = {"schedule": str(path), **overrides.pop("common", {})}
-        return load_scenario({"common": common, **overrides})
+        return load_scenario(values={"common": common, **overrides})
 
     return make
 
@@ -203,7 +203,7 @@ def make_scenario(tmp_path: Path) -> MakeScenario:
 def run(**overrides: dict[str, object]) -> RunData:
     """Return a run of the shipped schedule with overrides of parameters."""
     given: Overrides = overrides
-    return simulate(load_scenario(given))
+    return simulate(load_scenario(values=given))
 
 
 @pytest.fixture(scope="session")

@@ -27,7 +27,7 @@ def digest_of_rest(loop: Loop) -> str:
 
 def main(overrides: str, files: list[str]) -> None:
     """Print the digest of the rest from each snapshot, all in one loop."""
-    loop = Loop(load_scenario(json.loads(overrides)))
+    loop = Loop(load_scenario(values=json.loads(overrides)))
     for file in files:
         loop.restore(load_snapshot(Path(file)))
         print(digest_of_rest(loop))

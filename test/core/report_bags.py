@@ -51,11 +51,11 @@ def write_handovers(folder: Path) -> dict[str, Path]:
     schedule.write_text(text, encoding="utf-8")
     bags = {}
     for law in LAWS:
-        scenario = load_scenario({"common": {"schedule": str(schedule)}, "controller": {"law": law}})
+        scenario = load_scenario(values={"common": {"schedule": str(schedule)}, "controller": {"law": law}})
         bags[law] = write_bag(
             folder / law,
             simulate(scenario),
-            urdf=scenario.robot.urdf,
+            urdf=scenario.truth.robot.urdf,
             schedule=text,
             values=parameters(law),
             origin={"start": "2026-01-02T03:04:05.678+00:00", "seed": "none", "version.numpy": "2.4.6"},

@@ -18,7 +18,7 @@ BEFORE, AFTER = "before grasp", "after release"
 
 
 def clearance(run: RunData, scenario: Scenario, schedule: str = "") -> RunClearance:
-    return run_clearance(run, TaskTexts(scenario.robot.urdf, schedule or scenario.schedule.text))
+    return run_clearance(run, TaskTexts(scenario.truth.robot.urdf, schedule or scenario.truth.schedule.text))
 
 
 def group(found: RunClearance, *words: str) -> GroupClearance:
@@ -104,7 +104,7 @@ def test_contact_is_declared_from_the_phase_on_that_leads_to_a_grasp_frame(
     run = short(nmpc_run, 150)
     declared = group(clearance(run, scenario), "gripper arm_a - deputy")
     assert "contact" in declared.group and declared.allowed == -0.001
-    elsewhere = scenario.schedule.text.replace("arm_a: {grasp_frame: end_a}", "arm_a: hold")
+    elsewhere = scenario.truth.schedule.text.replace("arm_a: {grasp_frame: end_a}", "arm_a: hold")
     counted = group(clearance(run, scenario, schedule=elsewhere), "gripper arm_a - deputy")
     assert (counted.least, counted.allowed) == (declared.least, 0.0)
 

@@ -30,7 +30,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     schedule = home / "schedule.yaml"
     schedule.write_text(SCHEDULE, encoding="utf-8")
     for law in ("nmpc", "pid"):
-        run = simulate(load_scenario({"common": {"schedule": str(schedule)}, "controller": {"law": law}}))
+        run = simulate(
+            load_scenario(values={"common": {"schedule": str(schedule)}, "controller": {"law": law}})
+        )
         (home / "runs" / law).mkdir(parents=True)
         write_run(home / "runs" / law / "bag", run)
     return home

@@ -34,7 +34,7 @@ def predicted(scenario: Scenario) -> tuple[PhasePrediction, ...]:
     """Return the predictions with the parameters of a scenario."""
     parameters = scenario.parameters
     tolerance = parameters.plant.grasp_tolerance
-    return check_feasibility(scenario.robot, scenario.schedule, parameters.ik, tolerance)
+    return check_feasibility(scenario.truth.robot, scenario.truth.schedule, parameters.ik, tolerance)
 
 
 def _changed(old: str, new: str) -> str:
@@ -94,7 +94,10 @@ def test_nothing_moves_nothing(robot: RobotModel, draw: Draw) -> None:
 
 def _walk(scenario: Scenario) -> Iterator[tuple[PhasePrediction, Pose, Array]]:
     """Yield each prediction with base and joints at the start of its phase."""
-    base, joints = scenario.schedule.base_in_world, initial_joints(scenario.robot, scenario.schedule)
+    base, joints = (
+        scenario.truth.schedule.base_in_world,
+        initial_joints(scenario.truth.robot, scenario.truth.schedule),
+    )
     for prediction in predicted(scenario):
         yield prediction, base, joints
         base, joints = prediction.base_in_world, prediction.joint_position
@@ -103,9 +106,11 @@ def _walk(scenario: Scenario) -> Iterator[tuple[PhasePrediction, Pose, Array]]:
 def test_tools_and_base_agree_in_every_prediction(make_scenario: MakeScenario) -> None:
     """At the predicted end the tools are at their targets, and the base is where they have pushed it."""
     scenario = make_scenario()
-    robot, ik = scenario.robot, scenario.parameters.ik
+    robot, ik = scenario.truth.robot, scenario.parameters.ik
     names = []
-    for (prediction, base, joints), phase in zip(_walk(scenario), scenario.schedule.phases, strict=True):
+    for (prediction, base, joints), phase in zip(
+        _walk(scenario), scenario.truth.schedule.phases, strict=True
+    ):
         names.append(prediction.phase)
         end, angles = prediction.base_in_world, prediction.joint_position
         assert np.all(angles >= robot.lower) and np.all(angles <= robot.upper)
@@ -116,7 +121,7 @@ def test_tools_and_base_agree_in_every_prediction(make_scenario: MakeScenario) -
                 assert metres <= ik.position_tolerance and radians <= ik.orientation_tolerance
         # the fixed point is found to 1e-9 in each of position and angle
         assert max(pose_distance(base_after(robot, base, joints, angles), end)) <= 2e-9
-        turned = pose_distance(scenario.schedule.base_in_world, end)[1]
+        turned = pose_distance(scenario.truth.schedule.base_in_world, end)[1]
         assert prediction.base_rotation_angle == turned
         assert prediction.restarts == 0
     assert names == ["approach", "carry", "withdraw", "let go"]
@@ -125,7 +130,7 @@ def test_tools_and_base_agree_in_every_prediction(make_scenario: MakeScenario) -
 def test_each_kind_of_target_is_predicted(make_scenario: MakeScenario) -> None:
     """Hold keeps the joints, a joint target is met exactly, a grasp frame where the deputy then is."""
     scenario = make_scenario()
-    robot, schedule = scenario.robot, scenario.schedule
+    robot, schedule = scenario.truth.robot, scenario.truth.schedule
     a, b = (robot.arm_joints[arm] for arm in ("arm_a", "arm_b"))
     approach, carry, withdraw, let_go = predicted(scenario)
     start = initial_joints(robot, schedule)
@@ -148,9 +153,11 @@ def test_a_robot_that_holds_stays(make_scenario: MakeScenario) -> None:
     scenario = make_scenario(text)
     (prediction,) = predicted(scenario)
     np.testing.assert_array_equal(
-        prediction.joint_position, initial_joints(scenario.robot, scenario.schedule)
+        prediction.joint_position, initial_joints(scenario.truth.robot, scenario.truth.schedule)
     )
-    assert max(pose_distance(prediction.base_in_world, scenario.schedule.base_in_world)) <= 64 * _ROUNDING
+    assert (
+        max(pose_distance(prediction.base_in_world, scenario.truth.schedule.base_in_world)) <= 64 * _ROUNDING
+    )
     assert prediction.base_rotation_angle <= 64 * _ROUNDING
 
 
@@ -178,10 +185,10 @@ def test_the_shipped_handover_ends_where_it_was_foreseen(nmpc_run: RunData, scen
     That difference is of second order in the motion. A tenth of the base's whole motion bounds it.
     """
     predictions = predicted(scenario)
-    start = scenario.schedule.base_in_world
+    start = scenario.truth.schedule.base_in_world
     assert [prediction.restarts for prediction in predictions] == [0] * len(predictions)
     ways = [pose_distance(start, prediction.base_in_world) for prediction in predictions]
-    for prediction, phase in zip(predictions, scenario.schedule.phases, strict=True):
+    for prediction, phase in zip(predictions, scenario.truth.schedule.phases, strict=True):
         row = int(np.searchsorted(nmpc_run.tick_ns, phase.end_ns))
         found = Pose(nmpc_run.base_pose[row, :3], nmpc_run.base_pose[row, 3:])
         metres, radians = pose_distance(prediction.base_in_world, found)
@@ -205,12 +212,12 @@ def test_a_target_out_of_reach_is_named(make_scenario: MakeScenario) -> None:
     assert match
     metres, radians = float(match[1]) / 1000.0, np.radians(float(match[2]))
     # nothing sampled at random comes nearer, with the base as it was at the start or pushed back from there
-    target = scenario.schedule.phases[1].targets["arm_b"]
+    target = scenario.truth.schedule.phases[1].targets["arm_b"]
     assert isinstance(target, ToolTarget)
-    draw, robot = Draw(scenario.robot, seed=1), scenario.robot
+    draw, robot = Draw(scenario.truth.robot, seed=1), scenario.truth.robot
     nearest = np.inf
     for _ in range(5000):
-        tools = robot.tools_in_world(scenario.schedule.base_in_world, draw.joints())
+        tools = robot.tools_in_world(scenario.truth.schedule.base_in_world, draw.joints())
         apart = pose_distance(tools["arm_b"], target.tool_in_world)
         nearest = min(nearest, apart[0] ** 2 + apart[1] ** 2)
     assert metres > 0.1
@@ -295,7 +302,7 @@ def test_a_target_on_a_deputy_that_the_other_arm_carries(make_scenario: MakeScen
     )
     scenario = make_scenario(text)
     carry = predicted(scenario)[1]
-    tool = scenario.robot.tools_in_world(carry.base_in_world, carry.joint_position)["arm_b"]
+    tool = scenario.truth.robot.tools_in_world(carry.base_in_world, carry.joint_position)["arm_b"]
     expected = Pose(np.array([1.15, -0.22, 0.75]), np.array([0.0, 0.0, 0.0, 1.0]))
     # A is at its target and holds its end, each within the tolerance of inverse kinematics, 1e-6 m and rad
     assert np.linalg.norm(tool.position - expected.position) < 4e-6
@@ -307,8 +314,11 @@ def test_a_target_on_a_deputy_that_the_other_arm_carries(make_scenario: MakeScen
 def test_a_target_that_needs_another_start_is_found_and_told(make_scenario: MakeScenario) -> None:
     """Where the present joints do not lead to a target in reach, random ones are tried, always the same."""
     scenario = make_scenario()
-    robot, draw = scenario.robot, Draw(scenario.robot, seed=6)
-    base, start = scenario.schedule.base_in_world, initial_joints(scenario.robot, scenario.schedule)
+    robot, draw = scenario.truth.robot, Draw(scenario.truth.robot, seed=6)
+    base, start = (
+        scenario.truth.schedule.base_in_world,
+        initial_joints(scenario.truth.robot, scenario.truth.schedule),
+    )
     for _ in range(200):
         tool = robot.tools_in_world(base, draw.joints(margin=0.3))["arm_a"]
         request = IkRequest(base, start, {"arm_a": tool})

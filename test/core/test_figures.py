@@ -38,7 +38,7 @@ def short(law: str, folder: Path) -> Scenario:
     """Return a handover of 1.4 s under a law."""
     path = folder / f"{law}.yaml"
     path.write_text(SCHEDULE, encoding="utf-8")
-    return load_scenario({"common": {"schedule": str(path)}, "controller": {"law": law}})
+    return load_scenario(values={"common": {"schedule": str(path)}, "controller": {"law": law}})
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def pid(tmp_path_factory: pytest.TempPathFactory) -> RunData:
 @pytest.fixture(scope="module")
 def drawn(scenario: Scenario, nmpc: RunData) -> DrawnRun:
     """The run under NMPC with its scene."""
-    scene = make_scene(nmpc, scenario.robot.urdf, scenario.schedule.deputy.size, 50.0)
+    scene = make_scene(nmpc, scenario.truth.robot.urdf, scenario.truth.schedule.deputy.size, 50.0)
     return DrawnRun("NMPC", nmpc, scene)
 
 
@@ -264,7 +264,7 @@ def test_no_text_covers_another_or_leaves_the_figure(
     nmpc_run: RunData, pid_run: RunData, scenario: Scenario, name: str
 ) -> None:
     """Of the whole handover, as printed."""
-    scene = make_scene(nmpc_run, scenario.robot.urdf, scenario.schedule.deputy.size, 1.0)
+    scene = make_scene(nmpc_run, scenario.truth.robot.urdf, scenario.truth.schedule.deputy.size, 1.0)
     assert_legible([DrawnRun("NMPC", nmpc_run, scene), DrawnRun("PID", pid_run)], name)
 
 

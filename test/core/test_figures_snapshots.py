@@ -27,7 +27,9 @@ UP = np.array([0.0, 0.0, 1.0])
 def drawn(make_scenario: MakeScenario) -> DrawnRun:
     scenario = make_scenario()
     run = simulate(scenario)
-    return DrawnRun("NMPC", run, make_scene(run, scenario.robot.urdf, scenario.schedule.deputy.size, 50.0))
+    return DrawnRun(
+        "NMPC", run, make_scene(run, scenario.truth.robot.urdf, scenario.truth.schedule.deputy.size, 50.0)
+    )
 
 
 def volume(faces: tuple[Array, ...]) -> float:

@@ -28,7 +28,7 @@ class Bench:
 
     def __init__(self, scenario: Scenario) -> None:
         """Put the robot at the start of the schedule."""
-        self.scenario, self.robot, self.schedule = scenario, scenario.robot, scenario.schedule
+        self.scenario, self.robot, self.schedule = scenario, scenario.truth.robot, scenario.truth.schedule
         self.generator = TrajectoryGenerator(self.robot, self.schedule, scenario.parameters.trajectory)
         self.joints = initial_joints(self.robot, self.schedule)
         self.deputy = self.schedule.deputy.deputy_in_world
@@ -248,10 +248,10 @@ def quintic_run() -> RunData:
 
 def test_target_moves_by_the_quintic_law(quintic_run: RunData, scenario: Scenario) -> None:
     """Through the run the tool target has covered the fraction of its way that the law says."""
-    phase = scenario.schedule.phases[0]
+    phase = scenario.truth.schedule.phases[0]
     rows = quintic_run.target_pose["arm_a"]
     start = quintic_run.tool_pose["arm_a"][0]
-    target, deputy = phase.targets["arm_a"], scenario.schedule.deputy
+    target, deputy = phase.targets["arm_a"], scenario.truth.schedule.deputy
     assert isinstance(target, GraspFrameTarget)
     frame = se3_of(deputy.deputy_in_world) * se3_of(deputy.grasp_frames[target.grasp_frame])
     goal = pose_row(pose_of(frame * se3_of(target.tool_in_grasp_frame)))
@@ -270,7 +270,7 @@ def test_reference_velocity_is_the_rate_of_the_reference(quintic_run: RunData, s
     rates with the base's reaction. Redundancy leaves one direction open, which is left out here.
     The base's reaction is large enough to be seen: without it the two would not agree.
     """
-    robot = scenario.robot
+    robot = scenario.truth.robot
     period, seen = _PERIOD_NS * 1e-9, []
     for row in range(20, len(quintic_run.reference_ns) - 1, 20):
         ahead, behind = (quintic_run.reference_position[row + side] for side in (1, -1))
@@ -282,7 +282,7 @@ def test_reference_velocity_is_the_rate_of_the_reference(quintic_run: RunData, s
         found = jacobian @ difference
         wanted = jacobian @ quintic_run.reference_velocity[row]
         # second order in the period: rates change by the law's 60 / T^3 per s^2 over ways below 1
-        motion = scenario.schedule.phases[0].motion_ns * 1e-9
+        motion = scenario.truth.schedule.phases[0].motion_ns * 1e-9
         bound = period**2 / 6.0 * 60.0 / motion**3 * 4.0 + 2.0 * 1e-9 / period
         np.testing.assert_allclose(found, wanted, atol=bound)
         assert not np.any(quintic_run.reference_velocity[row][robot.arm_joints["arm_b"]])
@@ -293,9 +293,9 @@ def test_reference_velocity_is_the_rate_of_the_reference(quintic_run: RunData, s
 
 def test_arm_b_holds_during_the_first_third(handover: RunData, scenario: Scenario) -> None:
     """Under either law, arm B's reference is its initial configuration and does not move."""
-    part = scenario.robot.arm_joints["arm_b"]
-    start = initial_joints(scenario.robot, scenario.schedule)[part]
-    end = scenario.schedule.end_ns // 3
+    part = scenario.truth.robot.arm_joints["arm_b"]
+    start = initial_joints(scenario.truth.robot, scenario.truth.schedule)[part]
+    end = scenario.truth.schedule.end_ns // 3
     rows = handover.reference_ns < end
     assert np.count_nonzero(rows) == end // _PERIOD_NS
     held = handover.reference_position[rows][:, part]

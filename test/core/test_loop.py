@@ -45,7 +45,7 @@ def test_a_run_goes_on_from_any_snapshot_in_a_fresh_process(
     Among the ticks are those at which a grasp has been commanded, but its event is not yet known.
     """
     given = {**overrides, "controller": LAWS[law]}
-    loop, ticks = Loop(load_scenario(given)), list[bytes]()
+    loop, ticks = Loop(load_scenario(values=given)), list[bytes]()
     chosen = {401, 421, *np.random.default_rng(14).choice(1_400, size=count - 2, replace=False).tolist()}
     files: dict[int, Path] = {}
     while not loop.finished:
@@ -62,7 +62,7 @@ def test_a_run_goes_on_from_any_snapshot_in_a_fresh_process(
 
 def test_the_loop_shows_what_simulate_records(overrides: Overrides) -> None:
     """Tick by tick or period by period, and the same again after a reset."""
-    scenario = load_scenario({**overrides, "controller": LAWS["nmpc"]})
+    scenario = load_scenario(values={**overrides, "controller": LAWS["nmpc"]})
     run, loop = simulate(scenario), Loop(scenario)
     assert len(run.tick_ns) == TICKS
     for _ in range(2):
@@ -86,12 +86,12 @@ def test_the_loop_shows_what_simulate_records(overrides: Overrides) -> None:
 
 def test_a_branch_departs_where_it_is_taken(overrides: Overrides) -> None:
     """Under other gains or another law the states up to there are shared, and the efforts after it differ."""
-    trunk = Loop(load_scenario({**overrides, "controller": LAWS["nmpc"]}))
+    trunk = Loop(load_scenario(values={**overrides, "controller": LAWS["nmpc"]}))
     while trunk.state.stamp_ns < 505_000_000:
         trunk.advance()
     snapshot, answer = trunk.snapshot(), trunk.advance()
     for law in ({"rolling_period": 0.4}, {"law": "pid"}):
-        branch = Loop(load_scenario({**overrides, "controller": law}))
+        branch = Loop(load_scenario(values={**overrides, "controller": law}))
         branch.restore(snapshot)
         tick = branch.advance()
         assert (tick.stamp_ns, tick.q.tobytes()) == (answer.stamp_ns, answer.q.tobytes())
@@ -120,7 +120,7 @@ def test_what_a_snapshot_needs_is_asked_for(scenario: Scenario, overrides: Overr
         Loop(scenario, Springs()).snapshot()
     snapshot = Loop(scenario).snapshot()
     with pytest.raises(ConfigurationError, match="the snapshot has 3 phases, must have the 4"):
-        Loop(load_scenario(overrides)).restore(snapshot)
+        Loop(load_scenario(values=overrides)).restore(snapshot)
     smaller = replace(snapshot.plant, q=np.zeros(14), v=np.zeros(13), joint_effort=np.zeros(7))
     with pytest.raises(ConfigurationError, match="the snapshot has 7 joints, must have 14"):
         Loop(scenario).restore(replace(snapshot, plant=smaller))
@@ -146,7 +146,7 @@ def test_the_seed_is_kept(scenario: Scenario) -> None:
 
 def test_a_state_that_is_restored_is_the_state(overrides: Overrides) -> None:
     """A snapshot of what was restored is the same file, and restoring leaves nothing of the run before."""
-    loop = Loop(load_scenario({"common": overrides["common"], "controller": {"rolling_period": 0.02}}))
+    loop = Loop(load_scenario(values={"common": overrides["common"], "controller": {"rolling_period": 0.02}}))
     for _ in range(30):
         loop.advance_period()
     snapshot = loop.snapshot()
@@ -158,4 +158,6 @@ def test_a_state_that_is_restored_is_the_state(overrides: Overrides) -> None:
 
 def test_a_run_of_an_external_controller_is_not_begun() -> None:
     with pytest.raises(ConfigurationError, match="the controller is external: give simulate"):
-        Loop(load_scenario({"common": {"external": ("controller",), "peers": ("plant", "controller")}}))
+        Loop(
+            load_scenario(values={"common": {"external": ("controller",), "peers": ("plant", "controller")}})
+        )

@@ -48,13 +48,15 @@ class Told:
 
 
 def of_duration(seconds: float) -> Scenario:
-    return load_scenario({"common": {"duration": seconds}})
+    return load_scenario(values={"common": {"duration": seconds}})
 
 
 def test_our_own_controller_given_from_outside_changes_no_bit() -> None:
     scenario = of_duration(0.1)
     parameters = scenario.parameters
-    ours = make_controller(scenario.robot, scenario.schedule, parameters.common, parameters.controller)
+    ours = make_controller(
+        scenario.truth.robot, scenario.truth.schedule, parameters.common, parameters.controller
+    )
     assert compare_runs(simulate(scenario), simulate(scenario, controller=ours)) == ()
 
 
@@ -105,7 +107,7 @@ def test_efforts_that_are_none_are_refused(answer: Array, said: str) -> None:
 def test_an_example_hands_the_deputy_over(law: type[TaskSpacePd | JointPd]) -> None:
     """Both grasps succeed on the shipped schedule; docs/own_controller.md tells how near."""
     scenario = of_duration(_BOTH_GRASPS_S)
-    run = simulate(scenario, controller=law(scenario.robot))
+    run = simulate(scenario, controller=law(scenario.truth.robot))
     assert [event.status for event in run.grasp_events] == [GraspStatus.SUCCEEDED] * 2
     assert max(event.position_error for event in run.grasp_events) < 1e-3
     assert np.abs(run.linear_momentum).max() < _ROUNDING
@@ -114,7 +116,7 @@ def test_an_example_hands_the_deputy_over(law: type[TaskSpacePd | JointPd]) -> N
 
 def test_task_space_pd_takes_energy_out_of_what_it_acts_on(scenario: Scenario) -> None:
     """Its power is what the springs give less what all dampers take: u . q_m' = f . x' - d |q_m'|^2."""
-    robot, gains = scenario.robot, TaskSpaceGains()
+    robot, gains = scenario.truth.robot, TaskSpaceGains()
     guidance = _guidance(scenario)
     springless = build(TaskSpaceGains, {"stiffness": 0.0, "angular_stiffness": 0.0}, "test")
     dampers = TaskSpacePd(robot, springless)
@@ -126,7 +128,7 @@ def test_task_space_pd_takes_energy_out_of_what_it_acts_on(scenario: Scenario) -
 
 
 def test_task_space_pd_at_its_target_rests(scenario: Scenario) -> None:
-    robot = scenario.robot
+    robot = scenario.truth.robot
     q, v = _state(robot, 1)
     law = TaskSpacePd(robot)
     guidance = _guidance(scenario)
@@ -136,7 +138,7 @@ def test_task_space_pd_at_its_target_rests(scenario: Scenario) -> None:
 
 def test_joint_pd_brings_a_joint_back_without_overshoot(scenario: Scenario) -> None:
     """For one joint alone m e'' = u with m its reduced inertia: u / m = -(w^2 e + 2 w e')."""
-    robot = scenario.robot
+    robot = scenario.truth.robot
     q, v = _state(robot, 2)
     law = JointPd(robot, frequency=0.5)
     guidance = _guidance(scenario)

@@ -40,7 +40,9 @@ def scenario_of(folder: Path, **controller: object) -> Scenario:
     file = folder / "schedule.yaml"
     gains = "      nmpc: {rolling_period: 2.0}"
     file.write_text(SCHEDULE.replace(gains, f"{gains}\n      {THIRD}: {{stiffness: 2.0}}"), encoding="utf-8")
-    return load_scenario({"common": {"schedule": str(file)}, "controller": {"law": THIRD, **controller}})
+    return load_scenario(
+        values={"common": {"schedule": str(file)}, "controller": {"law": THIRD, **controller}}
+    )
 
 
 @pytest.mark.usefixtures("third")
@@ -48,7 +50,7 @@ def test_a_law_of_another_package_runs_by_its_name(tmp_path: Path) -> None:
     """With its gains from the parameters and, by phase, from the schedule; the same bits as by hand."""
     assert law_names() == ("nmpc", "pid", THIRD) and law_named(THIRD) is LAW
     scenario = scenario_of(tmp_path, damping=6.0)
-    gains = gains_by_phase(scenario.schedule, scenario.parameters.controller)
+    gains = gains_by_phase(scenario.truth.schedule, scenario.parameters.controller)
     assert [(g.stiffness, g.damping) for g in gains] == [(5.0, 6.0), (2.0, 6.0), (5.0, 6.0), (5.0, 6.0)]
 
     class ByHand(TaskSpacePd):
@@ -57,9 +59,9 @@ def test_a_law_of_another_package_runs_by_its_name(tmp_path: Path) -> None:
             super().guide(guidance)  # type: ignore[arg-type]
 
     run = simulate(scenario)
-    assert compare_runs(run, simulate(scenario, controller=ByHand(scenario.robot))) == ()
+    assert compare_runs(run, simulate(scenario, controller=ByHand(scenario.truth.robot))) == ()
     assert np.any(run.joint_command)
-    check_scenario(load_scenario({"controller": {"law": THIRD}}))  # not linearised: no verdict
+    check_scenario(load_scenario(values={"controller": {"law": THIRD}}))  # not linearised: no verdict
 
 
 @pytest.mark.usefixtures("third")
@@ -70,9 +72,11 @@ def test_its_parameters_are_checked_as_ours_are(tmp_path: Path) -> None:
         load_parameters({"controller": {"law": THIRD, "stifness": 1.0}})
     with pytest.raises(UnknownNameError, match=r"unknown parameter 'stiffness'"):
         load_parameters({"controller": {"stiffness": 1.0}})
-    wrong = load_scenario({"common": {"schedule": str(_misspelt(tmp_path))}, "controller": {"law": THIRD}})
+    wrong = load_scenario(
+        values={"common": {"schedule": str(_misspelt(tmp_path))}, "controller": {"law": THIRD}}
+    )
     with pytest.raises(UnknownNameError, match=rf"phase 'carry': unknown gain of {THIRD} 'stifness'"):
-        gains_by_phase(wrong.schedule, wrong.parameters.controller)
+        gains_by_phase(wrong.model.schedule, wrong.parameters.controller)
 
 
 def _misspelt(folder: Path) -> Path:
@@ -124,4 +128,6 @@ def test_what_a_law_cannot_have_is_refused(
         load_parameters({"controller": {"law": "clashing"}})
     parameters = load_parameters({"controller": {"law": "wanting"}})
     with pytest.raises(ConfigurationError, match="'wanting' needs preview, which the loop has not"):
-        make_controller(scenario.robot, scenario.schedule, parameters.common, parameters.controller)
+        make_controller(
+            scenario.truth.robot, scenario.truth.schedule, parameters.common, parameters.controller
+        )

@@ -43,7 +43,7 @@ def run(scenario: Scenario) -> RunData:
 
 @pytest.fixture
 def scene(scenario: Scenario, run: RunData) -> Scene:
-    return make_scene(run, scenario.robot.urdf, scenario.schedule.deputy.size)
+    return make_scene(run, scenario.truth.robot.urdf, scenario.truth.schedule.deputy.size)
 
 
 def pose(row: Array) -> Pose:
@@ -95,14 +95,14 @@ def test_joints_are_matched_by_name(run: RunData, scenario: Scenario, scene: Sce
     turned = replace(
         run, joint_names=run.joint_names[::-1], joint_position=run.joint_position[:, ::-1].copy()
     )
-    again = make_scene(turned, scenario.robot.urdf, scenario.schedule.deputy.size)
+    again = make_scene(turned, scenario.truth.robot.urdf, scenario.truth.schedule.deputy.size)
     assert np.array_equal(again.link_in_world, scene.link_in_world)
 
 
 def test_a_joint_that_the_description_lacks_is_named(run: RunData, scenario: Scenario) -> None:
     other = replace(run, joint_names=("elbow", *run.joint_names[1:]))
     with pytest.raises(UnknownNameError, match="robot description: unknown joint 'elbow'"):
-        make_scene(other, scenario.robot.urdf, scenario.schedule.deputy.size)
+        make_scene(other, scenario.truth.robot.urdf, scenario.truth.schedule.deputy.size)
 
 
 @pytest.mark.parametrize("frame_rate", [1.0, 25.0, 30.0, 50.0, 1000.0])
@@ -140,7 +140,7 @@ def test_the_scene_of_a_bag_is_that_of_the_run(
     with Recording(tmp_path / "bag", types=TYPES) as recording:
         open_topics(recording)
         record_run(recording, run)
-        recording.describe(urdf=scenario.robot.urdf, schedule=SCHEDULE)
+        recording.describe(urdf=scenario.truth.robot.urdf, schedule=SCHEDULE)
     again = read_scene(tmp_path / "bag")
     assert (again.links, again.arms, again.phases) == (scene.links, scene.arms, scene.phases)
     for name in ("stamp_ns", "link_in_world", "deputy_size", "deputy_in_world"):
@@ -161,7 +161,7 @@ def test_a_bag_that_lacks_something_says_what(
     with Recording(tmp_path / "bag", types=TYPES) as recording:
         open_topics(recording)
         record_run(recording, run)
-        urdf = scenario.robot.urdf if given.get("urdf") else None
+        urdf = scenario.truth.robot.urdf if given.get("urdf") else None
         recording.describe(urdf=urdf, schedule=given.get("schedule"))  # type: ignore[arg-type]
     with pytest.raises(BagError, match=message):
         read_scene(tmp_path / "bag")

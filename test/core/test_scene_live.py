@@ -39,12 +39,12 @@ def run(scenario: Scenario) -> RunData:
 
 @pytest.fixture
 def scene(scenario: Scenario, run: RunData) -> Scene:
-    return make_scene(run, scenario.robot.urdf, scenario.schedule.deputy.size)
+    return make_scene(run, scenario.truth.robot.urdf, scenario.truth.schedule.deputy.size)
 
 
 @pytest.fixture
 def live(scenario: Scenario) -> LiveScene:
-    return LiveScene(scenario.robot.urdf, scenario.schedule.deputy.size)
+    return LiveScene(scenario.truth.robot.urdf, scenario.truth.schedule.deputy.size)
 
 
 def test_in_the_end_it_is_the_scene_of_the_run(live: LiveScene, run: RunData, scene: Scene) -> None:
@@ -86,7 +86,7 @@ def test_a_frame_that_goes_back_begins_another_run(live: LiveScene, run: RunData
 
 
 def test_instants_between_frames_are_left_out(scenario: Scenario, run: RunData, scene: Scene) -> None:
-    slow = LiveScene(scenario.robot.urdf, scenario.schedule.deputy.size, frame_rate=5.0)
+    slow = LiveScene(scenario.truth.robot.urdf, scenario.truth.schedule.deputy.size, frame_rate=5.0)
     play(slow, run, scene)
     news = slow.updates(Seen(), 0.0)
     assert news is not None
@@ -131,7 +131,7 @@ def test_a_long_run_keeps_its_newest_frames(
 @pytest.mark.parametrize("frame_rate", [0.0, -5.0, float("nan")])
 def test_a_rate_that_is_not_positive_is_refused(scenario: Scenario, frame_rate: float) -> None:
     with pytest.raises(ConfigurationError, match=r"frame rate is .* 1/s, it must be > 0"):
-        LiveScene(scenario.robot.urdf, scenario.schedule.deputy.size, frame_rate)
+        LiveScene(scenario.truth.robot.urdf, scenario.truth.schedule.deputy.size, frame_rate)
 
 
 # Served

@@ -18,7 +18,7 @@ LIBRARY = 700_000  # [B] of scripts, styles and the library that draws
 @pytest.fixture
 def scene(make_scenario: MakeScenario) -> Scene:
     scenario = make_scenario()
-    return make_scene(simulate(scenario), scenario.robot.urdf, scenario.schedule.deputy.size)
+    return make_scene(simulate(scenario), scenario.truth.robot.urdf, scenario.truth.schedule.deputy.size)
 
 
 def test_it_names_nothing_to_load(scene: Scene) -> None:

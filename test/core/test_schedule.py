@@ -190,7 +190,7 @@ def test_a_schedule_cannot_be_changed(files: Files) -> None:
 
 def test_the_shipped_schedule_is_a_handover(scenario: Scenario) -> None:
     """60 s; B holds during the first third; A grasps, then hands over to B; T_r is 2 s once it is held."""
-    schedule = scenario.schedule
+    schedule = scenario.truth.schedule
     assert schedule.text == config_file("handover.yaml").read_text(encoding="utf-8")
     assert schedule.end_ns == 60 * _NS
     holding = [phase for phase in schedule.phases if phase.start_ns < 20 * _NS]
@@ -578,4 +578,4 @@ def test_gains_of_an_unknown_law_are_refused_when_the_controller_is_made(make_sc
     for old, words in (("nmpc: {", "nmcp: {"), ("rolling_period: 2.0", "rolling_perod: 2.0")):
         scenario = make_scenario(SCHEDULE.replace(old, words))
         with pytest.raises(ConfigurationError, match=r"gains of phase 'carry': unknown .* \(did you mean"):
-            gains_by_phase(scenario.schedule, scenario.parameters.controller)
+            gains_by_phase(scenario.truth.schedule, scenario.parameters.controller)

@@ -53,7 +53,7 @@ def short() -> RunData:
 
 def test_a_run_of_n_ticks_has_n_plus_one_states(short: RunData, scenario: Scenario) -> None:
     """From the initial state to the last, one row each; a row per reference period, both ends included."""
-    robot, n, m = scenario.robot, 301, 16
+    robot, n, m = scenario.truth.robot, 301, 16
     assert (short.joint_names, short.arms) == (robot.joint_names, robot.arms)
     np.testing.assert_array_equal(short.tick_ns, np.arange(n) * _TICK_NS)
     np.testing.assert_array_equal(short.reference_ns, np.arange(m) * _PERIOD_NS)
@@ -84,8 +84,8 @@ def test_a_duration_between_two_periods(scenario: Scenario) -> None:
 
 def test_a_run_begins_at_rest_where_the_schedule_says(short: RunData, scenario: Scenario) -> None:
     """The first row is the initial state: at rest, without effort, with the deputy in its place."""
-    schedule = scenario.schedule
-    np.testing.assert_array_equal(short.joint_position[0], initial_joints(scenario.robot, schedule))
+    schedule = scenario.truth.schedule
+    np.testing.assert_array_equal(short.joint_position[0], initial_joints(scenario.truth.robot, schedule))
     np.testing.assert_array_equal(short.base_pose[0], pose_row(schedule.base_in_world))
     for values in (short.joint_velocity, short.joint_effort, short.base_twist, short.work):
         assert not np.any(values[0])
@@ -94,7 +94,7 @@ def test_a_run_begins_at_rest_where_the_schedule_says(short: RunData, scenario: 
 
 def test_a_command_acts_over_the_tick_that_follows_its_state(short: RunData, scenario: Scenario) -> None:
     """The effort in state k + 1 is the command that answers state k, as far as the joints can give it."""
-    limit = scenario.robot.effort_limit
+    limit = scenario.truth.robot.effort_limit
     np.testing.assert_array_equal(short.joint_effort[1:], np.clip(short.joint_command[:-1], -limit, limit))
     assert np.any(short.joint_command[0])
 
@@ -104,7 +104,7 @@ def test_poses_of_the_record_belong_to_its_states(short: RunData, scenario: Scen
     per_period = _PERIOD_NS // _TICK_NS
     for row in range(0, len(short.reference_ns), 5):
         base = _pose(short.base_pose[row * per_period])
-        tools = scenario.robot.tools_in_world(base, short.joint_position[row * per_period])
+        tools = scenario.truth.robot.tools_in_world(base, short.joint_position[row * per_period])
         for arm, tool in tools.items():
             np.testing.assert_array_equal(short.tool_pose[arm][row], pose_row(tool))
 
@@ -138,7 +138,7 @@ def test_every_command_follows_from_the_record(make_scenario: MakeScenario, law:
     difference of the last two reference velocities, but for the first reference of a phase.
     """
     scenario = make_scenario(controller={"law": law}, trajectory={"time_law": "quintic"})
-    robot, data, gains = scenario.robot, simulate(scenario), scenario.parameters.controller
+    robot, data, gains = scenario.truth.robot, simulate(scenario), scenario.parameters.controller
     integral = np.zeros(14)
     for tick in range(len(data.tick_ns)):
         row, since = tick // 20, (tick % 20) * 1e-3
@@ -175,7 +175,7 @@ def test_the_same_scenario_gives_the_same_bits(short: RunData, make_scenario: Ma
     _assert_equal(short, run(common={"duration": 0.3}))
     scenario = make_scenario()
     first = simulate(scenario)
-    other = replace(scenario, parameters=load_scenario({"controller": {"law": "pid"}}).parameters)
+    other = replace(scenario, parameters=load_scenario(values={"controller": {"law": "pid"}}).parameters)
     simulate(replace(other, parameters=replace(other.parameters, common=scenario.parameters.common)))
     _assert_equal(first, simulate(scenario))
 
@@ -195,7 +195,7 @@ def test_a_longer_run_begins_like_a_short_one(short: RunData, nmpc_run: RunData)
 def test_the_handover_completes(handover: RunData, scenario: Scenario) -> None:
     """A grasps the deputy by a third of the time and B takes it at two thirds, inside every tolerance."""
     tolerance = scenario.parameters.plant.grasp_tolerance
-    commands = [command for phase in scenario.schedule.phases for command in phase.commands]
+    commands = [command for phase in scenario.truth.schedule.phases for command in phase.commands]
     assert [event.command for event in handover.grasp_events] == commands
     for event in handover.grasp_events:
         assert event.status is GraspStatus.SUCCEEDED
@@ -233,7 +233,7 @@ def test_work_is_the_sum_of_effort_times_way(handover: RunData) -> None:
 
 def test_the_centre_of_mass_stays(handover: RunData, scenario: Scenario) -> None:
     """Whatever the arms do, it does not leave its place by more than a momentum of 1e-9 allows."""
-    robot = scenario.robot
+    robot = scenario.truth.robot
     places = []
     for row in range(0, len(handover.tick_ns), 2000):
         q = robot.configuration(_pose(handover.base_pose[row]), handover.joint_position[row])
@@ -245,7 +245,7 @@ def test_the_centre_of_mass_stays(handover: RunData, scenario: Scenario) -> None
 
 def test_the_base_moves_as_the_joints_make_it(handover: RunData, scenario: Scenario) -> None:
     """At zero momentum its twist is -H_b^-1 H_bm times the joint rates, at every instant."""
-    robot = scenario.robot
+    robot = scenario.truth.robot
     for row in range(0, len(handover.tick_ns), 2500):
         q = robot.configuration(_pose(handover.base_pose[row]), handover.joint_position[row])
         expected = base_twist_per_joint_rate(robot, q) @ handover.joint_velocity[row]

@@ -62,7 +62,7 @@ def test_the_increment_of_a_step(robot: RobotModel, draw: Draw, scheme: str) -> 
 def test_work(scenario: Scenario, draw: Draw) -> None:
     """Joint after joint, tick after tick."""
     parameters = scenario.parameters
-    plant = make_plant(scenario.robot, scenario.schedule, parameters.common, parameters.plant)
+    plant = make_plant(scenario.truth.robot, scenario.truth.schedule, parameters.common, parameters.plant)
     work = 0.0
     for _ in range(20):
         before, effort = plant.q, draw.effort(plant.q)

@@ -73,7 +73,7 @@ def walk(make_scenario: MakeScenario) -> WalkWith:
         if on_miss:
             text = text.replace("  - name: carry\n", f"  - name: carry\n    on_miss: {on_miss}\n")
         scenario = make_scenario(text, trajectory={"failure_hold": 0.1, **trajectory})
-        progress = TaskProgress(scenario.schedule, scenario.parameters.trajectory)
+        progress = TaskProgress(scenario.truth.schedule, scenario.parameters.trajectory)
         return Walk(progress, verdict, converged=converged)
 
     return make
@@ -173,7 +173,7 @@ def test_only_what_has_not_succeeded_is_given_again(make_scenario: MakeScenario)
         "      - release: {arm: arm_a}\n      - grasp: {arm: arm_b, grasp_frame: right}\n",
     ).replace("  - name: withdraw\n", "  - name: withdraw\n    on_miss: {retry: 1}\n")
     scenario = make_scenario(text)
-    progress = TaskProgress(scenario.schedule, scenario.parameters.trajectory)
+    progress = TaskProgress(scenario.truth.schedule, scenario.parameters.trajectory)
     done = Walk(
         progress,
         lambda command, times: MISSED if command.arm == "arm_b" and times == 0 else SUCCEEDED,
@@ -191,9 +191,9 @@ def test_only_what_has_not_succeeded_is_given_again(make_scenario: MakeScenario)
 
 def test_an_answer_is_waited_for_and_others_are_no_answer(make_scenario: MakeScenario) -> None:
     scenario = make_scenario(SCHEDULE.replace("  - name: carry\n", "  - name: carry\n    on_miss: abort\n"))
-    progress = TaskProgress(scenario.schedule, scenario.parameters.trajectory)
-    (command,) = scenario.schedule.phases[1].commands
-    (other,) = scenario.schedule.phases[2].commands
+    progress = TaskProgress(scenario.truth.schedule, scenario.parameters.trajectory)
+    (command,) = scenario.truth.schedule.phases[1].commands
+    (other,) = scenario.truth.schedule.phases[2].commands
     progress.at(0)
     assert not progress.awaits_grasps
     progress.at(400_000_000)
@@ -210,8 +210,8 @@ def test_an_answer_that_comes_in_the_next_phase_still_counts(make_scenario: Make
     """In real time on a busy machine: the retry then takes back what the later phase has asked for."""
     text = SCHEDULE.replace("  - name: carry\n", "  - name: carry\n    on_miss: {retry: 1}\n")
     scenario = make_scenario(text)
-    progress = TaskProgress(scenario.schedule, scenario.parameters.trajectory)
-    (grasp,), (transfer,) = (phase.commands for phase in scenario.schedule.phases[1:3])
+    progress = TaskProgress(scenario.truth.schedule, scenario.parameters.trajectory)
+    (grasp,), (transfer,) = (phase.commands for phase in scenario.truth.schedule.phases[1:3])
     for stamp_ns in (0, 400_000_000, 1_000_000_000):
         progress.at(stamp_ns)
     progress.grasped([GraspEvent(0, grasp, MISSED, 0.0, 0.0, 0.0, "")])
@@ -240,7 +240,7 @@ def test_a_solve_that_converges_breaks_the_row(walk: WalkWith) -> None:
 def test_reset_forgets_retries_and_failures(make_scenario: MakeScenario) -> None:
     text = SCHEDULE.replace("  - name: carry\n", "  - name: carry\n    on_miss: {retry: 1}\n")
     scenario = make_scenario(text)
-    progress = TaskProgress(scenario.schedule, scenario.parameters.trajectory)
+    progress = TaskProgress(scenario.truth.schedule, scenario.parameters.trajectory)
     stories = []
     for _ in range(2):
         done = Walk(progress, always(MISSED), converged=lambda stamp_ns: True)

@@ -17,7 +17,7 @@ from sms_handover.trajectory.load import load_schedule
 def test_values_are_those_of_the_scenario(tmp_path: Path, scenario: Scenario) -> None:
     """Also where an alias shares them or the file has none; the record has the schedule as it was run."""
     changed = load_scenario(
-        {
+        values={
             "robot": {
                 "base.mass": 300,
                 "arms.arm_a.gripper.mass": 0.9,
@@ -29,21 +29,25 @@ def test_values_are_those_of_the_scenario(tmp_path: Path, scenario: Scenario) ->
             "controller": {"rolling_period": 0.5},
         }
     )
-    arm_a, arm_b = changed.robot.description.arms
-    before = scenario.robot.description
-    assert changed.robot.description.base.inertia.mass == 300.0
+    arm_a, arm_b = changed.truth.robot.description.arms
+    before = scenario.truth.robot.description
+    assert changed.truth.robot.description.base.inertia.mass == 300.0
     assert (arm_a.gripper.mass, arm_b.gripper.mass) == (0.9, before.arms[1].gripper.mass)
     assert [joint.effort for joint in arm_b.joints][:3] == [39.0, 20.0, 39.0]
-    assert changed.robot.description.base.panels[1].size == (0.5, *before.base.panels[1].size[1:])
-    assert changed.robot.description.base.panels[0] == before.base.panels[0]
-    np.testing.assert_array_equal(changed.schedule.deputy.size, [0.2, 0.4, 0.2])
-    assert changed.schedule.end_ns == scenario.schedule.end_ns + 10_000_000_000
-    assert (dict(changed.schedule.phases[1].gains), changed.parameters.controller.rolling_period) == ({}, 0.5)
+    assert changed.truth.robot.description.base.panels[1].size == (0.5, *before.base.panels[1].size[1:])
+    assert changed.truth.robot.description.base.panels[0] == before.base.panels[0]
+    np.testing.assert_array_equal(changed.truth.schedule.deputy.size, [0.2, 0.4, 0.2])
+    assert changed.truth.schedule.end_ns == scenario.truth.schedule.end_ns + 10_000_000_000
+    assert (dict(changed.truth.schedule.phases[1].gains), changed.parameters.controller.rolling_period) == (
+        {},
+        0.5,
+    )
     path = tmp_path / "schedule.yaml"
-    path.write_text(changed.schedule.text, encoding="utf-8")
-    recorded = load_schedule(path, changed.robot, changed.parameters.common.reference_ns)
+    path.write_text(changed.truth.schedule.text, encoding="utf-8")
+    recorded = load_schedule(path, changed.truth.robot, changed.parameters.common.reference_ns)
     assert (
-        recorded.text == changed.schedule.text and yaml.safe_load(recorded.text)["deputy"]["size"][1] == 0.4
+        recorded.text == changed.truth.schedule.text
+        and yaml.safe_load(recorded.text)["deputy"]["size"][1] == 0.4
     )
 
 
@@ -77,7 +81,7 @@ REFUSED: dict[str, tuple[Overrides, str]] = {
 @pytest.mark.parametrize(("overrides", "words"), REFUSED.values(), ids=list(REFUSED))
 def test_what_is_wrong_is_said_at_its_path(overrides: Overrides, words: str) -> None:
     with pytest.raises(ConfigurationError) as caught:
-        load_scenario(overrides)
+        load_scenario(values=overrides)
     assert re.search(words, str(caught.value))
     assert "\n" not in str(caught.value)
 

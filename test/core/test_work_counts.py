@@ -58,7 +58,7 @@ class TickBench:
 
     def __init__(self, scenario: Scenario) -> None:
         """Start with every joint a little away from its desired position."""
-        parameters, robot, schedule = scenario.parameters, scenario.robot, scenario.schedule
+        parameters, robot, schedule = scenario.parameters, scenario.truth.robot, scenario.truth.schedule
         self.plant: FreeFloatingPlant = make_plant(robot, schedule, parameters.common, parameters.plant)
         self.controller: Controller = make_controller(
             robot, schedule, parameters.common, parameters.controller
@@ -75,7 +75,7 @@ class TickBench:
 
 def _loop(overrides: Overrides | None = None) -> TickBench:
     """Return the loop of the shipped scenario with overrides."""
-    return TickBench(load_scenario(overrides))
+    return TickBench(load_scenario(values=overrides))
 
 
 @pytest.mark.parametrize(
@@ -117,7 +117,7 @@ def test_a_reference_period_adds_little(monkeypatch: pytest.MonkeyPatch) -> None
     With one arm led by its tool and at its target: two forward kinematics for the tools, one each for the
     residual at the seed and after every iteration, one at the start of a phase.
     """
-    scenarios = [load_scenario({"common": {"duration": duration}}) for duration in (20e-3, 40e-3)]
+    scenarios = [load_scenario(values={"common": {"duration": duration}}) for duration in (20e-3, 40e-3)]
     counted = []
     for scenario in scenarios:
         with monkeypatch.context() as patch:
@@ -141,7 +141,7 @@ def test_inverse_kinematics_from_near_takes_few_iterations(
     monkeypatch: pytest.MonkeyPatch, draw: Draw, scenario: Scenario
 ) -> None:
     """Both arms from within 0.05 rad: four in the median, with one Jacobian of each tool in every one."""
-    robot = scenario.robot
+    robot = scenario.truth.robot
     iterations = []
     calls = count_calls(monkeypatch)
     for _ in range(100):

@@ -76,7 +76,7 @@ def decided(code: int, kinds: Kinds, trial: Trial, task: Task) -> Kept:
     missing = [kind for kind in kinds if kind not in task.ended.err]
     require(not missing, f"the launcher has not told of {missing}")
     common = {"schedule": str(task.schedule)}
-    alone = simulate(load_scenario({"common": common, TRAJECTORY: {"failure_hold": _HOLD}}))
+    alone = simulate(load_scenario(values={"common": common, TRAJECTORY: {"failure_hold": _HOLD}}))
     differences = compare_runs(run, alone)
     require(not differences, f"not as in one process: {', '.join(map(str, differences))[:200]}")
     return closed(trial.folder / "run" / "bag", task.ended)

@@ -62,8 +62,8 @@ def _schedule() -> dict[str, Any]:
 def _joints_at(tool_in_world: dict[str, Pose]) -> dict[str, list[float]]:
     """Return joint angles per arm that bring the tools to poses, found from the shipped start."""
     scenario = load_scenario()
-    robot, seed = scenario.robot, initial_joints(scenario.robot, scenario.schedule)
-    request = IkRequest(scenario.schedule.base_in_world, seed, tool_in_world)
+    robot, seed = scenario.truth.robot, initial_joints(scenario.truth.robot, scenario.truth.schedule)
+    request = IkRequest(scenario.truth.schedule.base_in_world, seed, tool_in_world)
     result = solve_ik(robot, request, scenario.parameters.ik)
     assert result.status is IkStatus.CONVERGED, result
     return {arm: result.joint_position[robot.arm_joints[arm]].tolist() for arm in robot.arms}

@@ -59,7 +59,7 @@ class Rest:
         common.update({key: controller.pop(key) for key in ("mode",) if key in controller})  # type: ignore[misc]
         bench.start({"common": common, CONTROLLER: controller})
         self.bench = bench
-        self.scenario: Scenario = load_scenario({"common": common, CONTROLLER: controller})
+        self.scenario: Scenario = load_scenario(values={"common": common, CONTROLLER: controller})
         self.node = bench.add(ControllerNode)
         endpoints = Endpoints(bench.plain(PLANT), TOPICS, (PLANT, CONTROLLER))
         self._publish: dict[str, CountedPublisher] = {
@@ -70,7 +70,7 @@ class Rest:
         ready: list[Any] = []
         endpoints.subscribe(RUN_READY, ready.append)
         bench.until(lambda: ready and not endpoints.unmatched, "the controller")
-        names = self.scenario.robot.joint_names
+        names = self.scenario.truth.robot.joint_names
         self._state_codec = StateCodec(names, WORLD, BASE)
         self._reference_codec = JointStateCodec(names, ("position", "velocity"))
         self._command_codec = JointStateCodec(names, ("effort",))
@@ -78,7 +78,7 @@ class Rest:
     def _targets(self) -> list[str]:
         """Return the topics of the targets of the tools, if the law follows them."""
         follows = Need.TOOL_TARGETS in law_named(self.scenario.parameters.controller.law).needs
-        return [target_pose(arm) for arm in self.scenario.robot.arms] if follows else []
+        return [target_pose(arm) for arm in self.scenario.truth.robot.arms] if follows else []
 
     def messages(self, state: RobotState, reference: JointReference, phase: TaskPhase) -> dict[str, Any]:
         """Return the messages of one stamp by topic."""
@@ -112,19 +112,19 @@ class Rest:
     def by_hand(self) -> Controller:
         """Return the controller of the core."""
         s = self.scenario
-        return make_controller(s.robot, s.schedule, s.parameters.common, s.parameters.controller)
+        return make_controller(s.model.robot, s.model.schedule, s.parameters.common, s.parameters.controller)
 
 
 def inputs(rest: Rest, stamp: int, seed: int) -> tuple[RobotState, JointReference, TaskPhase]:
     """Return a state near the start, a reference near it, and a phase."""
     random = np.random.default_rng(seed)
-    start = initial_joints(rest.scenario.robot, rest.scenario.schedule)
+    start = initial_joints(rest.scenario.truth.robot, rest.scenario.truth.schedule)
     noise = random.normal(scale=0.01, size=(5, 14))
     q = np.concatenate([0.1 * noise[0, :3], [0.0, 0.0, 0.0, 1.0], start + noise[2]])
     state = RobotState(stamp, q, np.concatenate([noise[1, :6], noise[3]]), np.zeros(14))
     reference = JointReference(stamp, start + noise[4], 0.1 * noise[0])
     index = min(stamp // (8 * REFERENCE_NS), 2)
-    return state, reference, TaskPhase(stamp, index, rest.scenario.schedule.phases[index].name)
+    return state, reference, TaskPhase(stamp, index, rest.scenario.truth.schedule.phases[index].name)
 
 
 def effort_of(controller: Controller, state: RobotState) -> Array:
@@ -274,7 +274,7 @@ def test_a_law_of_another_package_answers_as_in_one_process(
     expected = rest.by_hand()
     for number in range(3):
         state, reference, phase = inputs(rest, number * REFERENCE_NS, number)
-        targets = rest.scenario.robot.tools_at(state.q)
+        targets = rest.scenario.truth.robot.tools_at(state.q)
         targets = {arm: Pose(pose.position + 0.01, pose.quaternion_xyzw) for arm, pose in targets.items()}
         messages = rest.messages(state, reference, phase)
         codec = PoseCodec(WORLD)

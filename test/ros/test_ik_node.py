@@ -44,8 +44,8 @@ class Asker:
         self.bench = bench
         self.node = bench.add(IkNode)
         self.scenario = load_scenario()
-        self.robot = self.scenario.robot
-        self.seed = initial_joints(self.robot, self.scenario.schedule)
+        self.robot = self.scenario.truth.robot
+        self.seed = initial_joints(self.robot, self.scenario.truth.schedule)
         self._client = bench.plain("client").create_client(SolveIK, SOLVE_IK)
         bench.until(self._client.service_is_ready, "the service")
 
@@ -134,7 +134,7 @@ def test_a_stall_is_told(bench: Bench) -> None:
 def test_values_of_robot_and_deputy_come_with_the_parameters(bench: Bench) -> None:
     bench.start({"common": {"values": ("robot.base.mass:=300", "robot.arms.arm_a.gripper.mass:=0.9")}})
     node = bench.add(IkNode)
-    assert node.robot.mass == pytest.approx(load_scenario().robot.mass + 60.0 + 0.9 - 0.6451)
+    assert node.robot.mass == pytest.approx(load_scenario().truth.robot.mass + 60.0 + 0.9 - 0.6451)
 
 
 LOOSE = {"position_tolerance": 9.0, "orientation_tolerance": 9.0}

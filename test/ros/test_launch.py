@@ -29,6 +29,7 @@ SAMPLES = {
     "controller": "pid",
     "time_law": "quintic",
     "dynamics": "compiled",
+    "scenario": "my run.yaml",
     "schedule": "my task.yaml",
     "robot": "robot.yaml",
     "duration": "5",

@@ -34,7 +34,7 @@ SAMPLE = [SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE]
 def test_who_is_told_first(lockstep: bool, with_reference: bool, expected: list[str]) -> None:
     scenario = load_scenario()
     parameters = scenario.parameters
-    plant = make_plant(scenario.robot, scenario.schedule, parameters.common, parameters.plant)
+    plant = make_plant(scenario.truth.robot, scenario.truth.schedule, parameters.common, parameters.plant)
     told: dict[str, list[Any]] = {}
     order: list[str] = []
 
@@ -45,7 +45,7 @@ def test_who_is_told_first(lockstep: bool, with_reference: bool, expected: list[
 
         return SimpleNamespace(publish=publish)
 
-    outputs = PlantOutputs(scenario.robot, publisher, lockstep=lockstep)
+    outputs = PlantOutputs(scenario.truth.robot, publisher, lockstep=lockstep)
     outputs.publish_loop(plant, with_reference=with_reference)
     assert order == expected
     if with_reference:

@@ -18,7 +18,7 @@ from sms_handover.ros.process.realtime import settle
 from sms_handover.simulation.scenario import load_scenario
 event = threading.Event()
 threading.Thread(target=event.wait).start()
-settle(load_scenario({{"common": {values}}}).parameters.common)
+settle(load_scenario(values={{"common": {values}}}).parameters.common)
 threads = [int(name) for name in os.listdir("/proc/self/task")]
 print(len(threads) > 1, {{cpu for thread in threads for cpu in os.sched_getaffinity(thread)}})
 event.set()
@@ -26,7 +26,7 @@ event.set()
 
 
 def common(**values: object) -> CommonParameters:
-    return load_scenario({"common": values}).parameters.common
+    return load_scenario(values={"common": values}).parameters.common
 
 
 def test_every_thread_stays_on_the_processor() -> None:

@@ -118,7 +118,7 @@ def test_bag_is_the_simulated_run_bit_for_bit(bench: Bench, transport: str) -> N
     assert recorded.run() == EXIT_OK
     run = read_run(recorded.folder)
     assert len(run.tick_ns) == TICKS and len(run.grasp_events) == 2
-    assert compare_runs(run, simulate(load_scenario(recorded.overrides))) == ()
+    assert compare_runs(run, simulate(load_scenario(values=recorded.overrides))) == ()
 
 
 def test_bag_stands_on_its_own(bench: Bench) -> None:
@@ -248,7 +248,7 @@ def test_every_run_has_a_bag_of_its_own(bench: Bench) -> None:
 
     assert recorded.run(reset_once) == EXIT_OK
     assert asked
-    whole = simulate(load_scenario(recorded.overrides))
+    whole = simulate(load_scenario(values=recorded.overrides))
     first = read_run(recorded.folder)
     assert 150 < len(first.tick_ns) < TICKS
     assert np.array_equal(first.joint_position, whole.joint_position[: len(first.tick_ns)])

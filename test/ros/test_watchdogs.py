@@ -83,7 +83,7 @@ def test_a_missed_grasp_leads_to_the_same_over_dds(bench: Bench, on_miss: object
 
 def simulated(bench: Bench, **trajectory: object) -> RunData:
     common = {"schedule": str(bench.folder / "schedule.yaml")}
-    return simulate(load_scenario({"common": common, TRAJECTORY: trajectory}))
+    return simulate(load_scenario(values={"common": common, TRAJECTORY: trajectory}))
 
 
 def test_a_second_run_decides_the_same(bench: Bench) -> None:

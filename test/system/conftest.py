@@ -38,7 +38,9 @@ def schedule(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def simulated(schedule: Path) -> dict[str, RunData]:
     """The same schedule in one process, by law."""
     common = {"schedule": str(schedule)}
-    return {law: simulate(load_scenario({"common": common, "controller": {"law": law}})) for law in LAWS}
+    return {
+        law: simulate(load_scenario(values={"common": common, "controller": {"law": law}})) for law in LAWS
+    }
 
 
 @pytest.fixture(scope="session")

@@ -5,8 +5,10 @@ from pathlib import Path
 import pytest
 
 from sms_handover.analysis.equality import compare_runs
+from sms_handover.bag.info import read_info
 from sms_handover.bag.run.reader import read_run
 from sms_handover.graph.topics import CONTAINER, RECORDER
+from sms_handover.launcher.recorded_scenario import scenario_in
 from sms_handover.run_data import RunData
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
@@ -76,9 +78,31 @@ def test_compiled_dynamics(schedule: Path, simulated: dict[str, RunData], tmp_pa
     assert ended.code == 0, ended
     run = read_run(tmp_path / "out" / "bag")
     assert_same_bits(
-        run, simulate(load_scenario({"common": {"schedule": str(schedule), "dynamics": "compiled"}}))
+        run,
+        simulate(load_scenario(values={"common": {"schedule": str(schedule), "dynamics": "compiled"}})),
     )
     assert run.joint_velocity.tobytes() != simulated["nmpc"].joint_velocity.tobytes()
+
+
+def test_every_node_has_the_robot_that_is_its(
+    schedule: Path, simulated: dict[str, RunData], tmp_path: Path
+) -> None:
+    """The plant is heavier than all others believe: read back from the bag, and repeated bit for bit."""
+    scenario = tmp_path / "heavy.yaml"
+    truth = "truth: {robot: {base: {mass: 264.0}}}"
+    scenario.write_text(f"extends: paper\nschedule: {schedule}\n{truth}\n", encoding="utf-8")
+    believed = "model.robot.arms.arm_a.gripper.mass:=0.7"
+    ended = sms_handover("run", scenario, "-p", believed, "-o", "out", cwd=tmp_path)
+    assert ended.code == 0, ended
+    bag = tmp_path / "out" / "bag"
+    same = load_scenario(scenario, {"model.robot.arms.arm_a.gripper.mass": 0.7})
+    assert_same_bits(read_run(bag), simulate(same))
+    assert compare_runs(read_run(bag), simulated["nmpc"])
+    found = scenario_in(read_info(bag), tmp_path)
+    assert (found.truth.robot.urdf, found.model.robot.urdf) == (same.truth.robot.urdf, same.model.robot.urdf)
+    assert found.truth.robot.mass - found.model.robot.mass == pytest.approx(24.0 - (0.7 - 0.6451))
+    scenario.unlink()  # the bag alone says what it was made with
+    assert sms_handover("reproduce", bag, cwd=tmp_path).code == 0
 
 
 def test_the_laws_differ(simulated: dict[str, RunData]) -> None:

@@ -43,7 +43,7 @@ def _hosts_can_be_made() -> None:
 @pytest.fixture(scope="module")
 def one_process() -> RunData:
     """The same run in one process."""
-    return simulate(load_scenario({"common": {"duration": DURATION_S}}))
+    return simulate(load_scenario(values={"common": {"duration": DURATION_S}}))
 
 
 @pytest.fixture

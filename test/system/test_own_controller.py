@@ -59,8 +59,8 @@ def own(schedule: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, t
 @pytest.fixture(scope="module")
 def in_one_process(schedule: Path) -> RunData:
     """The same law in one process."""
-    scenario = load_scenario({"common": {"schedule": str(schedule)}})
-    return simulate(scenario, controller=task_space_pd.TaskSpacePd(scenario.robot))
+    scenario = load_scenario(values={"common": {"schedule": str(schedule)}})
+    return simulate(scenario, controller=task_space_pd.TaskSpacePd(scenario.truth.robot))
 
 
 def test_the_same_object_gives_the_same_bits_over_dds(

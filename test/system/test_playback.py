@@ -152,8 +152,8 @@ def test_record_ends_by_itself_and_takes_what_was_asked_for(tmp_path: Path) -> N
         assert player.process.poll() is None
     assert list(by_topic(tmp_path / "again")) == ["/imu"]
     assert len([*(tmp_path / "again").glob("*.mcap")]) in (2, 3), "a new file every 3 s"
-    words = ("--regex", "^/nothing", "-o", "none", "--duration", "1")
-    done = sms_handover("bag", "record", *words, cwd=tmp_path)
+    nothing = ("--regex", "^/nothing", "-o", "none", "--duration", "1")
+    done = sms_handover("bag", "record", *nothing, cwd=tmp_path)
     assert done.code == 1
 
 

@@ -25,7 +25,7 @@ from sms_handover.model.poses import pose_distance, pose_of
 from sms_handover.run_data import RunData
 from sms_handover.scene.links import DescribedRobot
 from sms_handover.scene.recorded_scene import read_scene
-from sms_handover.simulation.scenario import load_robot_model, load_scenario
+from sms_handover.simulation.scenario import load_scenario
 from sms_handover.types import Pose
 
 from ..core.layout_paths import (
@@ -127,7 +127,7 @@ def test_metadata_is_that_of_rosbag2(bag: Path) -> None:
 
 
 def test_it_stands_on_its_own(recorded: Recorded, schedule: Path) -> None:
-    robot = load_robot_model(load_scenario().parameters.common)
+    robot = load_scenario().truth.robot
     for law, (folder, _) in recorded.items():
         info: BagInfo = read_info(folder / "bag")
         assert info.schedule_text == schedule.read_text(encoding="utf-8")

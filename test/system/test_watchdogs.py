@@ -30,7 +30,7 @@ def test_a_run_with_retries_is_the_one_in_one_process(tmp_path: Path, called: Co
     assert "the nodes reported 1 error, 2 warnings, see above" in ended.out
     assert "phase 'carry' has failed at 0.42 s of simulated time" in ended.out
     recorded = read_run(tmp_path / "out" / "bag")
-    scenario = load_scenario({"common": {"schedule": str(path)}, "trajectory": {"failure_hold": 0.06}})
+    scenario = load_scenario(values={"common": {"schedule": str(path)}, "trajectory": {"failure_hold": 0.06}})
     assert compare_runs(recorded, simulate(scenario)) == ()
     assert [event.kind for event in recorded.run_events if event.node == "trajectory"] == [
         "phase_retried",

@@ -65,7 +65,7 @@ def _replay(start: State, efforts: Array, hold: int, apply: Callable[[Array], St
 def _our_plant(scenario: Scenario, hold: int, step: int) -> Callable[[Array], State]:
     """Return what moves our plant by ``hold``, in ticks of ``step``, from the start of the schedule."""
     common = replace(scenario.parameters.common, tick=ns_to_seconds(step))
-    plant = make_plant(scenario.robot, scenario.schedule, common, scenario.parameters.plant)
+    plant = make_plant(scenario.truth.robot, scenario.truth.schedule, common, scenario.parameters.plant)
 
     def apply(effort: Array) -> State:
         for _ in range(hold // step):
@@ -78,7 +78,7 @@ def _our_plant(scenario: Scenario, hold: int, step: int) -> Callable[[Array], St
 
 def _in_mujoco(scenario: Scenario, start: State, hold: int, step: int) -> Callable[[Array], State]:
     """Return what moves MuJoCo's robot by ``hold`` in steps of ``step``, from the same start."""
-    other = MujocoRobot(scenario.robot.description)
+    other = MujocoRobot(scenario.truth.robot.description)
     other.place(*start)
 
     def apply(effort: Array) -> State:
@@ -98,7 +98,7 @@ def _row(run: RunData, tick: int) -> State:
 @pytest.fixture(scope="module")
 def scenario() -> Scenario:
     """The shipped scenario under NMPC."""
-    return load_scenario({"controller": {"law": "nmpc"}})
+    return load_scenario(values={"controller": {"law": "nmpc"}})
 
 
 @pytest.fixture(scope="module")
@@ -133,7 +133,7 @@ def _furthest(a: list[State], b: list[State]) -> Array:
 
 def _drift(scenario: Scenario, states: list[State]) -> tuple[float, float]:
     """Return the largest linear and angular momentum over the run, which starts at rest."""
-    conserved = [conserved_quantities(scenario.robot, *state) for state in states]
+    conserved = [conserved_quantities(scenario.truth.robot, *state) for state in states]
     linear = max(float(np.linalg.norm(each.linear_momentum)) for each in conserved)
     return linear, max(float(np.linalg.norm(each.angular_momentum)) for each in conserved)
 
@@ -146,11 +146,13 @@ def _rounding(scenario: Scenario, run: RunData) -> Array:
     add. The base follows the joints by -H_b^-1 H_bm, as momentum demands.
     """
     states = [_row(run, tick) for tick in range(0, run.tick_ns.size, _SAMPLE // _TICK)]
-    condition = max(np.linalg.cond(reduced_dynamics(scenario.robot, *state).inertia) for state in states)
+    condition = max(
+        np.linalg.cond(reduced_dynamics(scenario.truth.robot, *state).inertia) for state in states
+    )
     tick_s, time_s = ns_to_seconds(_TICK), ns_to_seconds(int(run.tick_ns[-1]))
     acceleration = np.max(np.abs(np.diff(run.joint_velocity, axis=0))) / tick_s
     joints = 2.0 * condition * _EPS * acceleration * time_s**2 / 2.0
-    reactions = np.array([base_twist_per_joint_rate(scenario.robot, q) for q, _ in states])
+    reactions = np.array([base_twist_per_joint_rate(scenario.truth.robot, q) for q, _ in states])
     sums = np.abs(reactions).sum(axis=2).max(axis=0)
     return np.asarray(joints * np.array([1.0, np.linalg.norm(sums[:3]), np.linalg.norm(sums[3:])]))
 
@@ -213,7 +215,7 @@ def test_ours_loses_no_more_momentum(
     """
     replay = replays[_TICK, step]
     ours, others = _drift(scenario, replay.ours), _drift(scenario, replay.mujoco)
-    arms = sum(arm.mass for arm in scenario.robot.description.arms)
+    arms = sum(arm.mass for arm in scenario.truth.robot.description.arms)
     momentum = arms * np.max(np.abs(run.joint_velocity)) * _REACH
     walk = np.sqrt(run.tick_ns[-1] / step) * _EPS * momentum
     for name, unit, mine, other, lever in zip(

@@ -1,15 +1,17 @@
 """Graph node: what every node of the graph is made of, and the hooks by which they differ."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Generic, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import Executor
 
 from sms_handover.configuration.parameters import EVERY_NODE
+from sms_handover.configuration.scenario_file import COMMON
+from sms_handover.configuration.values import MODEL, TRUTH
 from sms_handover.errors import ConfigurationError, MessageError, Reason
 from sms_handover.graph.events import MESSAGE_REFUSED, RunEvent, Severity
-from sms_handover.graph.topics import DIAGNOSTICS, LOOP_NODES, RUN_EVENTS, graph_topics
+from sms_handover.graph.topics import DIAGNOSTICS, LOOP_NODES, PLANT, RECORDER, RUN_EVENTS, graph_topics
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.ros.node.diagnostics import NodeReport, diagnostics_message
 from sms_handover.ros.node.endpoints import Endpoints
@@ -18,14 +20,16 @@ from sms_handover.ros.node.lifecycle_node import LifecycleNode
 from sms_handover.ros.node.message_filter import MessageFilter
 from sms_handover.ros.node.node_inputs import NodeInputs
 from sms_handover.ros.node.run_membership import RunMembership
-from sms_handover.ros.parameters import declare, reject_unknown
+from sms_handover.ros.parameters import declare, named_scenario, reject_unknown
 from sms_handover.ros.process.main import EXIT_OK, WAIT_S, RunnableNode, Stop
 from sms_handover.ros.process.realtime import settle
 from sms_handover.simulation.parameters import DIRECT, EXECUTOR, LOCKSTEP, CommonParameters
-from sms_handover.simulation.scenario import load_robot_model
+from sms_handover.simulation.scenario import load_world
+from sms_handover.trajectory.schedule import Schedule
 
 P = TypeVar("P")
 
+WITH_TRUTH = (PLANT, RECORDER)  # the nodes that have the true robot and deputy; every other has a model
 _DIAGNOSTICS_PERIOD_S = 1.0  # [s] of wall time
 
 
@@ -45,9 +49,11 @@ class GraphNode(LifecycleNode, Generic[P]):
         self._invalid: ConfigurationError | None = None
         transport = EXECUTOR
         try:
-            self.common: CommonParameters = declare(self, CommonParameters, "common.yaml", EVERY_NODE)
-            group = self.parameter_group(group)
-            self.parameters: P = declare(self, group, f"{name}.yaml" if shipped else None, name)
+            scenario = named_scenario(self).parameters
+            common, own = scenario[COMMON], scenario.get(name) if shipped else None
+            self.common: CommonParameters = declare(self, CommonParameters, "common.yaml", EVERY_NODE, common)
+            group = self.parameter_group(group, own or {})
+            self.parameters: P = declare(self, group, f"{name}.yaml" if shipped else None, name, own)
             reject_unknown(self, CommonParameters, group)
             transport = self.common.transport
         except ConfigurationError as error:
@@ -63,8 +69,11 @@ class GraphNode(LifecycleNode, Generic[P]):
 
     # Hooks
 
-    def parameter_group(self, group: type[P]) -> type[P]:
-        """Return the parameters to declare, which may depend on those given; raises ConfigurationError."""
+    def parameter_group(self, group: type[P], scenario: Mapping[str, object]) -> type[P]:
+        """Return the parameters to declare, which may depend on those given here and by the scenario.
+
+        Raises ConfigurationError.
+        """
         return group
 
     def prepare(self) -> None:
@@ -101,10 +110,13 @@ class GraphNode(LifecycleNode, Generic[P]):
             super().start()
 
     def configure(self) -> None:
-        """Load the robot and make the endpoints; raises ConfigurationError."""
+        """Load robot and schedule and make the endpoints; raises ConfigurationError."""
         if self._invalid is not None:
             raise self._invalid
-        self.robot: RobotModel = load_robot_model(self.common)
+        role = TRUTH if self.get_name() in WITH_TRUTH else MODEL
+        world = load_world(self.common, role)
+        self.robot: RobotModel = world.robot
+        self.schedule: Schedule = world.schedule
         topics = graph_topics(self.robot.arms)
         self.endpoints = Endpoints(self, topics, self.common.peers, self.common.external)
         self.message_filter = MessageFilter(self.get_logger().warning, self._on_first_rejected)

@@ -1,0 +1,40 @@
+"""Content of a robot file: its YAML with the description files of its arms in their places."""
+
+from copy import copy
+from pathlib import Path
+from typing import Any
+
+from sms_handover.configuration.yaml_reader import Mapping, read_yaml
+
+_ARMS, _DESCRIPTION = "arms", "description"
+
+
+def read_robot_content(path: Path) -> Mapping:
+    """Return the content of a robot file; raises ConfigurationError on a file that cannot be read."""
+    return with_arm_descriptions(read_yaml(path), path.parent)
+
+
+def with_arm_descriptions(content: Mapping, folder: Path) -> Mapping:
+    """Return the content of a robot with the arm files that it names read, relative to ``folder``.
+
+    Anything that is not as a robot has it is left to the reader of robots.
+    """
+    arms = content.get(_ARMS)
+    result = copy(content)
+    if isinstance(arms, list):
+        result[_ARMS] = [_described(arm, folder) for arm in arms]
+    elif isinstance(arms, Mapping):
+        named = copy(arms)
+        named.update({name: _described(arm, folder) for name, arm in arms.items()})
+        result[_ARMS] = named
+    return result
+
+
+def _described(arm: Any, folder: Path) -> Any:
+    """Return an arm with its description file read, if it names one."""
+    name = arm.get(_DESCRIPTION) if isinstance(arm, Mapping) else None
+    if not isinstance(name, str) or not name:
+        return arm
+    result = copy(arm)
+    result[_DESCRIPTION] = read_yaml(folder / name)
+    return result
