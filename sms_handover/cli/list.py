@@ -10,6 +10,7 @@ from sms_handover.analysis.definitions import DEFINITIONS
 from sms_handover.analysis.records import UNITS
 from sms_handover.cli.columns import columns
 from sms_handover.cli.verbs import PROGRAM
+from sms_handover.configuration.scenario_file import load_scenario_file, scenario_names
 from sms_handover.control.registry import law_named, law_names, package_of
 from sms_handover.errors import ConfigurationError
 
@@ -27,10 +28,14 @@ class Kind(NamedTuple):
 def add_parser(parser: ArgumentParser) -> None:
     """Describe the command."""
     parser.description = "Print the names that other commands take, with a line on each."
-    parser.epilog = "'sms-handover show NAME' prints a scenario in full, or the parameters of a law."
+    parser.epilog = f"'{PROGRAM} show NAME' prints a scenario in full, or the parameters of a law."
     kinds = "; ".join(f"{name}: {kind.text}" for name, kind in KINDS.items())
     parser.add_argument(
-        "kind", nargs="?", choices=tuple(KINDS), help=f"{kinds} (default: {' and '.join(_DEFAULT)})"
+        "kind",
+        nargs="?",
+        choices=tuple(KINDS),
+        metavar="KIND",
+        help=f"{kinds} (default: {' and '.join(_DEFAULT)})",
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
 
@@ -44,14 +49,20 @@ def command(options: Namespace) -> int:
         return 0
     print("\n\n".join(_table(KINDS[name].head, rows) for name, rows in found.items()))
     if not options.kind:
-        others = " and ".join(name for name in KINDS if name not in found)
-        print(f"\nThere are also {others}: '{PROGRAM} list {others.split()[0]}'.")
+        others = [name for name in KINDS if name not in found]
+        print(f"\nThere are also {' and '.join(others)}: '{PROGRAM} list {others[0]}'.")
     return 0
 
 
 def _table(head: Sequence[str], rows: Sequence[Row]) -> str:
     """Return things as text."""
     return columns([head, *([row[column] for column in head] for row in rows)])
+
+
+def _scenarios() -> list[Row]:
+    return [
+        {"scenario": name, "description": load_scenario_file(name).description} for name in scenario_names()
+    ]
 
 
 def _laws() -> list[Row]:
@@ -63,9 +74,9 @@ def _law(name: str) -> Row:
     try:
         law = law_named(name)
     except ConfigurationError as error:
-        return {"law": name, "needs": "", "package": package_of(name), "description": f"unusable: {error}"}
+        return {"law": name, "package": package_of(name), "needs": "", "description": f"unusable: {error}"}
     needs = ", ".join(sorted(need.value for need in law.needs))
-    return {"law": name, "needs": needs, "package": package_of(name), "description": law.description}
+    return {"law": name, "package": package_of(name), "needs": needs, "description": law.description}
 
 
 def _metrics() -> list[Row]:
@@ -74,8 +85,9 @@ def _metrics() -> list[Row]:
 
 KINDS: Mapping[str, Kind] = MappingProxyType(
     {
-        "laws": Kind("control laws, with what they need", ("law", "package", "needs", "description"), _laws),
+        "scenarios": Kind("what can be run", ("scenario", "description"), _scenarios),
+        "laws": Kind("control laws and what they need", ("law", "package", "needs", "description"), _laws),
         "metrics": Kind("figures of 'compare --csv'", ("metric", "unit", "definition"), _metrics),
     }
 )
-_DEFAULT = ("laws",)
+_DEFAULT = ("scenarios", "laws")

@@ -14,9 +14,10 @@ BAG = "bag"  # the verb that has verbs of its own
 
 GROUPS: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
-        "find": {
-            "list": "list what has a name: control laws, metrics",
-            "show": "print the parameters of a control law",
+        "choose": {
+            "list": "list what has a name: scenarios, control laws, metrics",
+            "show": "print a scenario in full, to copy from, or the parameters of a law",
+            "check": "check whether a scenario can be run, without running it",
         },
         "run": {
             "run": "run the handover as a graph of ROS 2 nodes and record it",

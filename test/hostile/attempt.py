@@ -55,6 +55,7 @@ _ENVIRONMENT: Mapping[str, tuple[str | None, ...]] = {  # None: not set
     "AMENT_PREFIX_PATH": ("/proc/none", ""),
     "TZ": ("nonsense",),
 }
+_FILES = ("schedule", "robot", "parameters")  # that a user writes
 _SHADOWS = ("yaml", "numpy", "rclpy", "mcap", "sms_handover_interfaces")  # modules of a stranger
 
 
@@ -174,6 +175,10 @@ _VERBS: Mapping[str, Callable[[Random, Path], list[str]]] = {
     "figures": _bag_verb("report", "--figures", "out", "--format", "png"),
     "report": _bag_verb("report", output=True),
     "view": _bag_verb("view", "--no-browser", output=True),
+    "list": lambda random, folder: ["list", *random.choice(([], ["metrics"], ["laws", "--json"], ["law"]))],
+    "show": lambda random, folder: ["show", random.choice(("paper", "pid", "", _bag(random, folder)))],
+    "check a file": lambda random, folder: ["check", _text(random, folder, random.choice(_FILES))],
+    "old name": _bag_verb("reproduce"),
     "verify": _bag_verb("verify"),
     "play": _bag_verb("bag", "play", "--rate", "100", "--duration", "0.2", "--ack-timeout", "0.2"),
     "verify with plant": _bag_verb("verify", "--with", "plant"),
