@@ -18,6 +18,7 @@ from sms_handover.cli import bag
 from sms_handover.cli.verbs import BAG, VERBS, call_of
 from sms_handover.configuration.scenario_file import COMMON
 from sms_handover.configuration.values import DOCUMENTS as DOCUMENTS_WITH_VALUES
+from sms_handover.configuration.values import ROLES
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.services import SERVICES
 from sms_handover.graph.topics import CONTROLLER, TF, graph_topics
@@ -97,7 +98,7 @@ def check_ours(words: list[str]) -> None:
     options = parser.parse_args(arguments)
     for text in getattr(options, "param", []):
         node, _, name = text.partition(":=")[0].partition(".")
-        if node in DOCUMENTS_WITH_VALUES:
+        if node in (*DOCUMENTS_WITH_VALUES, *ROLES):
             load_scenario(values={COMMON: {"values": [text]}})
             continue
         groups = {"common": COMMON_GROUP, **OWN_GROUPS}

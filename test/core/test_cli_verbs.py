@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -145,3 +147,36 @@ def test_a_cell_of_the_table_for_latex_is_the_number() -> None:
         "\\end{longtable}",
     ]
     assert escaped("\\a\n{}~") == "\\textbackslash{}a \\{\\}\\textasciitilde{}"
+
+
+WITHOUT_ROS = """
+import sys
+sys.modules["rclpy"] = None
+from sms_handover.cli.main import main
+for line in sys.stdin.read().splitlines():
+    try:
+        code = main(line.split())
+    except SystemExit as ended:
+        code = ended.code
+    print("code of", line, "is", code)
+"""
+NEED_ROS = ("run", "bag play BAG", "bag record --all", "view --live", "verify --with plant BAG")
+
+
+def test_ros_is_imported_by_the_verbs_alone_that_need_it(run: str, tmp_path: Path) -> None:
+    names = [*(verb for verb in VERBS if verb != BAG), *(f"{BAG} {name}" for name in bag.COMMANDS)]
+    need_none = [f"{name} --help" for name in names if not any(line.startswith(name) for line in NEED_ROS)]
+    need_none += ["view --help", "verify --help", "list", "show pid", f"verify {run}", f"bag info {run}"]
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_ROS],
+        input="\n".join([*need_none, *NEED_ROS]),
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+    )
+    codes = dict(re.findall(r"^code of (.*) is (\d+)$", done.stdout, re.MULTILINE))
+    assert [line for line in need_none if codes[line] != "0"] == [f"verify {run}"]
+    assert done.stderr.count("\n") == len(NEED_ROS) + 1, "one line of each, as of the run that is made up"
+    assert done.stderr.count(": error: ROS cannot be imported: ") == len(NEED_ROS)
+    assert all(codes[line] == "2" for line in NEED_ROS)
