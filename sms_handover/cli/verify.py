@@ -29,8 +29,8 @@ def add_parser(parser: ArgumentParser) -> None:
     """Describe the command."""
     parser.formatter_class = RawDescriptionHelpFormatter
     parser.description = (
-        "Take schedule and parameters out of each bag, compute the run again, and compare it with the\n"
-        "recording bit by bit. The robot description must be that of then."
+        "Take the scenario out of each bag, compute the run again, and compare it with the recording bit by\n"
+        "bit."
     )
     listed = "\n".join(f"  {name:<6} {engine.text}" for name, engine in ENGINES.items())
     parser.epilog = (

@@ -1,5 +1,7 @@
 """Wrong input ends in one line and exit code 2 before any node is started."""
 
+from argparse import ArgumentParser
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -138,6 +140,17 @@ def test_simulate_refuses_the_same(folder: Path, called: Command) -> None:
         done = called("simulate", *arguments, cwd=folder)
         assert done.code == 2, done
         assert len(done.errors) == 1 and told in done.errors[0], done
+
+
+def test_run_simulate_and_check_describe_a_scenario_alike() -> None:
+    """Each takes what the others take, and has options of its own for what it does with it."""
+    taken = {}
+    for verb in ("run", "simulate", "check"):
+        parser = ArgumentParser()
+        import_module(f"sms_handover.cli.{verb}").add_parser(parser)
+        (group,) = [group for group in parser._action_groups if group.title == "scenario"]
+        taken[verb] = [(action.dest, *action.option_strings) for action in group._group_actions]
+    assert taken["run"] == taken["simulate"] == taken["check"]
 
 
 def test_numbers_are_read_as_ros_reads_them(schedule: Path, tmp_path: Path, called: Command) -> None:
