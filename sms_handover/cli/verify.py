@@ -62,12 +62,11 @@ def command(options: Namespace) -> int:
     engine = ENGINES[options.engine]
     if options.domain_id is not None and not engine.over_dds:
         raise ConfigurationError("--domain-id is for a verification over DDS: give --with plant with it")
-    bags = [bag for run in options.runs for bag in bags_of(run)]
     codes = []
-    for bag in bags:
-        if len(bags) > 1:
-            print(f"{bag}:", flush=True)
-        codes.append(engine.verify(bag, options.domain_id))
+    for run in options.runs:
+        if len(options.runs) > 1:
+            print(f"{run}:", flush=True)
+        codes += [engine.verify(bag, options.domain_id) for bag in bags_of(run)]
     return max(codes)
 
 
