@@ -32,7 +32,7 @@ handover: install  ## hand the deputy over under NMPC, then PID, over DDS in loc
 	$(BIN)/sms-handover compare $(RUNS)/nmpc $(RUNS)/pid
 
 figures: install  ## draw the paper's figures from the runs of `make handover`
-	$(BIN)/sms-handover figures $(RUNS)/nmpc $(RUNS)/pid --output $(FIGURES) --format pdf,png,svg
+	$(BIN)/sms-handover report $(RUNS)/nmpc $(RUNS)/pid --figures $(FIGURES) --format pdf,png,svg
 
 report: install  ## write an HTML page on the runs of `make handover`
 	$(BIN)/sms-handover report $(RUNS)/nmpc $(RUNS)/pid --output $(REPORT) --overwrite

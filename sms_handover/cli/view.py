@@ -25,7 +25,7 @@ def add_parser(parser: ArgumentParser) -> None:
     parser.description = (
         "Show runs in 3D. With bags: write one page that plays them and needs no network, and open it;\n"
         "of several runs the first is solid and the others are translucent over it. With --live: show a\n"
-        "graph that runs, or that 'sms-handover play' plays back, as it goes; it never holds the graph up."
+        "graph that runs, or a bag that 'bag play' plays back, as it goes; it never holds the graph up."
     )
     parser.epilog = (
         "examples:\n"
@@ -52,6 +52,11 @@ def add_parser(parser: ArgumentParser) -> None:
         "--port", type=int, metavar="N", help="port of the page (default: 8017; 0: any free one)"
     )
     live.add_argument("--domain-id", type=int, metavar="N", help="ROS domain (default: ROS_DOMAIN_ID)")
+
+
+def needs_ros(options: Namespace) -> bool:
+    """Return whether a running graph is to be shown."""
+    return bool(options.live)
 
 
 def command(options: Namespace) -> int:
