@@ -18,6 +18,7 @@ from docs.commands import sub_parsers
 from sms_handover.cli.main import _COMMANDS
 from sms_handover.configuration.scenario_file import COMMON
 from sms_handover.configuration.values import DOCUMENTS as DOCUMENTS_WITH_VALUES
+from sms_handover.configuration.values import ROLES
 from sms_handover.graph.services import SERVICES
 from sms_handover.graph.topics import CONTROLLER, TF, graph_topics
 from sms_handover.ros.launching.launch_arguments import ARGUMENTS
@@ -102,7 +103,7 @@ def check_ours(words: list[str]) -> None:
     options = parser_of(words[0]).parse_args(words[1:])
     for text in getattr(options, "param", []):
         node, _, name = text.partition(":=")[0].partition(".")
-        if node in DOCUMENTS_WITH_VALUES:
+        if node in (*DOCUMENTS_WITH_VALUES, *ROLES):
             load_scenario(values={COMMON: {"values": [text]}})
             continue
         groups = {"common": COMMON_GROUP, **OWN_GROUPS}
