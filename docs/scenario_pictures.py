@@ -33,7 +33,7 @@ def draw(name: str) -> None:
     file = picture_of(name)
     write_figure(figure, file, _DPI)
     with Image.open(file) as drawn:
-        small = drawn.convert("RGB").quantize(_COLOURS)
+        small = drawn.convert("RGB").quantize(_COLOURS, Image.Quantize.MAXCOVERAGE)
     small.save(file, optimize=True)
     size = file.stat().st_size / 1000
     print(f"{file}: {size:.0f} kB")

@@ -133,7 +133,7 @@ def _add_key(axes: Axes, arms: Sequence[str], title: str) -> None:
     handles.append(Patch(color=_DEPUTY, label="deputy"))
     handles.append(Line2D([], [], color=MUTED, linewidth=1.0, label="path of a tool"))
     axes.legend(handles=handles, title=title, loc="upper left", borderpad=0.0)
-    origin = (0.74, 0.4)
+    origin = (0.82, 0.4)
     for name, (right, up) in zip("xyz", 0.2 * _CAMERA.seen(np.eye(3)), strict=True):
         axes.annotate(
             "",
