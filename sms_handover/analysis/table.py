@@ -13,6 +13,7 @@ from sms_handover.analysis.clearance_rows import clearance_sections
 from sms_handover.analysis.comparison import Comparison, compare
 from sms_handover.analysis.completion import command_in_words
 from sms_handover.analysis.grasps import Tolerance
+from sms_handover.analysis.joints import F
 from sms_handover.analysis.layout import MISSING, WIDTH, Row, Section, layout, number, row
 from sms_handover.analysis.loop_timing import LoopTiming
 from sms_handover.analysis.metrics import PhaseMetrics, RunMetrics
@@ -168,10 +169,16 @@ _EITHER: tuple[tuple[str, Callable[[ToolTracking], float]], ...] = (
 )
 
 
+def _of_arm(figures: F, arm: str) -> F | None:
+    """Return the figures of one arm, None for a robot without it."""
+    found = figures.of_arm(arm)
+    return found if found.joint_names else None
+
+
 def _tool_rows(arm: str, phases: Sequence[PhaseMetrics | None]) -> list[Row]:
     tools = [item.tools.get(arm) if item else None for item in phases]
-    torques = [item.torque.of_arm(arm) if item else None for item in phases]
-    works = [item.work.of_arm(arm) if item else None for item in phases]
+    torques = [_of_arm(item.torque, arm) if item else None for item in phases]
+    works = [_of_arm(item.work, arm) if item else None for item in phases]
     kinds = {tool.motion for tool in tools if tool}
     kind = " or ".join(motion.value for motion in Motion if motion in kinds)
     rows = [Row(f"{arm} ({kind})")]
