@@ -14,6 +14,8 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from sms_handover.units import MM_PER_M, ns_to_seconds
+
 Array = npt.NDArray[np.float64]
 
 BASE_NQ = 7  # position and quaternion of the base at the head of a configuration
@@ -148,6 +150,28 @@ class TickRows:
         return len(self.stamp_ns)
 
 
+@dataclass(frozen=True, eq=False)
+class PeriodRows:
+    """Reference periods as arrays, a row each: what every one began with.
+
+    Stamps (k,) ns; references (k, n) rad and rad/s; poses (k, 7) of targets and tools by arm, and of the
+    deputy; momenta (k, 3); energy and work (k,) J; the status of inverse kinematics, None where it was not
+    asked.
+    """
+
+    stamp_ns: npt.NDArray[np.int64]
+    reference_position: Array
+    reference_velocity: Array
+    target_pose: Mapping[str, Array]
+    tool_pose: Mapping[str, Array]
+    deputy_pose: Array
+    linear_momentum: Array
+    angular_momentum: Array
+    kinetic_energy: Array
+    work: Array
+    ik_status: tuple["IkStatus | None", ...]
+
+
 class IkStatus(Enum):
     """How an inverse-kinematics solve ended; the value is what a user reads."""
 
@@ -239,6 +263,26 @@ class GraspEvent:
     angle_error: float
     relative_speed: float
     detail: str
+
+
+@dataclass(frozen=True)
+class Collision:
+    """Two bodies that are nearer to each other than ``allowed`` at ``stamp_ns``: signed distances in m.
+
+    ``group`` is what reports count the two to; ``allowed`` is 0, or minus the depth of a declared contact.
+    """
+
+    stamp_ns: int
+    group: str
+    bodies: tuple[str, str]
+    distance: float
+    allowed: float
+
+    def __str__(self) -> str:
+        """Return which two bodies overlap, by how much and when."""
+        first, second = self.bodies
+        depth_mm, time_s = -self.distance * MM_PER_M, ns_to_seconds(self.stamp_ns)
+        return f"{first} and {second} overlap by {depth_mm:.2f} mm at {time_s:.2f} s"
 
 
 class PhaseState(Enum):

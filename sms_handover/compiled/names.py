@@ -12,3 +12,4 @@ def step_name(scheme: str) -> str:
 
 
 TOOL_ROWS, MOTION_ROWS, FIND_JOINTS = "sms_tool_rows", "sms_motion_rows", "sms_find_joints"
+PERIODS = "sms_periods"

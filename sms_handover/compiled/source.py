@@ -18,7 +18,7 @@ from sms_handover.plant.integrators import Tableau
 _NATIVE = Path(__file__).parent / "native"
 
 
-_NATIVE_FILES = ("ticks", "poses", "inverse_kinematics")  # each may use those before it
+_NATIVE_FILES = ("ticks", "poses", "inverse_kinematics", "periods")  # each may use those before it
 
 
 def dynamics_source(bodies: Sequence[Body], tools: Sequence[Tool], schemes: Mapping[str, Tableau]) -> str:

@@ -18,7 +18,7 @@ from sms_handover.control.protocol import Controller
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.plant.integrators import TABLEAUS
-from sms_handover.types import TickRows, frozen
+from sms_handover.types import Array, TickRows, frozen
 from sms_handover.units import ns_to_seconds
 
 _LAWS: Mapping[type, int] = MappingProxyType({NmpcLaw: 0, PidLaw: 1})  # as in native/ticks.c
@@ -46,7 +46,9 @@ class CompiledTicks:
         true, longest_ns = plant.robot, controller.track.longest_ns
         self._plant, self._controller = plant, controller
         self._scheme = tuple(TABLEAUS).index(scheme)
+        self._tick_ns = tick_ns
         self._state = np.zeros((), _layout(true.n_joints))
+        self._address = self._state.ctypes.data
         self._at: dict[str, Any] = {name: self._state[name] for name in self._state.dtype.names or ()}
         constant: dict[str, Any] = {
             "limit": known.effort_limit,
@@ -68,17 +70,29 @@ class CompiledTicks:
 
     def run(self, ticks: int, steps: int) -> TickRows:
         """Carry out ``ticks`` ticks, of which the first ``steps`` are integrated."""
-        plant, at = self._plant, self._at
-        first_ns, tick_ns = plant.stamp_ns, int(at["tick_ns"])
-        self._take_over()
-        nq, nv, acted, width = self._ends
-        rows = np.empty((ticks, width))
-        self._call(self._state.ctypes.data, self._scheme, rows.ctypes.data, ticks, steps)
-        self._give_back(steps)
-        stamps = np.arange(first_ns, first_ns + ticks * tick_ns, tick_ns)
+        first_ns, rows = self._plant.stamp_ns, self.room(ticks)
+        self.take_over()
+        self._call(*self.address, rows.ctypes.data, ticks, steps)
+        self.give_back(steps)
+        return self.rows_of(rows, first_ns)
+
+    @property
+    def address(self) -> tuple[int, int]:
+        """Where ``ticks_t`` is, and the number of the scheme."""
+        return self._address, self._scheme
+
+    def room(self, ticks: int) -> Array:
+        """Return room for the rows of some ticks."""
+        return np.empty((ticks, self._ends[-1]))
+
+    def rows_of(self, rows: Array, first_ns: int) -> TickRows:
+        """Return the rows of ticks from a time on by name."""
+        nq, nv, acted, _ = self._ends
+        tick_ns = self._tick_ns
+        stamps = np.arange(first_ns, first_ns + len(rows) * tick_ns, tick_ns)
         return TickRows(stamps, rows[:, :nq], rows[:, nq:nv], rows[:, nv:acted], rows[:, acted:])
 
-    def _take_over(self) -> None:
+    def take_over(self) -> None:
         """Take the state of plant and controller."""
         plant, law, track, at = self._plant, self._controller.law, self._controller.track, self._at
         at["q"][:], at["v"][:], at["effort"][:] = plant.q, plant.v, plant.joint_effort
@@ -93,7 +107,7 @@ class CompiledTicks:
             at["gains"][:2] = law.feedback[:, 0]
         at["saturated"][:] = 0
 
-    def _give_back(self, steps: int) -> None:
+    def give_back(self, steps: int) -> None:
         """Give plant and controller the state that the ticks have led to."""
         plant, law, at = self._plant, self._controller.law, self._at
         q, v, effort = (frozen(at[name].copy()) for name in ("q", "v", "effort"))

@@ -4,6 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from sms_handover.clearance.monitor import PeriodClearance
+from sms_handover.compiled.periods import CompiledPeriods
+from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.control.law import Need
 from sms_handover.control.protocol import CheckedController, Controller, Guidance
 from sms_handover.control.registry import law_named
@@ -11,9 +14,17 @@ from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import CONTROLLER
 from sms_handover.model.conserved import ConservedQuantities
+from sms_handover.simulation.quiet_periods import QuietPeriods, QuietRunner
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.snapshot import Snapshot, controller_data, restore_controller
-from sms_handover.simulation.wiring import make_controller, make_generator, make_ik, make_plant, make_runner
+from sms_handover.simulation.wiring import (
+    make_controller,
+    make_generator,
+    make_ik,
+    make_monitor,
+    make_plant,
+    make_runner,
+)
 from sms_handover.types import (
     Array,
     DeputyState,
@@ -31,9 +42,10 @@ from sms_handover.types import (
 class Period:
     """What is worked out once per reference period, at the instant at which it begins.
 
-    Tool poses and targets are in ``world``; ``work`` J is that of the joint efforts since the start;
-    ``ik_status`` is None where no tool had a target. ``events`` has what came of grasp commands,
-    ``decisions`` what was decided about the task.
+    Tool poses and targets are in ``world``; ``work`` J is that of the joint efforts since the start, less
+    what joint stops have taken; ``ik_status`` is None where no tool had a target. ``events`` has what came
+    of grasp commands, ``decisions`` what was decided about the task. ``clearance`` is None unless it is
+    measured online.
     """
 
     phase: TaskPhase
@@ -46,13 +58,15 @@ class Period:
     ik_status: IkStatus | None
     events: tuple[GraspEvent, ...]
     decisions: tuple[RunEvent, ...]
+    clearance: PeriodClearance | None = None
 
 
 class Observation(NamedTuple):
     """One tick: the state at ``stamp_ns``, and the efforts (n,) N m that answer it.
 
     ``q`` (7 + n,), ``v`` (6 + n,) and ``joint_effort`` (n,) are those of :attr:`state`. ``period`` is there
-    at the instants at which a reference period begins.
+    at the instants at which a reference period begins. ``excesses`` tells of limits of the joints that were
+    exceeded, once that is over.
     """
 
     stamp_ns: int
@@ -62,6 +76,7 @@ class Observation(NamedTuple):
     effort: Array
     guidance: Guidance
     period: Period | None
+    excesses: tuple[RunEvent, ...] = ()
 
     @property
     def phase(self) -> TaskPhase:
@@ -86,18 +101,30 @@ class Observation(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Ticks:
-    """Ticks under one guidance, as arrays; ``period`` is there if a reference period begins with them."""
+    """Ticks under one guidance, as arrays; ``period`` is there if a reference period begins with them.
+
+    ``excesses`` tells, by the number of the tick, of limits of the joints that were exceeded.
+    """
 
     rows: TickRows
+    excesses: Mapping[int, tuple[RunEvent, ...]]
     guidance: Guidance
     period: Period | None
+
+    @property
+    def phases(self) -> tuple[TaskPhase, ...]:
+        """The phase of the reference period, if one begins with them."""
+        return (self.period.phase,) if self.period else ()
 
     @property
     def observations(self) -> tuple[Observation, ...]:
         """The ticks one by one."""
         rows = self.rows
         columns = zip(rows.stamp_ns.tolist(), rows.q, rows.v, rows.joint_effort, rows.effort, strict=True)
-        ticks = [Observation(*column, self.guidance, None) for column in columns]
+        ticks = [
+            Observation(*column, self.guidance, None, self.excesses.get(index, ()))
+            for index, column in enumerate(columns)
+        ]
         return (ticks[0]._replace(period=self.period), *ticks[1:])
 
 
@@ -124,6 +151,8 @@ class Loop:
         self._plant = make_plant(truth.robot, truth.schedule, self._common, parameters.plant)
         self._generator = make_generator(robot, schedule, self._common, parameters.trajectory)
         self._find_joints = make_ik(robot, self._common, parameters.ik)
+        measured = self._common.measures_clearance
+        self._monitor = make_monitor(truth.robot, truth.schedule, self._common) if measured else None
         self._per_reference = self._common.ticks_per_reference
         self._controller: Controller
         if controller is not None:
@@ -132,13 +161,17 @@ class Loop:
         elif CONTROLLER in self._common.external:
             raise ConfigurationError(
                 "the controller is external: give simulate() a controller, "
-                "or check a recording with 'sms-handover play --closed-loop'"
+                "or check a recording with 'sms-handover verify --with plant'"
             )
         else:
             self.law = parameters.controller.law
             self._aims = Need.TOOL_TARGETS in law_named(self.law).needs
             self._controller = make_controller(robot, schedule, self._common, parameters.controller)
         self._runner = make_runner(self._plant, self._controller, robot, self._common, parameters.plant)
+        self._quiet: QuietRunner | None = None
+        if isinstance(self._runner, CompiledTicks) and not self._monitor:
+            periods = CompiledPeriods(self._runner, robot, parameters.ik, self._per_reference)
+            self._quiet = QuietRunner(self._plant, self._generator, periods, self._per_reference)
         self.reset()
 
     def reset(self, seed: int | None = None) -> None:
@@ -150,6 +183,8 @@ class Loop:
         self._plant.reset()
         self._generator.reset()
         self._controller.reset()
+        if self._monitor:
+            self._monitor.reset()
         schedule, rest = self.scenario.model.schedule, self._plant.state
         phase = TaskPhase(0, 0, schedule.phases[0].name, end_ns=schedule.end_ns)
         reference = JointReference(0, rest.joint_position, rest.joint_velocity)
@@ -188,9 +223,28 @@ class Loop:
         period = None if since else self._begin_period()
         left = self.last_tick - plant.tick
         ticks = min(most, self._per_reference - since, left + 1)
+        return Ticks(*self._run(ticks, left), self._guidance, period)
+
+    def _run(self, ticks: int, left: int) -> tuple[TickRows, Mapping[int, tuple[RunEvent, ...]]]:
+        """Carry out some ticks, with ``left`` still to be integrated; return them with their excesses."""
+        plant = self._plant
+        first, self.finished = plant.tick, ticks > left
         rows = self._runner.run(ticks, min(ticks, left))
-        self.finished = ticks > left
-        return Ticks(rows, self._guidance, period)
+        excesses = plant.take_excesses_of(first, rows)
+        if self.finished:
+            last = ticks - 1
+            excesses[last] = excesses.get(last, ()) + plant.end_excesses()
+        return rows, excesses
+
+    def advance_quietly(self) -> Ticks | QuietPeriods:
+        """Carry out as many reference periods as there are without a decision, or the next one."""
+        if self._quiet and not self.finished and self._plant.tick % self._per_reference == 0:
+            quiet = self._quiet.run(self._guidance, self.last_tick)
+            if quiet:
+                self._guidance = quiet.guidance
+                self._controller.guide(self._guidance)
+                return quiet
+        return self._advance(self._per_reference)
 
     def snapshot(self) -> Snapshot:
         """Return all that the rest of the run depends on besides the scenario.
@@ -199,7 +253,10 @@ class Loop:
         """
         controller = controller_data(self._controller, self.law)
         plant, trajectory = self._plant.snapshot(), self._generator.snapshot()
-        return Snapshot(self.seed, plant, trajectory, self.law, controller, self._guidance, self.finished)
+        clearance = self._monitor.snapshot() if self._monitor else None
+        return Snapshot(
+            self.seed, plant, trajectory, self.law, controller, self._guidance, self.finished, clearance
+        )
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot: the rest of the run is the same bit for bit.
@@ -209,6 +266,8 @@ class Loop:
         """
         self._plant.restore(snapshot.plant)
         self._generator.restore(snapshot.trajectory)
+        if self._monitor and snapshot.clearance:
+            self._monitor.restore(snapshot.clearance)
         self._guidance, phase = snapshot.guidance, snapshot.guidance.phase
         self.last_tick = self._common.last_tick(phase.end_ns, failed=phase.failed)
         self.seed, self.finished = snapshot.seed, snapshot.finished
@@ -233,9 +292,26 @@ class Loop:
         self._controller.guide(self._guidance)
         events = plant.execute(phase.commands)
         generator.grasped(events)
+        clearance = None
+        if self._monitor:
+            pose, holder = deputy.deputy_in_world, plant.deputy.holder
+            clearance = self._monitor.measure(state.stamp_ns, state.q, pose, phase.index, holder)
+            generator.collided(clearance.collisions)
         status = solution.status if solution else None
         if status:
             generator.solved(converged=status is IkStatus.CONVERGED)
         self.last_tick = self._common.last_tick(phase.end_ns, failed=phase.failed)
         decisions = generator.take_decisions()
-        return Period(phase, reference, aims, tools, deputy, conserved, plant.work, status, events, decisions)
+        return Period(
+            phase,
+            reference,
+            aims,
+            tools,
+            deputy,
+            conserved,
+            plant.net_work,
+            status,
+            events,
+            decisions,
+            clearance,
+        )

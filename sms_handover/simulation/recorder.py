@@ -10,8 +10,13 @@ from sms_handover.graph.message_constants import CONSTANTS
 from sms_handover.model.poses import pose_row
 from sms_handover.run_data import RunData
 from sms_handover.simulation.loop import Period, Ticks
+from sms_handover.simulation.quiet_periods import QuietPeriods
 from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, TaskPhase
 
+_BY_PERIOD = (
+    *("reference_position", "reference_velocity", "deputy_pose", "linear_momentum", "angular_momentum"),
+    *("kinetic_energy", "work"),
+)
 _NOT_ASKED = -1  # in place of a status where inverse kinematics was not asked
 
 
@@ -35,8 +40,8 @@ class RunRecorder:
         self._events: list[GraspEvent] = []
         self._decisions: list[RunEvent] = []
 
-    def add(self, ticks: Ticks) -> None:
-        """Add some ticks, and the reference period if one begins with them."""
+    def add(self, ticks: Ticks | QuietPeriods) -> None:
+        """Add some ticks, and the reference periods that begin with them."""
         rows, k = ticks.rows, self._count
         self._count += len(rows)
         while self._count > len(self._rows[0]):
@@ -45,8 +50,13 @@ class RunRecorder:
             self._rows, (rows.stamp_ns, rows.q, rows.v, rows.joint_effort, rows.effort), strict=True
         ):
             kept[k : self._count] = new
-        if ticks.period:
+        self._decisions.extend(ticks.excesses.get(0, ()))
+        if isinstance(ticks, QuietPeriods):
+            self._add_periods(ticks)
+        elif ticks.period:
             self._add_period(ticks.period)
+        for index, events in ticks.excesses.items():
+            self._decisions.extend(events if index else ())
 
     def _add_period(self, period: Period) -> None:
         """Add what a reference period begins with."""
@@ -63,13 +73,26 @@ class RunRecorder:
             "ik_status": CONSTANTS[status] if status else _NOT_ASKED,
         }
         for name, value in row.items():
-            self._periods[name].append(value)
+            self._periods[name].append(np.array([value]))
         for arm in self._arms:
-            self._target_pose[arm].append(pose_row(period.targets_in_world[arm]))
-            self._tool_pose[arm].append(pose_row(period.tools_in_world[arm]))
+            self._target_pose[arm].append(pose_row(period.targets_in_world[arm])[np.newaxis])
+            self._tool_pose[arm].append(pose_row(period.tools_in_world[arm])[np.newaxis])
         self._phases.append(period.phase)
         self._events.extend(period.events)
         self._decisions.extend(period.decisions)
+
+    def _add_periods(self, quiet: QuietPeriods) -> None:
+        """Add what some reference periods begin with."""
+        rows = quiet.periods
+        for name in _BY_PERIOD:
+            self._periods[name].append(getattr(rows, name))
+        self._periods["reference_ns"].append(rows.stamp_ns)
+        status = [CONSTANTS[status] if status else _NOT_ASKED for status in rows.ik_status]
+        self._periods["ik_status"].append(np.array(status))
+        for arm in self._arms:
+            self._target_pose[arm].append(rows.target_pose[arm])
+            self._tool_pose[arm].append(rows.tool_pose[arm])
+        self._phases.extend(quiet.phases)
 
     def data(self) -> RunData:
         """Return the run so far."""
@@ -84,10 +107,10 @@ class RunRecorder:
             joint_command=command.copy(),
             base_pose=q[:, :BASE_NQ].copy(),
             base_twist=v[:, :BASE_NV].copy(),
-            target_pose={arm: np.array(rows) for arm, rows in self._target_pose.items()},
-            tool_pose={arm: np.array(rows) for arm, rows in self._tool_pose.items()},
+            target_pose={arm: np.concatenate(rows) for arm, rows in self._target_pose.items()},
+            tool_pose={arm: np.concatenate(rows) for arm, rows in self._tool_pose.items()},
             phases=tuple(self._phases),
             grasp_events=tuple(self._events),
             run_events=tuple(self._decisions),
-            **{name: np.array(rows) for name, rows in self._periods.items()},
+            **{name: np.concatenate(rows) for name, rows in self._periods.items()},
         )

@@ -27,8 +27,9 @@ def simulate(
     robot = loop.scenario.model.robot
     recorder = RunRecorder(robot.joint_names, robot.arms, loop.last_tick + 1)
     while not loop.finished:
-        ticks = loop.advance_period()
+        ticks = loop.advance_quietly()
         recorder.add(ticks)
-        if progress and ticks.period:
-            progress(ticks.period.phase.stamp_ns, ticks.period.phase)
+        if progress:
+            for phase in ticks.phases:
+                progress(phase.stamp_ns, phase)
     return recorder.data()

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from sms_handover.clearance.distances import ClearanceModel
+from sms_handover.clearance.monitor import ClearanceMonitor
 from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
 from sms_handover.compiled.inverse_kinematics import CompiledIk
 from sms_handover.compiled.kinematics import CompiledKinematics
@@ -21,6 +23,7 @@ from sms_handover.ik.parameters import IkParameters
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
 from sms_handover.plant.integrators import TABLEAUS, Tableau
+from sms_handover.plant.joint_limits import ENFORCE
 from sms_handover.plant.kinematics import PinocchioKinematics
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.plant.stepper import PinocchioStepper, Stepper
@@ -70,7 +73,8 @@ def make_generator(
 ) -> TrajectoryGenerator:
     """Return the generator of the trajectory; raises ConfigurationError."""
     tools_at = CompiledKinematics(robot).tools_at if common.dynamics == COMPILED else robot.tools_at
-    return TrajectoryGenerator(robot, schedule, parameters, tools_at)
+    aborts = common.aborts_on_collision
+    return TrajectoryGenerator(robot, schedule, parameters, tools_at, abort_on_collision=aborts)
 
 
 def make_ik(robot: RobotModel, common: CommonParameters, parameters: IkParameters) -> FindJoints:
@@ -78,6 +82,12 @@ def make_ik(robot: RobotModel, common: CommonParameters, parameters: IkParameter
     if common.dynamics == COMPILED:
         return CompiledIk(robot, parameters)
     return lambda request: find_joints(robot, request, parameters)
+
+
+def make_monitor(robot: RobotModel, schedule: Schedule, common: CommonParameters) -> ClearanceMonitor:
+    """Return what measures the clearance of a run as it goes on; raises RobotDescriptionError."""
+    model = ClearanceModel(robot.pin, robot.urdf, robot.arms, schedule.deputy.size)
+    return ClearanceMonitor(model, schedule.grasping_arms, common.contact_depth)
 
 
 def gains_by_phase(schedule: Schedule, parameters: ControllerParameters) -> tuple[Any, ...]:
@@ -123,9 +133,10 @@ def make_runner(
     """
     if common.dynamics != COMPILED:
         return PythonRunner(plant, controller)
-    if not CompiledTicks.fits(plant, controller, known):
+    if parameters.joint_limits == ENFORCE or not CompiledTicks.fits(plant, controller, known):
         _LOG.warning(
-            "ticks are carried out by Python: C has only our own laws, and truth and model with joints alike"
+            "ticks are carried out by Python: C has only our own laws, joints that are alike in truth and "
+            "model, and limits that are not enforced"
         )
         return PythonRunner(plant, controller)
     return CompiledTicks(plant, controller, known, parameters.integrator, common.tick_ns)

@@ -24,6 +24,7 @@ from sms_handover.trajectory.task_progress import ProgressState, Stage, TaskProg
 from sms_handover.trajectory.time_law import TIME_LAWS, Progress
 from sms_handover.types import (
     Array,
+    Collision,
     GraspEvent,
     IkRequest,
     JointReference,
@@ -67,6 +68,7 @@ class GeneratorState:
     tools_at_start: Mapping[str, Pose]
 
 
+_DONE = Progress(1.0, 0.0)  # of a motion whose targets stand still from now on
 ToolsAt = Callable[[Array, Iterable[str]], Mapping[str, Pose]]  # in world, of q (7 + n,) and some arms
 
 
@@ -82,12 +84,14 @@ class TrajectoryGenerator:
         schedule: Schedule,
         parameters: TrajectoryParameters,
         tools_at: ToolsAt | None = None,
+        *,
+        abort_on_collision: bool = False,
     ) -> None:
         """Follow a schedule; ``tools_at`` is the forward kinematics of the robot, by default by Pinocchio."""
         self._robot = robot
         self._tools_at = tools_at or robot.tools_at
         self._schedule = schedule
-        self._progress = TaskProgress(schedule, parameters)
+        self._progress = TaskProgress(schedule, parameters, abort_on_collision=abort_on_collision)
         self._time_law = TIME_LAWS[parameters.time_law]
         self._damping = parameters.jacobian_damping
         self.reset()
@@ -126,6 +130,10 @@ class TrajectoryGenerator:
         """Record outcomes of grasp commands."""
         self._progress.grasped(events)
 
+    def collided(self, collisions: Iterable[Collision]) -> None:
+        """Record which bodies collide in this period."""
+        self._progress.collided(collisions)
+
     def solved(self, *, converged: bool) -> None:
         """Record whether IK converged for the latest targets."""
         self._progress.solved(converged=converged)
@@ -133,6 +141,30 @@ class TrajectoryGenerator:
     def take_decisions(self) -> tuple[RunEvent, ...]:
         """Return the decisions about the task since the last call."""
         return self._progress.take_decisions()
+
+    @property
+    def ik_failures(self) -> tuple[int, int]:
+        """The latest targets in a row that inverse kinematics has not reached, and the number that fails."""
+        return self._progress.ik_failures
+
+    def failed_so_far(self, ik_failures: int) -> None:
+        """Record how many of the latest targets in a row were not reached."""
+        self._progress.failed_so_far(ik_failures)
+
+    def quiet_until(self, stamp_ns: int, *, deputy_rests: bool) -> int | None:
+        """Return up to when targets stand still and nothing has to be decided, None if not even now."""
+        quiet = self._progress.quiet_from(stamp_ns)
+        if quiet is None:
+            return None
+        phase, start_ns, end_ns = quiet
+        targets = () if self._progress.failed else phase.targets.values()
+        done = self._time_law(ns_to_seconds(stamp_ns - start_ns), ns_to_seconds(phase.motion_ns))
+        for target in targets:
+            if isinstance(target, GraspFrameTarget) and not deputy_rests:
+                return None
+            if not isinstance(target, Hold) and done != _DONE:
+                return None
+        return end_ns
 
     def ik_request(self, state: RobotState, targets: Targets) -> IkRequest:
         """Return the IK request: the base locked at its pose, the current joints as seed.

@@ -16,7 +16,8 @@ def bytes_of(tick: Observation) -> bytes:
     """Return all that a tick shows, to the last bit."""
     arrays = (tick.q, tick.v, tick.joint_effort, tick.effort)
     period = json.dumps(plain((tick.guidance, tick.period))) if tick.period else ""
-    return b"".join([str(tick.stamp_ns).encode(), *(array.tobytes() for array in arrays), period.encode()])
+    told = f"{tick.stamp_ns} {tick.excesses} {period}"
+    return b"".join([told.encode(), *(array.tobytes() for array in arrays)])
 
 
 def digest_of_rest(loop: Loop) -> str:

@@ -18,6 +18,12 @@ from sms_handover.types import Array, GraspStatus
 from .loop_rest import digest_of_rest, digests_of_rests
 from .retried_handover import EARLIEST_END, LAWS, MISSED, TICKS, retried_handover
 
+ENFORCED: Overrides = {
+    "plant": {"joint_limits": "enforce"},
+    "robot": {"arms.arm_a.limits": {"joint_6": {"position": [-1.41, 0.0], "velocity": 0.1}}},
+}
+AT_STOP = 200  # a tick at which joint 6 of arm A is at its stop, where limits are enforced
+
 
 @pytest.fixture
 def overrides(tmp_path: Path) -> Overrides:
@@ -31,12 +37,14 @@ def test_a_run_goes_on_from_any_snapshot_in_a_fresh_process(
 ) -> None:
     """The rest is that of the uninterrupted run bit for bit: states, efforts, references, deputy, events.
 
-    Among the ticks are those at which a grasp has been commanded, but its event is not yet known.
-    ``make verify`` takes a hundred ticks.
+    Among the ticks are those at which a grasp has been commanded, but its event is not yet known. Under PID
+    joint 6 is at its stop at 200 ms, and an excess of its rate goes on at 401 ms. ``make verify`` takes a
+    hundred ticks.
     """
     random = np.random.default_rng(14)
-    ticks = {*MISSED, *random.choice(EARLIEST_END, size=3, replace=False).tolist()}
-    digests = digests_of_rests({**overrides, "controller": LAWS[law]}, ticks, tmp_path)
+    ticks = {AT_STOP, *MISSED, *random.choice(EARLIEST_END, size=3, replace=False).tolist()}
+    given = {**overrides, "controller": LAWS[law], **(ENFORCED if law == "pid" else {})}
+    digests = digests_of_rests(given, ticks, tmp_path)
     assert len({uninterrupted for uninterrupted, _ in digests}) == len(ticks)
     assert all(uninterrupted == restored for uninterrupted, restored in digests)
 
