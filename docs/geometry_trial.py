@@ -143,7 +143,7 @@ class Bench:
             loop = Loop(Scenario(self._scenarios[law].parameters, world, world))
         except ConfigurationError as error:
             return Attempt(str(error), schedule.phases[0].name, -inf, inf)
-        recorder = RunRecorder(self.robot.joint_names, self.robot.arms, loop.last_tick + 1)
+        recorder = RunRecorder(self.robot.joint_names, self.robot.arms)
         least, rate, failure, phase = inf, 0.0, "", ""
         while not loop.finished and not failure:
             period, q, v = _advanced(loop, recorder)

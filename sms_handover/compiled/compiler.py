@@ -12,13 +12,16 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 
 from sms_handover.errors import ConfigurationError
 
 _LOG = logging.getLogger(__name__)
-# No fused or reordered operations: machines then differ only in the rounding of sine and cosine.
-_FLAGS = ("-O2", "-march=native", "-ffp-contract=off", "-fPIC", "-shared")
+# No fused or reordered operations, so that results do not depend on the other flags. Loops over joints are
+# vectorised; more passes over the long straight text of the equations take time and gain none.
+_VECTORS = ("-ftree-loop-vectorize", "-fvect-cost-model=dynamic")
+_FLAGS = ("-O1", *_VECTORS, "-march=native", "-ffp-contract=off", "-fPIC", "-shared")
 _TIMEOUT_S = 600.0  # [s] for a compiler that hangs; normally a few seconds
 _CPU_KEYS = ("model name", "flags", "CPU part", "Features")  # of /proc/cpuinfo, on x86 and on ARM
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
@@ -34,7 +37,7 @@ def library_of(what: str, identity: bytes, source: Callable[[], str]) -> Path:
     """
     command = _compiler()
     folder = _own_folder()
-    parts = (*command, *_FLAGS, _machine(command))
+    parts = (*command, *_FLAGS, _machine(*command))
     key = hashlib.sha256(b"\0".join([identity, *(part.encode() for part in parts)]))
     library = folder / f"{what}-{key.hexdigest()[:32]}.so"
     if not library.exists():
@@ -72,8 +75,9 @@ def _compiler() -> list[str]:
     return command
 
 
-def _machine(command: list[str]) -> str:
-    """Return the versions of platform and compiler, and the processor."""
+@cache
+def _machine(*command: str) -> str:
+    """Return the versions of platform and compiler, and the processor; they stay while a process runs."""
     try:
         version = _run([*command, "--version"]).stdout
         cpu = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").partition("\n\n")[0]

@@ -38,6 +38,7 @@ def kinematics_functions(
     base = ca.SX.sym("base", BASE_NQ)
     q = ca.vertcat(base, angles)
     placed = _placed(tools, bodies, base, angles)
+    robot = RigidBodies(bodies, ca.cos(angles), ca.sin(angles), v)
     poses = _poses(placed)
     columns = _columns(tools, bodies, placed)
     linear, angular = (ca.vertcat(*(column[part] for column in columns)) for part in range(2))
@@ -46,7 +47,7 @@ def kinematics_functions(
         TOOLS: ([q], [poses]),
         TOOL_JACOBIANS: ([q], [poses, linear, angular]),
         MOTION: ([q, v], [poses, twists]),
-        CONSERVED: ([q, v, parameters], [_conserved(placed, RigidBodies(bodies, angles, v))]),
+        CONSERVED: ([q, v, parameters], [_conserved(placed, robot)]),
     }
     return [ca.Function(name, given, ca.cse(found)) for name, (given, found) in functions.items()]
 
@@ -56,7 +57,8 @@ def _placed(tools: Sequence[Tool], bodies: Sequence[Body], base: Expression, ang
     placed = [(ca.SX.eye(3), ca.SX.zeros(3))]
     for index, body in enumerate(bodies[1:]):
         rotation, origin = placed[body.parent]
-        turn = ca.SX(body.rotation) @ turned_about_axis(body, angles[index])
+        cosine, sine = ca.cos(angles[index]), ca.sin(angles[index])
+        turn = ca.SX(body.rotation) @ turned_about_axis(body, cosine, sine)
         placed.append((rotation @ turn, origin + rotation @ ca.SX(body.place)))
     ends = []
     for tool in tools:

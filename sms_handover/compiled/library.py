@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping
+from functools import cache
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -33,10 +34,7 @@ def _identity(bodies: tuple[Body, ...], tools: tuple[Tool, ...], schemes: Mappin
     Their inertial parameters are arguments of the functions, so one library serves every robot that has the
     same joints and tools in the same places.
     """
-    digest = hashlib.sha256(f"{dict(schemes)} casadi {_casadi_version()}".encode())
-    here = Path(__file__).parent
-    for source in (*sorted(here.glob("*.py")), *sorted((here / "native").glob("*.c"))):
-        digest.update(source.read_bytes())
+    digest = hashlib.sha256(f"{dict(schemes)}".encode() + _generator())
     for body in bodies:
         digest.update(body.parent.to_bytes(4, "little", signed=True))
         for numbers in (body.rotation, body.place, body.axis):
@@ -45,6 +43,16 @@ def _identity(bodies: tuple[Body, ...], tools: tuple[Tool, ...], schemes: Mappin
         digest.update(f"{tool.body} {tool.first_joint} {tool.joints}".encode())
         for numbers in (tool.rotation, tool.place):
             digest.update(np.ascontiguousarray(numbers).tobytes())
+    return digest.digest()
+
+
+@cache
+def _generator() -> bytes:
+    """Return a digest of what generates the code."""
+    digest = hashlib.sha256(f"casadi {_casadi_version()}".encode())
+    here = Path(__file__).parent
+    for source in (*sorted(here.glob("*.py")), *sorted((here / "native").glob("*.c"))):
+        digest.update(source.read_bytes())
     return digest.digest()
 
 

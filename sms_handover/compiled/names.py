@@ -1,9 +1,14 @@
 """Names of the C functions that are made for a kind of robot."""
 
-COMPUTED_TORQUE = "sms_computed_torque"
+COMPUTED_TORQUE, PREPARED_TORQUE = "sms_computed_torque", "sms_prepared_torque"
 TOOLS, TOOL_JACOBIANS = "sms_tools", "sms_tool_jacobians"
 MOTION, CONSERVED = "sms_motion", "sms_conserved"
 TICKS, WORK_SIZE = "sms_ticks", "sms_work_size"  # the loop, and the numbers that it needs room for
+
+
+def rest_name(scheme: str) -> str:
+    """Return the name of the function that steps by a scheme after its first stage has been prepared."""
+    return f"sms_rest_{scheme}"
 
 
 def step_name(scheme: str) -> str:

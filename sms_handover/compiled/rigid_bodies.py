@@ -32,19 +32,21 @@ class _Rigid:
 
 
 class RigidBodies:
-    """The equations of motion H(q) v' + c(q, v) = (0, u) at angles (n,) and a velocity v (6 + n,).
+    """The equations of motion H(q) v' + c(q, v) = (0, u) at joint angles and a velocity v (6 + n,).
 
     In free space H, c and hence v' do not depend on the base pose.
     """
 
-    def __init__(self, bodies: Sequence[Body], angles: Expression, v: Expression) -> None:
+    def __init__(self, bodies: Sequence[Body], cosines: Expression, sines: Expression, v: Expression) -> None:
+        """Set up expressions of cosines (n,) and sines (n,) of the joint angles."""
         self._bodies = bodies
         self._rigids = [_Rigid(body.mass, ca.SX(body.first_moment), ca.SX(body.inertia)) for body in bodies]
         self._rates = [v[BASE_NV + joint] for joint in range(len(bodies) - 1)]
         self._rotations = [ca.SX.eye(3)]  # of each body in its parent
         self._twists = [(v[:3], v[3:BASE_NV])]
-        for body, angle, rate in zip(bodies[1:], _elements(angles), self._rates, strict=True):
-            self._rotations.append(ca.SX(body.rotation) @ turned_about_axis(body, angle))
+        turns = zip(_elements(cosines), _elements(sines), strict=True)
+        for body, turn, rate in zip(bodies[1:], turns, self._rates, strict=True):
+            self._rotations.append(ca.SX(body.rotation) @ turned_about_axis(body, *turn))
             linear, angular = self._carried(len(self._twists), *self._twists[body.parent])
             self._twists.append((linear, angular + ca.SX(body.axis) * rate))
         self._composites = self._composed()
@@ -53,27 +55,91 @@ class RigidBodies:
         """Return u (n,) N m that brings about joint accelerations (n,), as ``reduced_inverse_dynamics``.
 
         A base at rest would need the wrench f_b; without it the base accelerates by a_b = -H_b^-1 f_b, and
-        each composite body follows.
+        u = H_m q_m'' + c_m + H_mb a_b. H and c are those of :meth:`acceleration`, so that both share them.
         """
-        wrenches = self._wrenches(_elements(joint_acceleration))
-        yielding = _solved(self._base_inertia(), -ca.vertcat(*wrenches[0]))
-        along = [(yielding[:3], yielding[3:])]
-        efforts = []
-        for index, body in enumerate(self._bodies[1:], start=1):
-            along.append(self._carried(index, *along[body.parent]))
-            _, moment = self._composites[index].wrench(*along[index])
-            rotor = body.rotor * joint_acceleration[index - 1]
-            efforts.append(ca.dot(ca.SX(body.axis), wrenches[index][1] + moment) + rotor)
-        return ca.vertcat(*efforts)
+        matrix, wanted = self._inertia_matrix(), _elements(joint_acceleration)
+        forces = _elements(self.bias())
+        for row, entries in enumerate(matrix):
+            forces[row] = forces[row] + _product(entries[BASE_NV:], wanted)
+        yielding = substituted(factored(self._base_inertia()), -ca.vertcat(*forces[:BASE_NV]))
+        rows = zip(forces[BASE_NV:], matrix[BASE_NV:], strict=True)
+        return ca.vertcat(*(own + _product(row[:BASE_NV], _elements(yielding)) for own, row in rows))
 
     def acceleration(self, force: Expression) -> Expression:
         """Return v' (6 + n,) under a wrench on the base and joint efforts (6 + n,), from H v' = f - c."""
+        return substituted(factored(self._inertia_matrix()), force - self.bias())
+
+    def bias(self) -> Expression:
+        """Return c (6 + n,)."""
         wrenches = self._wrenches([0.0] * len(self._rates))
         bias = [
             ca.dot(ca.SX(body.axis), moment)
             for body, (_, moment) in zip(self._bodies[1:], wrenches[1:], strict=True)
         ]
-        return _solved(self._inertia_matrix(), force - ca.vertcat(*wrenches[0], *bias))
+        return ca.vertcat(*wrenches[0], *bias)
+
+    def inertia_factors(self) -> "Factors":
+        """Return the factors of H."""
+        return factored(self._inertia_matrix())
+
+    def articulated_acceleration(self, force: Expression) -> Expression:
+        """Return the same by the articulated-body algorithm, with fewer operations than by H.
+
+        [Featherstone2008], section 7.3, with a base that is free. The inertia of an articulated body is
+        [[M, B], [B^T, I]], from linear and angular acceleration to force and moment.
+        """
+        linear = [rigid.mass * ca.SX.eye(3) for rigid in self._rigids]
+        mixed = [-ca.skew(rigid.first_moment) for rigid in self._rigids]
+        angular = [rigid.inertia for rigid in self._rigids]
+        forces, moments = (list(part) for part in zip(*self._velocity_wrenches(), strict=True))
+        steps: list[tuple[Expression, ...]] = [()]
+        for body, rate, (velocity, spin) in zip(self._bodies[1:], self._rates, self._twists[1:], strict=True):
+            axis = ca.SX(body.axis)
+            steps.append((ca.cross(velocity, axis) * rate, ca.cross(spin, axis) * rate))
+        for index in range(len(self._bodies) - 1, 0, -1):
+            body, rotation, place = self._bodies[index], self._rotations[index], self._bodies[index].place
+            axis, across = ca.SX(body.axis), ca.SX(np.array(ca.skew(place)))
+            pull, turn = mixed[index] @ axis, angular[index] @ axis
+            wanted = force[BASE_NV + index - 1] - ca.dot(axis, moments[index])
+            inverse = -1.0 / (ca.dot(axis, turn) + body.rotor)
+            pull_share, turn_share = pull * inverse, turn * inverse
+            own = _symmetric(linear[index] + pull @ pull_share.T)
+            both = mixed[index] + pull @ turn_share.T
+            spun = _symmetric(angular[index] + turn @ turn_share.T)
+            moved, turned = steps[index]
+            steps[index] += (pull_share, turn_share, inverse * wanted)
+            own_force = forces[index] + own @ moved + both @ turned - pull_share * wanted
+            own_moment = moments[index] + both.T @ moved + spun @ turned - turn_share * wanted
+            own, both, spun = (rotation @ part @ rotation.T for part in (own, both, spun))
+            own, shifted = _symmetric(own), own @ across
+            crossed = across @ both
+            linear[body.parent] += own
+            mixed[body.parent] += both - shifted
+            angular[body.parent] += _symmetric(spun + crossed + crossed.T - across @ shifted)
+            passed_force, passed_moment = self._passed_on(index, own_force, own_moment)
+            forces[body.parent] += passed_force
+            moments[body.parent] += passed_moment
+        whole = ca.blockcat([[linear[0], mixed[0]], [mixed[0].T, angular[0]]])
+        rows = [_elements(whole[row, :]) for row in range(BASE_NV)]
+        base = substituted(factored(rows), force[:BASE_NV] - ca.vertcat(forces[0], moments[0]))
+        along, rates = [(base[:3], base[3:])], []
+        for index, body in enumerate(self._bodies[1:], start=1):
+            moved, turned, pull_share, turn_share, free = steps[index]
+            velocity, spin = self._carried(index, *along[body.parent])
+            velocity, spin = velocity + moved, spin + turned
+            rate = ca.dot(pull_share, velocity) + ca.dot(turn_share, spin) - free
+            rates.append(rate)
+            along.append((velocity, spin + ca.SX(body.axis) * rate))
+        return ca.vertcat(base, *rates)
+
+    def _velocity_wrenches(self) -> list[tuple[Expression, Expression]]:
+        """Return the wrench that keeps the twist of each body, by Newton and Euler."""
+        wrenches = []
+        for rigid, (linear, angular) in zip(self._rigids, self._twists, strict=True):
+            momentum, spin = rigid.wrench(linear, angular)
+            force = ca.cross(angular, momentum)
+            wrenches.append((force, ca.cross(angular, spin) + ca.cross(linear, momentum)))
+        return wrenches
 
     def momentum(self) -> tuple[Expression, Expression]:
         """Return linear momentum and angular momentum about the origin of the base, in its axes."""
@@ -177,13 +243,21 @@ class RigidBodies:
         return matrix
 
 
-def _solved(matrix: list[list[Expression]], right: Expression) -> Expression:
-    """Return x of H x = r by H = L^T D L, from the tips to the base: what is zero in H stays zero in L.
+@dataclass(frozen=True, eq=False)
+class Factors:
+    """L and the inverse of D of H = L^T D L; row k of L by the columns where it is not zero."""
+
+    lower: list[dict[int, Expression]]
+    inverse: list[Expression]
+
+
+def factored(matrix: list[list[Expression]]) -> Factors:
+    """Return the factors of H, from the tips to the base: what is zero in H stays zero in L.
 
     [Featherstone2008], section 6.5. ``matrix`` holds 0.0 where H is zero for every configuration.
     """
     size = len(matrix)
-    left, x = [row[:] for row in matrix], _elements(right)
+    left = [row[:] for row in matrix]
     lower: list[dict[int, Expression]] = [{} for _ in range(size)]
     inverse = [0.0] * size
     for k in range(size - 1, -1, -1):
@@ -194,6 +268,13 @@ def _solved(matrix: list[list[Expression]], right: Expression) -> Expression:
             for j in linked:
                 if j <= i:
                     left[i][j] = left[i][j] - lower[k][i] * left[k][j]
+    return Factors(lower, inverse)
+
+
+def substituted(factors: Factors, right: Expression) -> Expression:
+    """Return x of H x = r."""
+    lower, inverse, x = factors.lower, factors.inverse, _elements(right)
+    size = len(x)
     for k in range(size - 1, -1, -1):
         for j, factor in lower[k].items():
             x[j] = x[j] - factor * x[k]
@@ -204,15 +285,24 @@ def _solved(matrix: list[list[Expression]], right: Expression) -> Expression:
     return ca.vertcat(*x)
 
 
+def _product(row: Sequence[Expression], vector: Sequence[Expression]) -> Expression:
+    """Return the sum of products, without those that are zero for every configuration."""
+    total = ca.SX(0.0)
+    for entry, value in zip(row, vector, strict=True):
+        if not _is_zero(entry):
+            total += entry * value
+    return total
+
+
 def _is_zero(value: Expression) -> bool:
     """Whether an entry is zero for every configuration."""
     return bool(ca.SX(value).is_zero())
 
 
-def turned_about_axis(body: Body, angle: Expression) -> Expression:
+def turned_about_axis(body: Body, cosine: Expression, sine: Expression) -> Expression:
     """Return the rotation about the axis of a joint by Rodrigues' formula."""
     cross, along = np.array(ca.skew(body.axis)), np.outer(body.axis, body.axis)
-    return ca.cos(angle) * ca.SX(np.eye(3) - along) + ca.sin(angle) * ca.SX(cross) + ca.SX(along)
+    return cosine * ca.SX(np.eye(3) - along) + sine * ca.SX(cross) + ca.SX(along)
 
 
 def _symmetric(matrix: Expression) -> Expression:

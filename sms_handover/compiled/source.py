@@ -5,15 +5,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import casadi as ca
+import casadi
 
 from sms_handover.compiled.kinematics_functions import kinematics_functions
-from sms_handover.compiled.names import COMPUTED_TORQUE, step_name
-from sms_handover.compiled.rigid_bodies import RigidBodies
-from sms_handover.compiled.step import step_function
+from sms_handover.compiled.names import COMPUTED_TORQUE, PREPARED_TORQUE, rest_name, step_name
+from sms_handover.compiled.rigid_bodies import Factors, RigidBodies, substituted
+from sms_handover.compiled.step import Acceleration, step_function
 from sms_handover.compiled.tree import PER_BODY, Body, Tool
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV
 from sms_handover.plant.integrators import Tableau
+
+ca: Any = casadi  # its type hints are incomplete
 
 _NATIVE = Path(__file__).parent / "native"
 
@@ -24,10 +26,14 @@ _NATIVE_FILES = ("ticks", "poses", "inverse_kinematics", "periods")  # each may 
 def dynamics_source(bodies: Sequence[Body], tools: Sequence[Tool], schemes: Mapping[str, Tableau]) -> str:
     """Return the C code of a kind of robot: its equations, and the loop and inverse kinematics on them."""
     joints = len(bodies) - 1
+    by = _acceleration(bodies)
+    angles, v = ca.SX.sym("angles", joints), ca.SX.sym("v", BASE_NV + joints)
     functions = [
-        *(_step(name, tableau, bodies) for name, tableau in schemes.items()),
+        *(step_function(step_name(n), by, scheme, joints, goes_on=False) for n, scheme in schemes.items()),
+        *(step_function(rest_name(n), by, scheme, joints, goes_on=True) for n, scheme in schemes.items()),
         _computed_torque(bodies),
-        *kinematics_functions(tools, *_symbols(bodies)[:2], *_with_parameters(bodies)),
+        _computed_torque(bodies, by),
+        *kinematics_functions(tools, angles, v, *_with_parameters(bodies)),
     ]
     generator = ca.CodeGenerator("dynamics", {"with_header": False})
     for function in functions:
@@ -38,6 +44,8 @@ def dynamics_source(bodies: Sequence[Body], tools: Sequence[Tool], schemes: Mapp
         "ARGUMENTS": max(max(function.sz_arg(), function.sz_res()) for function in functions),
         "WORK": max(1, *(function.sz_w() for function in functions)),
         "STEPS": f"{{{', '.join(map(step_name, schemes))}}}",
+        "RESTS": f"{{{', '.join(map(rest_name, schemes))}}}",
+        "KEPT": by.kept,
         "ARMS": len(tools),
         "FIRST_JOINTS": f"{{{', '.join(str(tool.first_joint) for tool in tools)}}}",
         "ARM_JOINTS": f"{{{', '.join(str(tool.joints) for tool in tools)}}}",
@@ -45,32 +53,61 @@ def dynamics_source(bodies: Sequence[Body], tools: Sequence[Tool], schemes: Mapp
     }
     lines = [f"#define {name} {value}" for name, value in definitions.items()]
     native = [(_NATIVE / f"{name}.c").read_text(encoding="ascii") for name in _NATIVE_FILES]
-    return "\n".join((generator.dump(), *lines, *native))
+    own = (_NATIVE / "sine_cosine.c").read_text(encoding="ascii")
+    return "\n".join((own, generator.dump(), *lines, *native))
 
 
-def _step(scheme: str, tableau: Tableau, bodies: Sequence[Body]) -> Any:
-    """Return the function that maps q, v, force, inertial parameters and h to q and v after ``h`` s.
+def _acceleration(bodies: Sequence[Body]) -> Acceleration:
+    """Return the functions for v' by the mass matrix, and by articulated bodies for later stages."""
+    turn, v, force = _symbols(bodies)
+    parameters, known = _with_parameters(bodies)
+    robot = RigidBodies(known, *turn, v)
+    factors, bias = robot.inertia_factors(), robot.bias()
+    numbers = _kept(bias, factors)
+    kept = ca.SX.sym("kept", numbers.numel())
+    given = iter(kept[index] for index in range(kept.numel()))
+    known_bias = ca.vertcat(*(next(given) for _ in range(bias.numel())))
+    inverse = [next(given) for _ in factors.inverse]
+    lower = [{column: next(given) for column in row} for row in factors.lower]
+    first = substituted(Factors(lower, inverse), force - known_bias)
+    later = ca.cse(robot.articulated_acceleration(force))
+    return Acceleration(
+        ca.Function("inertia", [*turn, v, parameters], [ca.cse(numbers)]),
+        ca.Function("first", [kept, force], [ca.cse(first)]),
+        ca.Function("later", [*turn, v, force, parameters], [later]),
+    )
 
-    The force (6 + n,) is a wrench on the base, in its axes at its origin, and the joint efforts.
+
+def _kept(bias: Any, factors: Factors) -> Any:
+    """Return what the acceleration depends on besides the force as one vector."""
+    return ca.vertcat(bias, *factors.inverse, *(x for row in factors.lower for x in row.values()))
+
+
+def _computed_torque(bodies: Sequence[Body], by: Acceleration | None = None) -> Any:
+    """Return the function that maps q, v, desired motion (3, n), gains and parameters to efforts.
+
+    With ``by`` the numbers that its first stage keeps are a second result.
     """
-    angles, v, force = _symbols(bodies)
+    turn, v, _ = _symbols(bodies)
     parameters, known = _with_parameters(bodies)
-    found = ca.cse(RigidBodies(known, angles, v).acceleration(force))
-    acceleration = ca.Function("acceleration", [angles, v, force, parameters], [found])
-    return step_function(step_name(scheme), acceleration, tableau, len(bodies) - 1)
-
-
-def _computed_torque(bodies: Sequence[Body]) -> Any:
-    """Return the function that maps q, v, desired motion (3, n), gains and parameters to efforts."""
-    angles, v, _ = _symbols(bodies)
-    parameters, known = _with_parameters(bodies)
-    base, feedback = ca.SX.sym("base", BASE_NQ), ca.SX.sym("feedback", 2)
-    desired = ca.SX.sym("desired", len(bodies) - 1, 3)  # CasADi has columns where NumPy has rows
-    error, error_rate = angles - desired[:, 0], v[BASE_NV:] - desired[:, 1]
-    wanted = desired[:, 2] - feedback[0] * error - feedback[1] * error_rate
-    found = ca.cse(RigidBodies(known, angles, v).joint_efforts(wanted))
-    given = [ca.vertcat(base, angles), v, desired, feedback, parameters]
-    return ca.Function(COMPUTED_TORQUE, given, [found])
+    joints = len(bodies) - 1
+    wanted = ca.SX.sym("wanted", joints)
+    robot = RigidBodies(known, *turn, v)
+    found = [robot.joint_efforts(wanted)]
+    if by:
+        found.append(_kept(robot.bias(), robot.inertia_factors()))
+    inner = ca.Function("efforts", [*turn, v, wanted, parameters], ca.cse(found))
+    q, rates = ca.MX.sym("q", BASE_NQ + joints), ca.MX.sym("v", BASE_NV + joints)
+    desired = ca.MX.sym("desired", joints, 3)  # CasADi has columns where NumPy has rows
+    feedback = ca.MX.sym("feedback", 2)
+    numbers = ca.MX.sym("parameters", PER_BODY * len(bodies))
+    angles = q[BASE_NQ:]
+    error, error_rate = angles - desired[:, 0], rates[BASE_NV:] - desired[:, 1]
+    asked = desired[:, 2] - feedback[0] * error - feedback[1] * error_rate
+    results = inner(ca.cos(angles), ca.sin(angles), rates, asked, numbers)
+    name = PREPARED_TORQUE if by else COMPUTED_TORQUE
+    given: list[Any] = [q, rates, desired, feedback, numbers]
+    return ca.Function(name, given, list(results) if by else [results])
 
 
 def _with_parameters(bodies: Sequence[Body]) -> tuple[Any, tuple[Body, ...]]:
@@ -88,8 +125,8 @@ def _with_parameters(bodies: Sequence[Body]) -> tuple[Any, tuple[Body, ...]]:
     return parameters, tuple(known)
 
 
-def _symbols(bodies: Sequence[Body]) -> tuple[Any, Any, Any]:
-    """Return joint angles (n,), velocity (6 + n,) and force (6 + n,)."""
+def _symbols(bodies: Sequence[Body]) -> tuple[tuple[Any, Any], Any, Any]:
+    """Return cosines and sines of the joint angles (n,), velocity (6 + n,) and force (6 + n,)."""
     joints = len(bodies) - 1
-    angles, v = ca.SX.sym("angles", joints), ca.SX.sym("v", BASE_NV + joints)
-    return angles, v, ca.SX.sym("f", BASE_NV + joints)
+    turn = ca.SX.sym("cosines", joints), ca.SX.sym("sines", joints)
+    return turn, ca.SX.sym("v", BASE_NV + joints), ca.SX.sym("f", BASE_NV + joints)

@@ -1,5 +1,6 @@
 """One step of the plant as a CasADi function: the schemes of ``plant.integrators``."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -11,10 +12,29 @@ from sms_handover.plant.integrators import Tableau
 _SMALL = 1e-3  # [rad^2] below, five terms of a series leave less than rounding
 
 
-def step_function(name: str, acceleration: Any, tableau: Tableau, joints: int) -> Any:
+@dataclass(frozen=True, eq=False)
+class Acceleration:
+    """CasADi functions for v' at the stages of a step.
+
+    ``inertia`` maps cosines, sines, v and the inertial parameters p to what the acceleration depends on
+    besides the force: ``kept`` numbers. ``first`` maps these and f to v', ``later`` maps cosines, sines, v, f
+    and p to v' with fewer operations.
+    """
+
+    inertia: Any
+    first: Any
+    later: Any
+
+    @property
+    def kept(self) -> int:
+        """How many numbers a tick keeps."""
+        return int(self.inertia.size1_out(0))
+
+
+def step_function(name: str, by: Acceleration, tableau: Tableau, joints: int, *, goes_on: bool) -> Any:
     """Return (q, v, f, p, h) -> (q, v) after a step of ``h`` s under a force f (6 + n,).
 
-    ``acceleration`` maps angles, v, f and the inertial parameters p to v'. The sums are those of
+    A step that ``goes_on`` is given the kept numbers of q and v too, as last argument. The sums are those of
     :class:`~sms_handover.plant.integrators.LieGroupIntegrator`. As accelerations do not depend on the base
     pose, the base moves at the end of the step only.
     """
@@ -23,10 +43,16 @@ def step_function(name: str, acceleration: Any, tableau: Tableau, joints: int) -
     parameters = ca.MX.sym("p", PER_BODY * (joints + 1))
     velocities: list[Any] = []
     accelerations: list[Any] = []
+    kept = ca.MX.sym("kept", by.kept)
     for row in tableau.a:
         at = q[BASE_NQ:] + h * _sum(row, [velocity[BASE_NV:] for velocity in velocities])
         velocity = v + h * _sum(row, accelerations)
-        accelerations.append(acceleration(at, velocity, force, parameters))
+        turn = (ca.cos(at), ca.sin(at))
+        if accelerations:
+            accelerations.append(by.later(*turn, velocity, force, parameters))
+        else:
+            of_state = kept if goes_on else by.inertia(*turn, velocity, parameters)
+            accelerations.append(by.first(of_state, force))
         velocities.append(velocity)
     pose, angles = q[:BASE_NQ], q[BASE_NQ:]
     move = _move()
@@ -34,7 +60,7 @@ def step_function(name: str, acceleration: Any, tableau: Tableau, joints: int) -
         motion = h * _sum(row, velocities)
         pose, angles = move(pose, motion[:BASE_NV]), angles + motion[BASE_NV:]
     total = [sum(weights) for weights in zip(*tableau.b, strict=True)]
-    given = [q, v, force, parameters, h]
+    given = [q, v, force, parameters, h, *([kept] if goes_on else [])]
     return ca.Function(name, given, [ca.vertcat(pose, angles), v + h * _sum(total, accelerations)])
 
 

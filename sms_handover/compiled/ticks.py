@@ -60,6 +60,7 @@ class CompiledTicks:
             "law": _LAWS[type(controller.law)],
             "longest_ns": _UNBOUNDED_NS if longest_ns is None else longest_ns,
         }
+        constant["one_robot"] = np.array_equal(constant["true_parameters"], constant["known_parameters"])
         for name, value in constant.items():
             self._at[name][...] = value
         pointer, number = ctypes.c_void_p, ctypes.c_long
@@ -124,7 +125,7 @@ def _layout(joints: int) -> np.dtype[Any]:
         **{"limit": joints, "true_limit": joints, "tick_s": (), "work": ()},
         **{"true_parameters": parameters, "known_parameters": parameters},
     }
-    counts = {name: () for name in ("stamp_ns", "reference_ns", "longest_ns", "tick_ns", "law")}
+    counts = {name: () for name in ("stamp_ns", "reference_ns", "longest_ns", "tick_ns", "law", "one_robot")}
     fields: list[tuple[str, str, Any]] = [(name, "f8", shape) for name, shape in reals.items()]
     fields += [(name, "i8", shape) for name, shape in counts.items()]
     return np.dtype([*fields, ("saturated", "i8", joints)])

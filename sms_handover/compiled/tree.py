@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -61,6 +62,7 @@ def inertial_parameters(bodies: Sequence[Body]) -> Array:
     return read_only(np.array(rows).ravel())
 
 
+@lru_cache(maxsize=4)  # a loop asks a dozen times for the same one or two robots
 def body_tree(robot: RobotModel) -> tuple[Body, ...]:
     """Return the bodies, base first, then one for each joint in the order of ``robot.joint_names``."""
     model = robot.pin

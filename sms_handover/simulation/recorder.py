@@ -11,7 +11,7 @@ from sms_handover.model.poses import pose_row
 from sms_handover.run_data import RunData
 from sms_handover.simulation.loop import Period, Ticks
 from sms_handover.simulation.quiet_periods import QuietPeriods
-from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, TaskPhase
+from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, TaskPhase, TickRows
 
 _BY_PERIOD = (
     *("reference_position", "reference_velocity", "deputy_pose", "linear_momentum", "angular_momentum"),
@@ -26,14 +26,10 @@ class RunRecorder:
     Of a period only numbers, phase and events are kept, so that a long run stays small.
     """
 
-    def __init__(self, joint_names: tuple[str, ...], arms: tuple[str, ...], ticks: int) -> None:
-        """Make room for ``ticks`` states; more make more room."""
-        n = len(joint_names)
+    def __init__(self, joint_names: tuple[str, ...], arms: tuple[str, ...]) -> None:
+        """Start without a row."""
         self._joint_names, self._arms = joint_names, arms
-        stamps = np.zeros(ticks, dtype=np.int64)
-        widths = (BASE_NQ + n, BASE_NV + n, n, n)  # of q, v, the efforts that acted, and those that answer
-        self._rows = [stamps, *(np.full((ticks, width), np.nan) for width in widths)]
-        self._count = 0
+        self._rows: list[TickRows] = []
         self._periods: defaultdict[str, list[Any]] = defaultdict(list)
         self._target_pose, self._tool_pose = ({arm: list[Array]() for arm in arms} for _ in range(2))
         self._phases: list[TaskPhase] = []
@@ -42,14 +38,7 @@ class RunRecorder:
 
     def add(self, ticks: Ticks | QuietPeriods) -> None:
         """Add some ticks, and the reference periods that begin with them."""
-        rows, k = ticks.rows, self._count
-        self._count += len(rows)
-        while self._count > len(self._rows[0]):
-            self._rows = [np.concatenate([kept, np.zeros_like(kept)]) for kept in self._rows]
-        for kept, new in zip(
-            self._rows, (rows.stamp_ns, rows.q, rows.v, rows.joint_effort, rows.effort), strict=True
-        ):
-            kept[k : self._count] = new
+        self._rows.append(ticks.rows)
         self._decisions.extend(ticks.excesses.get(0, ()))
         if isinstance(ticks, QuietPeriods):
             self._add_periods(ticks)
@@ -96,17 +85,17 @@ class RunRecorder:
 
     def data(self) -> RunData:
         """Return the run so far."""
-        stamps, q, v, effort, command = (rows[: self._count] for rows in self._rows)
+        rows = self._rows
         return RunData(
             joint_names=self._joint_names,
             arms=self._arms,
-            tick_ns=stamps.copy(),
-            joint_position=q[:, BASE_NQ:].copy(),
-            joint_velocity=v[:, BASE_NV:].copy(),
-            joint_effort=effort.copy(),
-            joint_command=command.copy(),
-            base_pose=q[:, :BASE_NQ].copy(),
-            base_twist=v[:, :BASE_NV].copy(),
+            tick_ns=np.concatenate([part.stamp_ns for part in rows]),
+            joint_position=np.concatenate([part.q[:, BASE_NQ:] for part in rows]),
+            joint_velocity=np.concatenate([part.v[:, BASE_NV:] for part in rows]),
+            joint_effort=np.concatenate([part.joint_effort for part in rows]),
+            joint_command=np.concatenate([part.effort for part in rows]),
+            base_pose=np.concatenate([part.q[:, :BASE_NQ] for part in rows]),
+            base_twist=np.concatenate([part.v[:, :BASE_NV] for part in rows]),
             target_pose={arm: np.concatenate(rows) for arm, rows in self._target_pose.items()},
             tool_pose={arm: np.concatenate(rows) for arm, rows in self._tool_pose.items()},
             phases=tuple(self._phases),

@@ -25,7 +25,7 @@ def simulate(
     """
     loop = Loop(scenario, controller)
     robot = loop.scenario.model.robot
-    recorder = RunRecorder(robot.joint_names, robot.arms, loop.last_tick + 1)
+    recorder = RunRecorder(robot.joint_names, robot.arms)
     while not loop.finished:
         ticks = loop.advance_quietly()
         recorder.add(ticks)

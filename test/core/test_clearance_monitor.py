@@ -31,7 +31,7 @@ ABORT = {"on_collision": "abort"}
 def run(scenario: Scenario) -> tuple[RunData, list[PeriodClearance]]:
     """Return a run with the clearance of its periods."""
     loop = Loop(scenario)
-    recorder, periods = RunRecorder(scenario.truth.robot.joint_names, scenario.truth.robot.arms, 1), []
+    recorder, periods = RunRecorder(scenario.truth.robot.joint_names, scenario.truth.robot.arms), []
     while not loop.finished:
         ticks = loop.advance_period()
         recorder.add(ticks)

@@ -1,13 +1,16 @@
 """Compiled kinematics and inverse kinematics: the values of Pinocchio to rounding, the same iterations."""
 
+import ctypes
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from sms_handover.compiled.c_function import NativeFunction
 from sms_handover.compiled.inverse_kinematics import CompiledIk
 from sms_handover.compiled.kinematics import CompiledKinematics
+from sms_handover.compiled.library import dynamics_library
 from sms_handover.ik.levenberg_marquardt import Solution, find_joints
 from sms_handover.model.description import load_robot
 from sms_handover.model.poses import pose_distance
@@ -73,6 +76,27 @@ def test_tools_deputy_and_momenta_are_those_of_pinocchio(make: Callable[[], Robo
         assert one.twist_deputy_in_world.linear == pytest.approx(
             other.twist_deputy_in_world.linear, abs=10 * _ROUNDING
         )
+
+
+def test_sine_and_cosine_are_right_to_the_last_digit(robot: RobotModel) -> None:
+    """Within one unit in the last place, against the longer numbers of the processor."""
+    random = np.random.default_rng(11)
+    quarters = np.pi / 2 * np.arange(-64, 65)
+    parts = [random.uniform(-reach, reach, 20_000) for reach in (1e-3, 1.0, 10.0, 1e5)]
+    x = np.concatenate([*parts, quarters, np.nextafter(quarters, 9.0), [0.0, -0.0, 5e-324, 1e-200]])
+    sines, cosines = np.empty_like(x), np.empty_like(x)
+    kinds = [*[ctypes.c_void_p] * 3, ctypes.c_long]
+    function = NativeFunction(dynamics_library(robot), "sms_sines_cosines", kinds)
+    function(*(array.ctypes.data for array in (x, sines, cosines)), len(x))
+    assert np.finfo(np.longdouble).nmant > 60
+    for found, exact in (
+        (sines, np.sin(x.astype(np.longdouble))),
+        (cosines, np.cos(x.astype(np.longdouble))),
+    ):
+        assert (np.abs(found - exact) <= 0.85 * np.spacing(np.abs(exact).astype(np.float64))).all()
+    odd = np.array([np.nan, np.inf, 1e300])
+    function(*(array.ctypes.data for array in (odd, sines, cosines)), len(odd))
+    assert np.isnan(sines[:2]).all() and np.isnan(cosines[:2]).all()
 
 
 def _same(one: Solution, other: Solution) -> None:

@@ -229,7 +229,7 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "compiled: a library is not held against Pinocchio",
-        "compiled/dynamics",
+        "compiled/example",
         "if not apart <= _TOLERANCE:",
         "if not apart <= 1e9:",
         "compiled_dynamics",

@@ -24,7 +24,7 @@ typedef struct {
   double true_limit[N];                 /* N m, of the joints as they are */
   double tick_s, work;                  /* s, J */
   double true_parameters[PARAMETERS], known_parameters[PARAMETERS];
-  long long stamp_ns, reference_ns, longest_ns, tick_ns, law, saturated[N];
+  long long stamp_ns, reference_ns, longest_ns, tick_ns, law, one_robot, saturated[N];
 } ticks_t;
 
 static double clipped(double value, double limit) {
@@ -51,12 +51,16 @@ static void desired_motion(const ticks_t *t, double (*desired)[N]) {
 
 static double sign(double x) { return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : x; }
 
-static void efforts_of(ticks_t *t, double (*desired)[N], double *efforts, double *w) {
+/* Efforts of the law; where truth and model are one, also what the step keeps of its first stage. */
+static void efforts_of(ticks_t *t, double (*desired)[N], double *efforts, double *kept, double *w) {
   if (t->law == LAW_NMPC) {
     /* CasADi has columns where NumPy has rows: (3, n) in memory is its (n, 3) */
     const double *arguments[ARGUMENTS] = {t->q, t->v, desired[0], t->gains, t->known_parameters};
-    double *results[ARGUMENTS] = {efforts};
-    sms_computed_torque(arguments, results, 0, w, 0);
+    double *results[ARGUMENTS] = {efforts, kept};
+    if (t->one_robot)
+      sms_prepared_torque(arguments, results, 0, w, 0);
+    else
+      sms_computed_torque(arguments, results, 0, w, 0);
     for (int j = 0; j < N; j++) efforts[j] = clipped(efforts[j], t->limit[j]);
     return;
   }
@@ -75,11 +79,13 @@ typedef int (*step_t)(const double **, double **, casadi_int *, double *, int);
 
 /* Carry out `ticks` ticks, of which `steps` are integrated; write a row of q, v, effort and command each. */
 void sms_ticks(ticks_t *t, long scheme, double *rows, long ticks, long steps, double *w) {
-  static const step_t schemes[] = STEPS;
+  static const step_t schemes[] = STEPS, rests[] = RESTS;
+  int prepared = t->law == LAW_NMPC && t->one_robot;
+  double kept[KEPT];
   double desired[3][N], command[N], acted[N], force[NV] = {0.0}, q[NQ], v[NV];
   for (long k = 0; k < ticks; k++) {
     desired_motion(t, desired);
-    efforts_of(t, desired, command, w);
+    efforts_of(t, desired, command, kept, w);
     memcpy(rows, t->q, sizeof t->q), rows += NQ;
     memcpy(rows, t->v, sizeof t->v), rows += NV;
     memcpy(rows, t->effort, sizeof t->effort), rows += N;
@@ -91,9 +97,9 @@ void sms_ticks(ticks_t *t, long scheme, double *rows, long ticks, long steps, do
       acted[j] = clipped(command[j], t->true_limit[j]);
       force[6 + j] = acted[j];
     }
-    const double *arguments[ARGUMENTS] = {t->q, t->v, force, t->true_parameters, &t->tick_s};
+    const double *arguments[ARGUMENTS] = {t->q, t->v, force, t->true_parameters, &t->tick_s, kept};
     double *results[ARGUMENTS] = {q, v};
-    schemes[scheme](arguments, results, 0, w, 0);
+    (prepared ? rests : schemes)[scheme](arguments, results, 0, w, 0);
     for (int j = 0; j < N; j++) t->work += acted[j] * (q[7 + j] - t->q[7 + j]);
     memcpy(t->q, q, sizeof q), memcpy(t->v, v, sizeof v), memcpy(t->effort, acted, sizeof acted);
     t->stamp_ns += t->tick_ns;

@@ -1,0 +1,165 @@
+"""Quiet periods: many reference periods in one call give the bits of one period after the other."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sms_handover.run_data import RunData
+from sms_handover.simulation import loop as loop_module
+from sms_handover.simulation.loop import Loop
+from sms_handover.simulation.period_runner import PythonRunner
+from sms_handover.simulation.quiet_periods import QuietPeriods
+from sms_handover.simulation.recorder import RunRecorder
+from sms_handover.simulation.scenario import Overrides, Scenario, load_scenario
+from sms_handover.simulation.simulate import simulate
+from sms_handover.simulation.snapshot import plain
+from sms_handover.types import GraspStatus
+
+from .conftest import SCHEDULE
+from .retried_handover import LAWS, retried_handover
+
+COMPILED: Overrides = {"common": {"dynamics": "compiled"}}
+_PERIOD = 20  # ticks
+
+
+@pytest.fixture(autouse=True, scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """The folder of all modules for the libraries, so that each is made once."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp() / "compiled"))
+        yield
+
+
+def python_loop(scenario: Scenario) -> Loop:
+    """Return a loop whose ticks and periods are carried out by Python."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            loop_module, "make_runner", lambda plant, controller, *_: PythonRunner(plant, controller)
+        )
+        return Loop(scenario)
+
+
+def rest_of(loop: Loop) -> tuple[RunData, int]:
+    """Return the rest of a run, and in how many calls it was carried out."""
+    robot = loop.scenario.model.robot
+    recorder, calls = RunRecorder(robot.joint_names, robot.arms), 0
+    while not loop.finished:
+        recorder.add(loop.advance_quietly())
+        calls += 1
+    return recorder.data(), calls
+
+
+def require_same(one: RunData, other: RunData) -> None:
+    """Require the same bits in every array, and the same events."""
+    for name, value in vars(one).items():
+        theirs = getattr(other, name)
+        if isinstance(value, dict):
+            assert all(rows.tobytes() == theirs[arm].tobytes() for arm, rows in value.items()), name
+        elif isinstance(value, np.ndarray):
+            assert (value.dtype, value.shape) == (theirs.dtype, theirs.shape), name
+            assert np.array_equal(value, theirs, equal_nan=True), name
+            assert np.array_equal(np.signbit(value), np.signbit(theirs)) or np.isnan(value).any(), name
+        else:
+            assert repr(value) == repr(theirs), name
+
+
+def merged(*parts: dict[str, Any] | Overrides) -> Overrides:
+    """Return the values of several."""
+    values: dict[str, Any] = {}
+    for part in parts:
+        for name, section in part.items():
+            values[name] = {**values.get(name, {}), **section} if isinstance(section, dict) else section
+    return values
+
+
+@pytest.mark.parametrize("time_law", ["step", "quintic"])
+@pytest.mark.parametrize("law", LAWS)
+def test_a_task_is_that_of_python(law: str, time_law: str, tmp_path: Path) -> None:
+    """With a grasp that misses and is tried again; the joints of arm A turn faster than they may."""
+    fast = {"robot": {"arms.arm_a.limits": {"joint_6": {"velocity": 0.002}}}}
+    values = merged(
+        retried_handover(tmp_path),
+        COMPILED,
+        {"controller": LAWS[law], "trajectory": {"time_law": time_law}},
+        fast,
+    )
+    scenario = load_scenario(values=values)
+    theirs = python_loop(scenario)
+    expected, calls = rest_of(theirs)
+    quiet = Loop(scenario)
+    found, fewer = rest_of(quiet)
+    require_same(found, expected)
+    assert plain(quiet.snapshot()) == plain(theirs.snapshot())
+    assert any(event.kind == "rate_exceeded" for event in found.run_events)
+    assert found.grasp_events[0].status is not GraspStatus.REJECTED
+    assert calls == len(found.reference_ns) and fewer < calls - 5
+    reference = simulate(load_scenario(values=merged(values, {"common": {"dynamics": "pinocchio"}})))
+    assert np.abs(found.joint_position - reference.joint_position).max() < 1e-9
+    assert repr(found.grasp_events)[:40] == repr(reference.grasp_events)[:40]
+
+
+def test_a_snapshot_of_one_goes_on_in_the_other(tmp_path: Path) -> None:
+    scenario = load_scenario(
+        values=merged(retried_handover(tmp_path), COMPILED, {"trajectory": {"time_law": "step"}})
+    )
+    ours, theirs = Loop(scenario), python_loop(scenario)
+    for _ in range(5):
+        ours.advance_quietly()
+    while theirs.state.stamp_ns < ours.state.stamp_ns:
+        theirs.advance_period()
+    one, other = ours.snapshot(), theirs.snapshot()
+    assert plain(one) == plain(other)
+    ours.restore(other)
+    theirs.restore(one)
+    require_same(rest_of(ours)[0], rest_of(theirs)[0])
+
+
+@pytest.mark.parametrize("most", [0, 3])
+def test_targets_out_of_reach_fail_at_the_same_tick(most: int, tmp_path: Path) -> None:
+    far = tmp_path / "far.yaml"
+    far.write_text(SCHEDULE.replace("xyz: [1.25, 0.0, 0.75]", "xyz: [9.25, 0.0, 0.75]"), encoding="utf-8")
+    ending = {"time_law": "step", "ik_failures": most, "failure_hold": 0.2}
+    common = {"common": {"schedule": str(far), "duration": 1.0}}
+    scenario = load_scenario(values=merged(common, COMPILED, {"trajectory": ending}))
+    found, calls = rest_of(Loop(scenario))
+    expected, _ = rest_of(python_loop(scenario))
+    require_same(found, expected)
+    assert ("ik_failed" in [event.kind for event in found.run_events]) == (most > 0)
+    assert calls < len(found.reference_ns) / 2
+
+
+def test_what_is_no_number_stays_none(tmp_path: Path) -> None:
+    """From a state with a rate that is no number, of which all of the rest becomes none."""
+    scenario = load_scenario(
+        values=merged(retried_handover(tmp_path), COMPILED, {"trajectory": {"time_law": "step"}})
+    )
+    runs = []
+    for loop in (Loop(scenario), python_loop(scenario)):
+        for _ in range(3):
+            loop.advance_period()
+        state = plain(loop.snapshot())
+        assert state["plant"]["tick"] == 3 * _PERIOD
+        snapshot = loop.snapshot()
+        v = np.array(snapshot.plant.v)
+        v[-1] = np.nan
+        object.__setattr__(snapshot.plant, "v", v)
+        loop.restore(snapshot)
+        ticks = [loop.advance_quietly() for _ in range(2)]
+        runs.append(ticks)
+    ours, theirs = runs
+    assert isinstance(ours[0], QuietPeriods)
+    assert np.isnan(ours[0].rows.q).any()
+    for name in ("q", "v", "effort", "joint_effort"):
+        found, expected = (getattr(run[0].rows, name)[:_PERIOD] for run in (ours, theirs))
+        assert np.array_equal(found, expected, equal_nan=True), name
+
+
+def test_the_work_of_a_quiet_phase() -> None:
+    """Python takes part at its beginning and at its end alone."""
+    short = {"schedule.phases.approach.duration": 2.0, "schedule.phases.approach.motion": 1.0}
+    values = {"common.dynamics": "compiled", "common.duration": 1.9, "trajectory.time_law": "step", **short}
+    _, calls = rest_of(Loop(load_scenario(values=values)))
+    assert calls == 3  # the first period, all others, and the last state
