@@ -149,7 +149,7 @@ def test_imports_point_one_way(file: Path) -> None:
         ("sms_handover.analysis.metrics", "from matplotlib.figure import Figure"),
         ("sms_handover.cli.figure_files", "def draw():\n    import mpl_toolkits.mplot3d"),
         ("sms_handover.control.nmpc", "import casadi"),
-        ("sms_handover.compiled.step", "from sms_handover.ik import residual"),
+        ("sms_handover.compiled.step", "from sms_handover.simulation import loop"),
         ("sms_handover.__init__", "from sms_handover.nodes.plant import main"),
     ],
 )

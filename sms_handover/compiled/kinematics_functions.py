@@ -6,7 +6,7 @@ from typing import Any
 
 import casadi
 
-from sms_handover.compiled.names import CONSERVED, MOTION, TOOL_JACOBIANS, TOOLS
+from sms_handover.compiled.names import CONSERVED, GENERALIZED_JACOBIAN, MOTION, TOOL_JACOBIANS, TOOLS
 from sms_handover.compiled.rigid_bodies import RigidBodies, turned_about_axis
 from sms_handover.compiled.tree import Body, Tool
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV
@@ -34,6 +34,7 @@ def kinematics_functions(
     origin of the tool in ``world`` axes (3), and its angular velocity in axes of the tool (3). Of q and v:
     the poses, and the twists (6) of the origins in ``world`` axes. Of q, v and parameters, in ``world``:
     linear momentum (3), angular momentum about the centre of mass (3), centre of mass (3), kinetic energy.
+    Of q and parameters: the generalised Jacobian (6 arms, n), row by row.
     """
     base = ca.SX.sym("base", BASE_NQ)
     q = ca.vertcat(base, angles)
@@ -48,6 +49,7 @@ def kinematics_functions(
         TOOL_JACOBIANS: ([q], [poses, linear, angular]),
         MOTION: ([q, v], [poses, twists]),
         CONSERVED: ([q, v, parameters], [_conserved(placed, robot)]),
+        GENERALIZED_JACOBIAN: ([q, parameters], [_generalized(tools, placed, columns, robot)]),
     }
     return [ca.Function(name, given, ca.cse(found)) for name, (given, found) in functions.items()]
 
@@ -114,6 +116,25 @@ def _twists(
             angular += rotation @ turned * v[BASE_NV + joint]
         twists.append(ca.vertcat(linear, turn @ angular))
     return ca.vertcat(*twists)
+
+
+def _generalized(
+    tools: Sequence[Tool],
+    placed: _Placed,
+    columns: list[tuple[Expression, Expression]],
+    robot: RigidBodies,
+) -> Expression:
+    """Return the transpose of the generalised Jacobian, whose columns CasADi writes one after the other."""
+    turn, remaining = placed.base[0], iter(columns)
+    rows = []
+    for tool, (rotation, origin) in zip(tools, placed.tools, strict=True):
+        twists = [(base[:3] + ca.cross(base[3:], origin), base[3:]) for base in robot.base_twists()]
+        parts = [ca.vertcat(turn @ linear, turn @ angular) for linear, angular in twists]
+        for joint in range(tool.first_joint, tool.first_joint + tool.joints):
+            moved, turned = next(remaining)
+            parts[joint] += ca.vertcat(moved, turn @ (rotation @ turned))
+        rows.append(ca.horzcat(*parts))
+    return ca.densify(ca.vertcat(*rows).T)
 
 
 def _conserved(placed: _Placed, robot: RigidBodies) -> Expression:

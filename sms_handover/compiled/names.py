@@ -17,4 +17,5 @@ def step_name(scheme: str) -> str:
 
 
 TOOL_ROWS, MOTION_ROWS, FIND_JOINTS = "sms_tool_rows", "sms_motion_rows", "sms_find_joints"
-PERIODS = "sms_periods"
+PERIODS, ON_PATH, RESOLVE_RATES = "sms_periods", "sms_on_path", "sms_resolve_rates"
+GENERALIZED_JACOBIAN = "sms_generalized_jacobian"

@@ -15,12 +15,16 @@ from sms_handover.ik.parameters import IkParameters
 from sms_handover.model.poses import pose_row
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.deputy import MasslessDeputy
-from sms_handover.trajectory.generator import Targets
-from sms_handover.types import PeriodRows, Pose, TickRows, Twist, read_only
+from sms_handover.trajectory.generator import Course
+from sms_handover.types import JointReference, PeriodRows, Pose, TickRows, Twist, read_only
+from sms_handover.units import ns_to_seconds
+
+Failures = tuple[int, int]
+_HOLD, _JOINTS, _TOOL = range(3)  # how an arm is led, as in native/periods.c
 
 
 class CompiledPeriods:
-    """Carries out reference periods whose targets stand still.
+    """Carries out reference periods in which nothing has to be decided.
 
     The state lives in plant and controller, as for :class:`~sms_handover.compiled.ticks.CompiledTicks`.
     """
@@ -33,24 +37,26 @@ class CompiledPeriods:
         self._quiet = np.zeros((), _quiet(n, arms))
         self._layout = _period(n, arms)
         pointer, number = ctypes.c_void_p, ctypes.c_long
-        kinds = (pointer, number, pointer, pointer, pointer, pointer, number, number)
+        kinds = (pointer, number, *[pointer] * 5, number, number)
         self._call = NativeFunction(dynamics_library(known), PERIODS, kinds)
 
     def run(
-        self, count: int, targets: Targets, deputy: MasslessDeputy, failures: tuple[int, int]
+        self, course: Course, before: JointReference, first_ns: int, deputy: MasslessDeputy, failed: Failures
     ) -> tuple[TickRows, PeriodRows, int]:
-        """Carry out at most ``count`` periods from the state of the targets, all of them integrated.
+        """Carry out at most the periods of a course, all of them integrated, from a time on.
 
-        ``failures`` are those of inverse kinematics in a row so far, and the number at which the periods end,
-        0 for never. Returns ticks, periods, and the failures then.
+        ``before`` is the reference of the period before; ``failed`` the failures of inverse kinematics in a
+        row so far, and the number at which the periods end, 0 for never. Returns ticks, periods, and the
+        failures then.
         """
-        quiet = self._quiet
-        self._set(targets, deputy, failures)
-        periods = np.zeros(count, self._layout)
-        first_ns, ticks = targets.stamp_ns, self._ticks
+        quiet, count = self._quiet, len(course.progress)
+        self._set(course, before, deputy, failed)
+        quiet["period_s"] = ns_to_seconds(first_ns - before.stamp_ns)
+        periods, progress = np.zeros(count, self._layout), np.ascontiguousarray(course.progress)
+        ticks = self._ticks
         rows = ticks.room(count * self._per_period)
         ticks.take_over()
-        given = (self._settings.ctypes.data, quiet.ctypes.data, periods.ctypes.data, rows.ctypes.data)
+        given = tuple(array.ctypes.data for array in (self._settings, quiet, progress, periods, rows))
         done = self._call(*ticks.address, *given, count, self._per_period)
         steps = done * self._per_period
         ticks.give_back(steps)
@@ -60,18 +66,22 @@ class CompiledPeriods:
         found = ticks.rows_of(rows[:steps], first_ns)
         return found, self._rows(periods[:done], found), int(quiet["failures"])
 
-    def _set(self, targets: Targets, deputy: MasslessDeputy, failures: tuple[int, int]) -> None:
+    def _set(self, course: Course, before: JointReference, deputy: MasslessDeputy, failed: Failures) -> None:
         """Say what holds for all of the periods."""
-        quiet, led = self._quiet, targets.tool_in_world
+        quiet = self._quiet
         for index, arm in enumerate(self._arms):
-            quiet["led"][index] = arm in led
-            if arm in led:
-                quiet["targets"][index] = pose_row(led[arm])
-        quiet["joints"], quiet["rates"] = targets.joint_position, targets.joint_velocity
+            quiet["kind"][index] = (
+                _TOOL if arm in course.goals else _JOINTS if arm in course.by_joints else _HOLD
+            )
+            if arm in course.goals:
+                quiet["starts"][index] = pose_row(course.starts[arm])
+                quiet["goals"][index] = pose_row(course.goals[arm])
+        quiet["joints"], quiet["ends"], quiet["rates"] = course.joints, course.ends, before.velocity
+        quiet["damping"] = course.damping
         quiet["holder"] = self._arms.index(deputy.holder) if deputy.holder else -1
         quiet["in_tool"] = numbers_of(deputy)
         quiet["deputy"] = pose_row(deputy.state.deputy_in_world)
-        quiet["failures"], quiet["most_failures"] = failures
+        quiet["failures"], quiet["most_failures"] = failed
 
     def _rows(self, periods: Any, ticks: TickRows) -> PeriodRows:
         """Return periods by name."""
@@ -79,7 +89,7 @@ class CompiledPeriods:
         return PeriodRows(
             stamp_ns=ticks.stamp_ns[:: self._per_period],
             reference_position=periods["reference"],
-            reference_velocity=np.broadcast_to(self._quiet["rates"], periods["reference"].shape).copy(),
+            reference_velocity=periods["rates"],
             target_pose={arm: periods["targets"][:, index] for index, arm in enumerate(self._arms)},
             tool_pose={arm: periods["tools"][:, index] for index, arm in enumerate(self._arms)},
             deputy_pose=periods["deputy"],
@@ -93,9 +103,10 @@ class CompiledPeriods:
 
 def _quiet(joints: int, arms: int) -> Any:
     """Return the fields of ``quiet_t`` in native/periods.c."""
-    reals: dict[str, Any] = {"targets": (arms, POSE_ROW), "joints": joints, "rates": joints}
-    reals |= {"in_tool": POSE, "deputy": POSE_ROW, "deputy_twist": TWIST}
-    counts: dict[str, Any] = {"led": arms, "holder": (), "failures": (), "most_failures": ()}
+    reals: dict[str, Any] = {"starts": (arms, POSE_ROW), "goals": (arms, POSE_ROW)}
+    reals |= {"joints": joints, "ends": joints, "rates": joints}
+    reals |= {"in_tool": POSE, "deputy": POSE_ROW, "deputy_twist": TWIST, "damping": (), "period_s": ()}
+    counts: dict[str, Any] = {"kind": arms, "holder": (), "failures": (), "most_failures": ()}
     fields = [(name, "f8", shape) for name, shape in reals.items()]
     return np.dtype([*fields, *((name, "i8", shape) for name, shape in counts.items())])
 
@@ -103,6 +114,6 @@ def _quiet(joints: int, arms: int) -> Any:
 def _period(joints: int, arms: int) -> Any:
     """Return the fields of ``period_t`` in native/periods.c."""
     poses = (arms, POSE_ROW)
-    reals: dict[str, Any] = {"reference": joints, "targets": poses, "tools": poses, "deputy": POSE_ROW}
-    reals |= {"conserved": CONSERVED_SIZE, "work": (), "status": ()}
+    reals: dict[str, Any] = {"reference": joints, "rates": joints, "targets": poses, "tools": poses}
+    reals |= {"deputy": POSE_ROW, "conserved": CONSERVED_SIZE, "work": (), "status": ()}
     return np.dtype([(name, "f8", shape) for name, shape in reals.items()])

@@ -132,6 +132,12 @@ class RigidBodies:
             along.append((velocity, spin + ca.SX(body.axis) * rate))
         return ca.vertcat(base, *rates)
 
+    def base_twists(self) -> list[Expression]:
+        """Return -H_b^-1 H_bm by columns: the twist (6,) of the base per joint rate at zero momentum."""
+        matrix, factors = self._inertia_matrix(), factored(self._base_inertia())
+        columns = zip(*(row[BASE_NV:] for row in matrix[:BASE_NV]), strict=True)
+        return [substituted(factors, -ca.vertcat(*column)) for column in columns]
+
     def _velocity_wrenches(self) -> list[tuple[Expression, Expression]]:
         """Return the wrench that keeps the twist of each body, by Newton and Euler."""
         wrenches = []

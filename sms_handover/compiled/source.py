@@ -18,9 +18,14 @@ from sms_handover.plant.integrators import Tableau
 ca: Any = casadi  # its type hints are incomplete
 
 _NATIVE = Path(__file__).parent / "native"
-
-
-_NATIVE_FILES = ("ticks", "poses", "inverse_kinematics", "periods")  # each may use those before it
+# Each may use those before it.
+_NATIVE_FILES = (
+    "ticks",
+    "poses",
+    "inverse_kinematics",
+    "tool_motion",
+    "periods",
+)  # each may use those before it
 
 
 def dynamics_source(bodies: Sequence[Body], tools: Sequence[Tool], schemes: Mapping[str, Tableau]) -> str:

@@ -241,8 +241,8 @@ class Loop:
         if self._quiet and not self.finished and self._plant.tick % self._per_reference == 0:
             quiet = self._quiet.run(self._guidance, self.last_tick)
             if quiet:
-                self._guidance = quiet.guidance
-                self._controller.guide(self._guidance)
+                for self._guidance in quiet.guidance:
+                    self._controller.guide(self._guidance)
                 return quiet
         return self._advance(self._per_reference)
 

@@ -17,13 +17,13 @@ from sms_handover.types import JointReference, PeriodRows, TaskPhase, TickRows
 class QuietPeriods:
     """Periods without an event, as arrays: ticks, what each period began with, and its phase.
 
-    ``excesses`` tells, by the number of the tick, of limits of the joints that were exceeded; ``guidance`` is
-    the last one.
+    ``excesses`` tells, by the number of the tick, of limits of the joints that were exceeded; ``guidance``
+    has the last two, or the only one: an acceleration is the difference of two.
     """
 
     rows: TickRows
     excesses: Mapping[int, tuple[RunEvent, ...]]
-    guidance: Guidance
+    guidance: tuple[Guidance, ...]
     periods: PeriodRows
     phases: tuple[TaskPhase, ...]
 
@@ -45,8 +45,7 @@ class QuietRunner:
     def run(self, guidance: Guidance, last_tick: int) -> QuietPeriods | None:
         """Carry out the quiet periods from here on, after one with ``guidance``, None if there are none.
 
-        All their ticks are before ``last_tick``. The targets stand still, the rates of the reference are
-        those of the period before, and no decision is due.
+        All their ticks are before ``last_tick``. The goals of the phase stand still, and no decision is due.
         """
         plant, generator, per_period = self._plant, self._generator, self._per_period
         first, stamp_ns = plant.tick, plant.stamp_ns
@@ -58,20 +57,25 @@ class QuietRunner:
         count = min((until_ns - stamp_ns) // period_ns, (last_tick - first) // per_period)
         if count < 1:
             return None
-        state = plant.state
-        phase, targets = generator.targets(state, plant.deputy.deputy_in_world)
-        if targets.joint_velocity.tobytes() != before.velocity.tobytes():
-            return None
-        deputy, losses = plant.held_or_resting, plant.losses
-        rows, periods, failures = self._periods.run(count, targets, deputy, generator.ik_failures)
-        generator.failed_so_far(failures)
-        work: PeriodRows = replace(periods, work=periods.work - losses)
-        phases = tuple(_at(phase, stamp) for stamp in work.stamp_ns.tolist())
-        last = JointReference(phases[-1].stamp_ns, np.array(work.reference_position[-1]), before.velocity)
+        course = generator.course(stamp_ns, period_ns, count, plant.deputy.deputy_in_world)
+        deputy, failures = plant.held_or_resting, generator.ik_failures
+        rows, periods, failed = self._periods.run(course, before, stamp_ns, deputy, failures)
+        generator.failed_so_far(failed)
+        net: PeriodRows = replace(periods, work=periods.work - plant.losses)
+        phases = tuple(_at(course.phase, stamp) for stamp in net.stamp_ns.tolist())
+        latest = range(max(0, len(phases) - 2), len(phases))
         excesses = plant.take_excesses_of(first, rows)
-        return QuietPeriods(rows, excesses, Guidance(phases[-1], last, {}), work, phases)
+        told = tuple(_guidance(phases[index], net, index) for index in latest)
+        return QuietPeriods(rows, excesses, told, net, phases)
 
 
 def _at(phase: TaskPhase, stamp_ns: int) -> TaskPhase:
     """Return a phase at another time."""
     return TaskPhase(stamp_ns, phase.index, phase.name, (), phase.state, phase.attempt, phase.end_ns)
+
+
+def _guidance(phase: TaskPhase, periods: PeriodRows, index: int) -> Guidance:
+    """Return the guidance of one of some periods."""
+    position, velocity = periods.reference_position[index], periods.reference_velocity[index]
+    reference = JointReference(phase.stamp_ns, np.array(position), np.array(velocity))
+    return Guidance(phase, reference, {})

@@ -11,6 +11,7 @@ from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepp
 from sms_handover.compiled.inverse_kinematics import CompiledIk
 from sms_handover.compiled.kinematics import CompiledKinematics
 from sms_handover.compiled.ticks import CompiledTicks
+from sms_handover.compiled.tool_motion import CompiledToolMotion
 from sms_handover.control.computed_torque import ComputedTorque
 from sms_handover.control.law import LawSetup, Need
 from sms_handover.control.parameters import ControllerParameters, gains_of
@@ -32,6 +33,7 @@ from sms_handover.simulation.period_runner import PeriodRunner, PythonRunner
 from sms_handover.trajectory.generator import TrajectoryGenerator
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.schedule import Schedule
+from sms_handover.trajectory.tool_motion import PinocchioToolMotion
 from sms_handover.types import Array
 from sms_handover.units import ns_to_seconds, seconds_to_ns
 
@@ -72,9 +74,9 @@ def make_generator(
     robot: RobotModel, schedule: Schedule, common: CommonParameters, parameters: TrajectoryParameters
 ) -> TrajectoryGenerator:
     """Return the generator of the trajectory; raises ConfigurationError."""
-    tools_at = CompiledKinematics(robot).tools_at if common.dynamics == COMPILED else robot.tools_at
+    motion = CompiledToolMotion(robot) if common.dynamics == COMPILED else PinocchioToolMotion(robot)
     aborts = common.aborts_on_collision
-    return TrajectoryGenerator(robot, schedule, parameters, tools_at, abort_on_collision=aborts)
+    return TrajectoryGenerator(robot, schedule, parameters, motion, abort_on_collision=aborts)
 
 
 def make_ik(robot: RobotModel, common: CommonParameters, parameters: IkParameters) -> FindJoints:

@@ -1,6 +1,6 @@
 """Generator of the trajectory: schedule and current state to targets and joint reference."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -9,10 +9,8 @@ import numpy as np
 from sms_handover.graph.events import RunEvent
 from sms_handover.model.deputy import DeputyDescription
 from sms_handover.model.poses import pose_of, se3_of
-from sms_handover.model.reduced import generalized_jacobian
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.trajectory.parameters import TrajectoryParameters
-from sms_handover.trajectory.pose_path import PosePath
 from sms_handover.trajectory.schedule import (
     GraspFrameTarget,
     Hold,
@@ -22,6 +20,7 @@ from sms_handover.trajectory.schedule import (
 )
 from sms_handover.trajectory.task_progress import ProgressState, Stage, TaskProgress
 from sms_handover.trajectory.time_law import TIME_LAWS, Progress
+from sms_handover.trajectory.tool_motion import PinocchioToolMotion, ToolMotion
 from sms_handover.types import (
     Array,
     Collision,
@@ -60,16 +59,32 @@ class Targets:
 
 
 @dataclass(frozen=True, eq=False)
+class Course:
+    """What leads the arms in quiet periods: the phase, and where its motion begins and ends.
+
+    The tools of some arms go from ``starts`` to ``goals`` in ``world``; the joints (n,) rad of those in
+    ``by_joints`` from ``joints`` to ``ends``; those of the others stay at ``joints``. ``progress`` (k, 2) has
+    the fraction of the motion and its rate in 1/s for each period; ``damping`` is that of the generalised
+    Jacobian.
+    """
+
+    phase: TaskPhase
+    starts: Mapping[str, Pose]
+    goals: Mapping[str, Pose]
+    by_joints: frozenset[str]
+    joints: Array
+    ends: Array
+    progress: Array
+    damping: float
+
+
+@dataclass(frozen=True, eq=False)
 class GeneratorState:
     """Progress of the task, and where joints (n,) rad and tools were when the phase began."""
 
     progress: ProgressState
     joints_at_start: Array
     tools_at_start: Mapping[str, Pose]
-
-
-_DONE = Progress(1.0, 0.0)  # of a motion whose targets stand still from now on
-ToolsAt = Callable[[Array, Iterable[str]], Mapping[str, Pose]]  # in world, of q (7 + n,) and some arms
 
 
 class TrajectoryGenerator:
@@ -83,13 +98,13 @@ class TrajectoryGenerator:
         robot: RobotModel,
         schedule: Schedule,
         parameters: TrajectoryParameters,
-        tools_at: ToolsAt | None = None,
+        motion: ToolMotion | None = None,
         *,
         abort_on_collision: bool = False,
     ) -> None:
-        """Follow a schedule; ``tools_at`` is the forward kinematics of the robot, by default by Pinocchio."""
+        """Follow a schedule; ``motion`` leads the tools of the robot, by default by Pinocchio."""
         self._robot = robot
-        self._tools_at = tools_at or robot.tools_at
+        self._motion: ToolMotion = motion or PinocchioToolMotion(robot)
         self._schedule = schedule
         self._progress = TaskProgress(schedule, parameters, abort_on_collision=abort_on_collision)
         self._time_law = TIME_LAWS[parameters.time_law]
@@ -118,7 +133,7 @@ class TrajectoryGenerator:
         stage = self._progress.at(state.stamp_ns)
         if stage.begins:
             self._joints_at_start = state.joint_position
-            self._tools_at_start = self._tools_at(state.q, self._robot.arms)
+            self._tools_at_start = self._motion.tools_at(state.q)
         return stage.task, self._targets_of(stage, state, deputy_in_world)
 
     @property
@@ -152,19 +167,36 @@ class TrajectoryGenerator:
         self._progress.failed_so_far(ik_failures)
 
     def quiet_until(self, stamp_ns: int, *, deputy_rests: bool) -> int | None:
-        """Return up to when targets stand still and nothing has to be decided, None if not even now."""
+        """Return up to when nothing has to be decided and goals stand still, None if not even now."""
         quiet = self._progress.quiet_from(stamp_ns)
         if quiet is None:
             return None
-        phase, start_ns, end_ns = quiet
-        targets = () if self._progress.failed else phase.targets.values()
-        done = self._time_law(ns_to_seconds(stamp_ns - start_ns), ns_to_seconds(phase.motion_ns))
-        for target in targets:
-            if isinstance(target, GraspFrameTarget) and not deputy_rests:
-                return None
-            if not isinstance(target, Hold) and done != _DONE:
-                return None
-        return end_ns
+        targets = self._progress.at(stamp_ns).targets.values()
+        if not deputy_rests and any(isinstance(target, GraspFrameTarget) for target in targets):
+            return None
+        return quiet
+
+    def course(self, stamp_ns: int, period_ns: int, count: int, deputy_in_world: Pose) -> Course:
+        """Return what leads the arms in some quiet periods from a time on, the first of ``count``."""
+        stage = self._progress.at(stamp_ns)
+        motion_s = ns_to_seconds(stage.phase.motion_ns)
+        progress = np.empty((count, 2))
+        for index in range(count):
+            elapsed_ns = stamp_ns + index * period_ns - stage.start_ns
+            done = self._time_law(ns_to_seconds(elapsed_ns), motion_s)
+            progress[index] = done.fraction, done.rate
+        goals, ends = dict[str, Pose](), np.array(self._joints_at_start)
+        moved = set[str]()
+        for arm, target in stage.targets.items():
+            if isinstance(target, ToolTarget | GraspFrameTarget):
+                goals[arm] = goal_in_world(target, self._schedule.deputy, deputy_in_world)
+            elif isinstance(target, JointTarget):
+                moved.add(arm)
+                ends[self._robot.arm_joints[arm]] = target.position
+        starts = self._tools_at_start
+        return Course(
+            stage.task, starts, goals, frozenset(moved), self._joints_at_start, ends, progress, self._damping
+        )
 
     def ik_request(self, state: RobotState, targets: Targets) -> IkRequest:
         """Return the IK request: the base locked at its pose, the current joints as seed.
@@ -185,10 +217,11 @@ class TrajectoryGenerator:
         robot, led = self._robot, targets.tool_in_world
         others = [arm for arm in robot.arms if arm not in led]
         at = robot.configuration(state.base_in_world, joint_position)
-        by_joints = self._tools_at(at, others) if others else {}
+        by_joints = self._motion.tools_at(at, others) if others else {}
         velocity = targets.joint_velocity
         if any(_moves(twist) for twist in targets.tool_twist_in_world.values()):
-            velocity = self._resolve_rates(state, targets, velocity)
+            twists = targets.tool_twist_in_world
+            velocity = self._motion.resolved(state.q, twists, velocity, self._damping)
         reference = JointReference(state.stamp_ns, joint_position, velocity)
         return reference, {arm: led[arm] if arm in led else by_joints[arm] for arm in robot.arms}
 
@@ -207,27 +240,12 @@ class TrajectoryGenerator:
             match target:
                 case ToolTarget() | GraspFrameTarget():
                     goal = goal_in_world(target, self._schedule.deputy, deputy_in_world)
-                    poses[arm], twists[arm] = PosePath(self._tools_at_start[arm], goal).at(progress)
+                    poses[arm], twists[arm] = self._motion.on_path(self._tools_at_start[arm], goal, progress)
                 case JointTarget():
                     position[joints], velocity[joints] = _joint_motion(start, target.position, progress)
                 case Hold():
                     position[joints] = start
         return Targets(state.stamp_ns, poses, twists, frozen(position), frozen(velocity))
-
-    def _resolve_rates(self, state: RobotState, targets: Targets, velocity: Array) -> Array:
-        """Return the joint rates, those of tool-led arms resolved from the desired twists."""
-        robot = self._robot
-        led = [arm for arm in robot.arms if arm in targets.tool_twist_in_world]
-        jacobian = generalized_jacobian(robot, state.q, *led)
-        twists = [targets.tool_twist_in_world[arm] for arm in led]
-        wanted = np.concatenate([part for t in twists for part in (t.linear, t.angular)])
-        columns = np.concatenate([np.arange(robot.n_joints)[robot.arm_joints[arm]] for arm in led])
-        free = jacobian[:, columns]
-        rest = wanted - jacobian @ velocity  # the other arms move the tool through the base
-        damped = free @ free.T + self._damping**2 * np.eye(rest.size)
-        result = np.array(velocity)
-        result[columns] = free.T @ np.linalg.solve(damped, rest)
-        return frozen(result)
 
 
 def goal_in_world(

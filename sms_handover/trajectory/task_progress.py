@@ -142,11 +142,6 @@ class TaskProgress:
         self._decisions = []
 
     @property
-    def failed(self) -> bool:
-        """Whether the task has failed."""
-        return self._failed
-
-    @property
     def ik_failures(self) -> tuple[int, int]:
         """The latest targets in a row that inverse kinematics has not reached, and the number that fails."""
         return self._ik_failures, 0 if self._failed else self._most_ik_failures
@@ -155,8 +150,8 @@ class TaskProgress:
         """Record how many of the latest targets in a row were not reached."""
         self._ik_failures = ik_failures
 
-    def quiet_from(self, stamp_ns: int) -> tuple[Phase, int, int] | None:
-        """Return the present phase, its start and its end, None if a decision may be due at this time.
+    def quiet_from(self, stamp_ns: int) -> int | None:
+        """Return the end of the present phase, None if a decision may be due at this time.
 
         Up to the end of the phase none is due as long as no grasp is commanded and not too many targets are
         out of reach.
@@ -168,7 +163,7 @@ class TaskProgress:
         phase, shift_ns = self._schedule.phases[index], self._shift_ns
         end_ns = self._end_ns if failed else phase.end_ns + shift_ns
         start_ns = phase.start_ns + shift_ns
-        return (phase, start_ns, end_ns) if failed or start_ns < stamp_ns < end_ns else None
+        return end_ns if failed or start_ns < stamp_ns < end_ns else None
 
     @property
     def awaits_grasps(self) -> bool:

@@ -11,6 +11,7 @@ from sms_handover.compiled.c_function import NativeFunction
 from sms_handover.compiled.inverse_kinematics import CompiledIk
 from sms_handover.compiled.kinematics import CompiledKinematics
 from sms_handover.compiled.library import dynamics_library
+from sms_handover.compiled.tool_motion import CompiledToolMotion
 from sms_handover.ik.levenberg_marquardt import Solution, find_joints
 from sms_handover.model.description import load_robot
 from sms_handover.model.poses import pose_distance
@@ -21,7 +22,9 @@ from sms_handover.simulation import loop
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.simulation.wiring import make_ik
-from sms_handover.types import Array, IkRequest, IkStatus, Pose
+from sms_handover.trajectory.time_law import Progress
+from sms_handover.trajectory.tool_motion import PinocchioToolMotion
+from sms_handover.types import Array, IkRequest, IkStatus, Pose, Twist
 
 from .conftest import Draw
 from .robots import someone_else
@@ -76,6 +79,32 @@ def test_tools_deputy_and_momenta_are_those_of_pinocchio(make: Callable[[], Robo
         assert one.twist_deputy_in_world.linear == pytest.approx(
             other.twist_deputy_in_world.linear, abs=10 * _ROUNDING
         )
+
+
+def test_paths_and_rates_of_tools_are_those_of_pinocchio(robot: RobotModel) -> None:
+    """From small turns to nearly half a one; one arm led, or both, with the other one in motion."""
+    draw = Draw(robot, seed=10)
+    ours, theirs = CompiledToolMotion(robot), PinocchioToolMotion(robot)
+    for distance in (1e-9, 1e-3, 0.1, 1.0, 1.7):
+        start = draw.pose()
+        goal = draw.near(start, distance)
+        for progress in (Progress(0.0, 0.0), Progress(0.3, 0.7), Progress(1.0, 0.0)):
+            (pose, twist), (expected, their_twist) = (
+                m.on_path(start, goal, progress) for m in (ours, theirs)
+            )
+            assert max(pose_distance(pose, expected)) < 10 * _ROUNDING
+            assert twist.linear == pytest.approx(their_twist.linear, abs=10 * _ROUNDING)
+            assert twist.angular == pytest.approx(their_twist.angular, abs=10 * _ROUNDING)
+        q, velocity = draw.q(), draw.vector(robot.n_joints, 0.1)
+        twists = {arm: Twist(draw.vector(3, 0.1), draw.vector(3, 0.1)) for arm in robot.arms}
+        for led in (robot.arms, robot.arms[1:]):
+            wanted = {arm: twists[arm] for arm in led}
+            found, rates = (m.resolved(q, wanted, velocity, 0.05) for m in (ours, theirs))
+            assert found == pytest.approx(rates, abs=1e-11)
+            others = np.ones(robot.n_joints, dtype=bool)
+            for arm in led:
+                others[robot.arm_joints[arm]] = False
+            assert np.array_equal(found[others], velocity[others])
 
 
 def test_sine_and_cosine_are_right_to_the_last_digit(robot: RobotModel) -> None:

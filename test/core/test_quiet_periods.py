@@ -1,5 +1,8 @@
 """Quiet periods: many reference periods in one call give the bits of one period after the other."""
 
+import gc
+import sys
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -7,16 +10,19 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sms_handover.compiled.c_function import CFunction, NativeFunction
+from sms_handover.control.protocol import Guidance
 from sms_handover.run_data import RunData
 from sms_handover.simulation import loop as loop_module
 from sms_handover.simulation.loop import Loop
-from sms_handover.simulation.period_runner import PythonRunner
+from sms_handover.simulation.period_runner import PeriodRunner, PythonRunner
 from sms_handover.simulation.quiet_periods import QuietPeriods
 from sms_handover.simulation.recorder import RunRecorder
 from sms_handover.simulation.scenario import Overrides, Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.simulation.snapshot import plain
-from sms_handover.types import GraspStatus
+from sms_handover.simulation.wiring import make_controller, make_plant, make_runner
+from sms_handover.types import GraspStatus, JointReference, TaskPhase
 
 from .conftest import SCHEDULE
 from .retried_handover import LAWS, retried_handover
@@ -40,6 +46,16 @@ def python_loop(scenario: Scenario) -> Loop:
             loop_module, "make_runner", lambda plant, controller, *_: PythonRunner(plant, controller)
         )
         return Loop(scenario)
+
+
+def runner_of(scenario: Scenario) -> PeriodRunner:
+    """Return what carries out the ticks of a scenario, for a reference at rest."""
+    common, known = scenario.parameters.common, scenario.model
+    plant = make_plant(scenario.truth.robot, scenario.truth.schedule, common, scenario.parameters.plant)
+    controller = make_controller(known.robot, known.schedule, common, scenario.parameters.controller)
+    rest = JointReference(0, plant.state.joint_position, plant.state.joint_velocity)
+    controller.guide(Guidance(TaskPhase(0, 0, ""), rest, {}))
+    return make_runner(plant, controller, known.robot, common, scenario.parameters.plant)
 
 
 def rest_of(loop: Loop) -> tuple[RunData, int]:
@@ -157,9 +173,36 @@ def test_what_is_no_number_stays_none(tmp_path: Path) -> None:
         assert np.array_equal(found, expected, equal_nan=True), name
 
 
-def test_the_work_of_a_quiet_phase() -> None:
-    """Python takes part at its beginning and at its end alone."""
+@pytest.mark.parametrize("time_law", ["step", "quintic"])
+def test_the_work_of_a_quiet_phase(time_law: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python takes part at its beginning and at its end alone, and there has few calls into C."""
     short = {"schedule.phases.approach.duration": 2.0, "schedule.phases.approach.motion": 1.0}
-    values = {"common.dynamics": "compiled", "common.duration": 1.9, "trajectory.time_law": "step", **short}
-    _, calls = rest_of(Loop(load_scenario(values=values)))
-    assert calls == 3  # the first period, all others, and the last state
+    values = {"common.dynamics": "compiled", "common.duration": 1.9, "trajectory.time_law": time_law, **short}
+    loop = Loop(load_scenario(values=values))
+    entered: Counter[str] = Counter()
+    for kind in (NativeFunction, CFunction):
+
+        def counted(self: Any, *arguments: Any, call: Any = kind.__call__, name: str = kind.__name__) -> Any:
+            entered[name] += 1
+            return call(self, *arguments)
+
+        monkeypatch.setattr(kind, "__call__", counted)
+    loop.advance_period()
+    assert entered.total() <= 7, entered  # tools, momenta, path, inverse kinematics, other arm, ticks
+    entered.clear()
+    _, calls = rest_of(loop)
+    assert calls == 2  # the others, and the last state
+    assert entered["NativeFunction"] <= 7, entered
+
+
+def test_ticks_in_c_allocate_nothing() -> None:
+    """As many blocks for two thousand ticks as for twenty."""
+    run = runner_of(load_scenario(values={"common.dynamics": "compiled"}))
+    blocks = []
+    for ticks in (20, 20, 2000):
+        gc.collect()
+        before = sys.getallocatedblocks()
+        rows = run.run(ticks, ticks)
+        blocks.append(sys.getallocatedblocks() - before)
+        assert len(rows) == ticks
+    assert blocks[2] <= blocks[1] + 5
