@@ -97,7 +97,7 @@ checked begin at configurations without overlaps; about a third of random ones h
 ## Least distances in the shipped scenarios
 
 Signed distance in mm and when it was; **bold** is a collision: less than zero, or less than -1 mm where
-contact of gripper and deputy is declared: "contact". The columns are [scenario](scenarios.md) and control law.
+contact of gripper and deputy is declared: "contact". The columns are [scenario](scenarios.md) and law.
 
 {table(["Bodies", *runs], distances)}
 
