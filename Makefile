@@ -126,21 +126,21 @@ $(VENV)/.interfaces: $(VENV)/.environment $(INTERFACES) .ci/constraints.txt
 	@touch $@
 
 $(VENV)/.package: $(METADATA) | $(VENV)/.interfaces
-	$(PIP) --editable '.[analysis]'
+	$(PIP) --editable '.[analysis,ros]'
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.package
-	$(PIP) --editable '.[analysis,test]'
+	$(PIP) --editable '.[analysis,ros,test]'
 	@touch $@
 
 $(VENV)/.verify: $(VENV)/.test
-	$(PIP) --editable '.[analysis,test,verify]'
+	$(PIP) --editable '.[analysis,ros,test,verify]'
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.test
-	$(PIP) --editable '.[analysis,test,docs]'
+	$(PIP) --editable '.[analysis,ros,test,docs]'
 	@touch $@
 
 $(VENV)/.bench: $(VENV)/.verify
-	$(PIP) --editable '.[analysis,test,verify,bench]'
+	$(PIP) --editable '.[analysis,ros,test,verify,bench]'
 	@touch $@

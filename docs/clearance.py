@@ -111,8 +111,8 @@ pulls the deputy past it.
 
 {table(["Figure", *runs], limits)}
 
-Position and rate limits are reported, not enforced: the plant has no joint stops, and its motors no
-torque-speed line. A negative position is the distance from the nearest limit.
+Position and rate limits are reported, not enforced, unless `plant.joint_limits` is `enforce`
+([dynamics.md](dynamics.md)). A negative position is the distance from the nearest limit.
 """
 
 

@@ -19,12 +19,15 @@ from sms_handover.cli.main import _COMMANDS
 from sms_handover.configuration.scenario_file import COMMON
 from sms_handover.configuration.values import DOCUMENTS as DOCUMENTS_WITH_VALUES
 from sms_handover.configuration.values import ROLES
+from sms_handover.control.parameters import parameters_with
+from sms_handover.control.registry import law_named
 from sms_handover.graph.services import SERVICES
 from sms_handover.graph.topics import CONTROLLER, TF, graph_topics
 from sms_handover.ros.launching.launch_arguments import ARGUMENTS
 from sms_handover.ros.reference.interfaces import COMMON_GROUP, OWN_GROUPS, groups_of
 from sms_handover.simulation.scenario import load_scenario
 
+from .core.laws import offer
 from .documents import DOCUMENTS, SHELL, Block, anchors, blocks, commands, inline_code, links
 from .workspace import PACKAGE, ROOT, executables
 
@@ -108,8 +111,11 @@ def check_ours(words: list[str]) -> None:
             continue
         groups = {"common": COMMON_GROUP, **OWN_GROUPS}
         require([node], groups, "node")
-        theirs = node == CONTROLLER and getattr(options, "own_controller", None)
-        cls = TaskSpaceGains if theirs else groups[node].cls  # the pages start our example
+        cls = groups[node].cls
+        if node == CONTROLLER and getattr(options, "own_controller", None):
+            cls = TaskSpaceGains  # the pages start our example
+        elif node == CONTROLLER and options.controller:
+            cls = parameters_with(law_named(options.controller))
         require([name], [item.name for item in fields(cls)], f"parameter of {node}")
 
 
@@ -158,6 +164,12 @@ def require(names: Iterable[str], known: Iterable[str], what: str) -> None:
     for name in names:
         if name not in list(known):
             raise Refused(f"{name!r} is no {what}")
+
+
+@pytest.fixture(autouse=True)
+def law_of_the_example(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The pages install it."""
+    monkeypatch.syspath_prepend(offer(tmp_path_factory.mktemp("site"), "my_law", joint_pd="my_law:LAW"))
 
 
 def place(block: Block) -> str:

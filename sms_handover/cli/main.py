@@ -94,8 +94,8 @@ def _prepare_ros(name: str, arguments: Sequence[str]) -> None:
         import_module("rclpy")
     except ImportError as error:
         raise ConfigurationError(
-            f"ROS cannot be imported: {' '.join(str(error).split())}; install the package with its wheels, "
-            "and unset PYTHONPATH and LD_LIBRARY_PATH if another ROS is sourced"
+            f"this needs ROS, which cannot be imported: {' '.join(str(error).split())}; install the extra "
+            "'ros' (docs/install.md), and unset PYTHONPATH and LD_LIBRARY_PATH if another ROS is sourced"
         ) from error
 
 

@@ -19,12 +19,9 @@ from sms_handover.model.shapes import (
     Sphere,
 )
 
-_KINDS = ("box", "cylinder", "capsule", "sphere", "mesh")
-
 
 def read_shapes(section: Section) -> dict[str, Shapes]:
     """Return the solids in a section ``clearance`` by link; raises RobotDescriptionError."""
-    section.only((), optional=("shapes", "allow", "count"))
     if "shapes" not in section:
         return {}
     links = section.section("shapes")
@@ -37,28 +34,21 @@ def read_contact_pairs(section: Section) -> ContactPairs:
 
 
 def _shape(section: Section) -> Shape:
-    """Return one shape: exactly one kind, and an origin unless it is that of the link."""
-    section.only((), optional=(*_KINDS, "origin"))
-    kinds = [key for key in section.keys if key in _KINDS]
-    if len(kinds) != 1:
-        raise section.error(f"a shape has {len(kinds)} kinds, must have 1 of {', '.join(_KINDS)}")
+    """Return one shape, at the origin of its link unless it has one of its own."""
+    kind = section.one_of("a shape")
     origin = read_origin(section.section("origin")) if "origin" in section else AT_ORIGIN
-    return Shape(_geometry(section, kinds[0]), origin)
+    return Shape(_geometry(section, kind), origin)
 
 
 def _geometry(section: Section, kind: str) -> Geometry:
     if kind == "box":
-        return Box(section.vector("box", 3, "m", above=0.0))
+        return Box(section.vector("box"))
     inner = section.section(kind)
     if kind == "mesh":
-        inner.only(("file",), optional=("scale",))
-        scale = inner.vector("scale", 3, above=0.0) if "scale" in inner else (1.0, 1.0, 1.0)
-        return Mesh(_uri(inner), scale)
+        return Mesh(_uri(inner), inner.vector("scale") if "scale" in inner else (1.0, 1.0, 1.0))
     if kind == "sphere":
-        inner.only(("radius",))
-        return Sphere(inner.number("radius", "m", above=0.0))
-    inner.only(("radius", "length"))
-    radius, length = (inner.number(key, "m", above=0.0) for key in ("radius", "length"))
+        return Sphere(inner.number("radius"))
+    radius, length = inner.number("radius"), inner.number("length")
     return Cylinder(radius, length) if kind == "cylinder" else Capsule(radius, length)
 
 

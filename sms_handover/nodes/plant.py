@@ -218,6 +218,8 @@ class PlantNode(GraphNode[PlantParameters]):
         self._outputs.publish_rest(self._plant, with_reference=with_reference)
         if with_reference:
             self._clearance.state_published(self._plant)
+        if excesses := self._plant.take_excesses():
+            self.events.publish_all(excesses)
 
     def _resend(self) -> None:
         """Publish the state of this tick again if nothing has answered it for a while (lock step).
@@ -336,6 +338,8 @@ class PlantNode(GraphNode[PlantParameters]):
 
     def restart(self) -> None:
         """End this run and wait for the next one at time zero."""
+        if not self.finished:
+            self.events.publish_all(self._plant.end_excesses())
         self.enter(RunState.WAITING, "reset")
         if not self.finished:
             self.membership.end()
@@ -360,6 +364,7 @@ class PlantNode(GraphNode[PlantParameters]):
         """End the run and publish what real time has cost; every node then publishes its counts."""
         if not self.lockstep and self._loop_clock.misses:
             detail = f"{detail}; {self._loop_clock.misses}"
+        self.events.publish_all(self._plant.end_excesses())
         self.membership.finished = True
         self.enter(state, detail)
         self.membership.end()

@@ -33,9 +33,10 @@ from sms_handover.types import (
 class Period:
     """What is worked out once per reference period, at the instant at which it begins.
 
-    Tool poses and targets are in ``world``; ``work`` J is that of the joint efforts since the start;
-    ``ik_status`` is None where no tool had a target. ``events`` has what came of grasp commands,
-    ``decisions`` what was decided about the task. ``clearance`` is None unless it is measured online.
+    Tool poses and targets are in ``world``; ``work`` J is that of the joint efforts since the start, less
+    what joint stops have taken; ``ik_status`` is None where no tool had a target. ``events`` has what came
+    of grasp commands, ``decisions`` what was decided about the task. ``clearance`` is None unless it is
+    measured online.
     """
 
     phase: TaskPhase
@@ -55,7 +56,8 @@ class Observation(NamedTuple):
     """One tick: the state at ``stamp_ns``, and the efforts (n,) N m that answer it.
 
     ``q`` (7 + n,), ``v`` (6 + n,) and ``joint_effort`` (n,) are those of :attr:`state`. ``period`` is there
-    at the instants at which a reference period begins.
+    at the instants at which a reference period begins. ``excesses`` tells of limits of the joints that were
+    exceeded, once that is over.
     """
 
     stamp_ns: int
@@ -65,6 +67,7 @@ class Observation(NamedTuple):
     effort: Array
     guidance: Guidance
     period: Period | None
+    excesses: tuple[RunEvent, ...] = ()
 
     @property
     def phase(self) -> TaskPhase:
@@ -166,13 +169,15 @@ class Loop:
         if self.finished:
             raise ConfigurationError(f"the run ended at {plant.stamp_ns} ns: reset or restore the loop first")
         tick, stamp_ns, q, v, acted = plant.tick, plant.stamp_ns, plant.q, plant.v, plant.joint_effort
+        excesses = plant.take_excesses()
         period = None if tick % self._per_reference else self._begin_period()
         effort = self._controller.effort(stamp_ns, q, v)
         if tick < self.last_tick:
             plant.apply(effort)
         else:
             self.finished = True
-        return Observation(stamp_ns, q, v, acted, effort, self._guidance, period)
+            excesses += plant.end_excesses()
+        return Observation(stamp_ns, q, v, acted, effort, self._guidance, period, excesses)
 
     def advance_period(self) -> tuple[Observation, ...]:
         """Carry out the ticks up to the next reference period, or to the end of the run."""
@@ -238,5 +243,15 @@ class Loop:
         self.last_tick = self._common.last_tick(phase.end_ns, failed=phase.failed)
         decisions = generator.take_decisions()
         return Period(
-            phase, reference, aims, tools, deputy, conserved, plant.work, status, events, decisions, clearance
+            phase,
+            reference,
+            aims,
+            tools,
+            deputy,
+            conserved,
+            plant.net_work,
+            status,
+            events,
+            decisions,
+            clearance,
         )

@@ -35,6 +35,10 @@ class Snapshot:
     finished: bool
     clearance: MonitorState | None
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the JSON form: read-only mappings have no pickled form of their own."""
+        return structured, (Snapshot, plain(self))
+
 
 def save_snapshot(snapshot: Snapshot, path: Path) -> None:
     """Write a snapshot as JSON; raises ConfigurationError if the file exists or cannot be written."""

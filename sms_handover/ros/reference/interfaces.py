@@ -4,13 +4,13 @@
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any, get_type_hints
+from dataclasses import dataclass
+from typing import Any
 
 from sms_handover.bag.parameters import RecorderParameters, TopicRecorderParameters
 from sms_handover.bag.qos import History
 from sms_handover.configuration.package_files import config_file
-from sms_handover.configuration.parameters import EVERY_NODE, ParameterSpec, read_parameter_files, spec_of
+from sms_handover.configuration.parameters import EVERY_NODE, read_parameter_files, specs_of
 from sms_handover.control.parameters import ControllerParameters
 from sms_handover.graph.services import SERVICES, Service
 from sms_handover.graph.topics import (
@@ -97,17 +97,16 @@ def parameter_rows(group: ParameterGroup) -> tuple[ParameterRow, ...]:
 
 def rows_of(cls: type[Any], defaults: Mapping[str, object]) -> tuple[ParameterRow, ...]:
     """Return the parameters of a dataclass, with their defaults by name."""
-    hints = get_type_hints(cls)
     return tuple(
         ParameterRow(
-            name=item.name,
-            type=_TYPES[hints[item.name]],
-            default=_value(defaults[item.name]),
-            unit=spec_of(item).unit.replace("-", ""),
-            allowed=_allowed(spec_of(item)),
-            description=spec_of(item).description,
+            name=name,
+            type=_TYPES[spec.kind],
+            default=_value(defaults[name]),
+            unit=spec.unit.replace("-", ""),
+            allowed=spec.allowed,
+            description=spec.description,
         )
-        for item in fields(cls)
+        for name, spec in specs_of(cls).items()
     )
 
 
@@ -149,15 +148,3 @@ def _value(value: object) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(map(str, value)) + "]"
     return "''" if value == "" else str(value)
-
-
-def _allowed(spec: ParameterSpec) -> str:
-    """Return the values allowed in words; '' if every value of the type is."""
-    if spec.choices:
-        return " | ".join(spec.choices)
-    bounds = []
-    if spec.minimum is not None:
-        bounds.append(f"at least {spec.minimum:.15g}")
-    if spec.maximum is not None:
-        bounds.append(f"at most {spec.maximum:.15g}")
-    return ", ".join(bounds)
