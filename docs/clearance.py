@@ -102,10 +102,10 @@ contact of gripper and deputy is declared: "contact". The columns are control la
 {table(["Bodies", *runs], distances)}
 
 **The shipped task collides.** Under step targets both laws press a gripper into the deputy, and under PID
-the grippers pass through each other. The simulation has no contact forces, so the run goes on and the
-paper's claims are judged as if nothing had touched; read them with this table beside them. With smooth
-(quintic) targets the grippers stay 140 mm apart; what is left is that arm A stands in the way while arm B
-pulls the deputy past it.
+the grippers pass through each other. The simulation has no contact forces, so the run goes on; `compare`
+says that it is not complete, and of the paper's claims *completion* does not hold. With smooth (quintic)
+targets the grippers stay 140 mm apart; what is left is that arm A stands in the way while arm B pulls the
+deputy past it.
 
 ## Limits of the joints
 

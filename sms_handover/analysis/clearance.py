@@ -1,16 +1,18 @@
 """The clearance of a run: how near bodies came to each other, when, and whether they might touch."""
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sms_handover.analysis.clearance_series import ClearanceSeries, SeriesOfGroups
 from sms_handover.analysis.grasps import holds
 from sms_handover.clearance.contacts import CONTACT_DEPTH, GraspContact, Group, contacts_of, fixed_groups
 from sms_handover.clearance.distances import ClearanceModel
 from sms_handover.clearance.solids import MissingMeshError, require_meshes
+from sms_handover.clearance.worst_pair import NearestRecord
 from sms_handover.errors import RobotDescriptionError, ScheduleError, UnknownNameError
 from sms_handover.frames import tool_frame
 from sms_handover.model.floating_model import floating_model, joint_columns
@@ -50,9 +52,10 @@ class GroupClearance:
 
 @dataclass(frozen=True)
 class RunClearance:
-    """The clearance of every group of bodies of a run, the worst one first."""
+    """The clearance of every group of bodies of a run, the worst one first, and its course over time."""
 
     groups: tuple[GroupClearance, ...]
+    series: ClearanceSeries | None = field(default=None, compare=False, repr=False)
 
     @property
     def collisions(self) -> tuple[GroupClearance, ...]:
@@ -96,14 +99,16 @@ def run_clearance(run: RunData, texts: TaskTexts) -> RunClearance:
     """
     course = _Course(run, texts)
     sampled = course.sampled()
-    found = []
+    found, series = [], SeriesOfGroups(sampled)
     for group, members in course.groups(sampled).items():
         pair, rows = min(members, key=lambda member: float(sampled[member[1], member[0]].min()))
         least, stamp_ns = course.refined(pair, rows, sampled[:, pair])
         one, other = course.model.pairs[pair]
         allowed = group.allowed(texts.contact_depth)
         found.append(GroupClearance(group.label, least, allowed, stamp_ns, (one.name, other.name)))
-    return RunClearance(tuple(sorted(found, key=lambda group: group.margin)))
+        series.add(group.label, allowed, found[-1].margin, members)
+    worst_first = tuple(sorted(found, key=lambda group: group.margin))
+    return RunClearance(worst_first, course.series(series, texts.contact_depth))
 
 
 class _Course:
@@ -113,6 +118,7 @@ class _Course:
         self._pin = floating_model(texts.urdf)
         self._run, self._data = run, self._pin.createData()
         self.model = ClearanceModel(self._pin, texts.urdf, run.arms, deputy_size(texts.schedule))
+        self._nearest = NearestRecord(self.model)
         self._columns = joint_columns(self._pin, run.joint_names)
         usable = np.isfinite(run.deputy_pose).all(axis=1)
         ticks = np.searchsorted(run.tick_ns, run.reference_ns)
@@ -127,9 +133,16 @@ class _Course:
 
     def sampled(self) -> Array:
         """Return the distances (M, pairs) m at the reference periods."""
-        return np.array(
-            [self.model.distances(self._q(tick), self._deputy(row)) for row, tick in enumerate(self._ticks)]
-        ).reshape(self._ticks.size, len(self.model.pairs))
+        distances = np.empty((self._ticks.size, len(self.model.pairs)))
+        for row, tick in enumerate(self._ticks):
+            distances[row] = self.model.distances(self._q(tick), self._deputy(row))
+            self._nearest.keep(distances[row])
+        return distances
+
+    def series(self, groups: SeriesOfGroups, contact_depth: float) -> ClearanceSeries:
+        """Return the sampled distances over time, with the worst pair of each reference period."""
+        worst = self._nearest.worst(self._stamps, groups.sampled, groups.declared, contact_depth)
+        return ClearanceSeries(self._stamps, groups.groups(), groups.allowed, worst)
 
     def groups(self, sampled: Array) -> dict[Group, list[tuple[int, Rows]]]:
         """Return the pairs that count to each group, and in which of the sampled periods they do."""

@@ -25,7 +25,7 @@ def counted_pairs(
     pairs = [
         (first, second)
         for first, second in combinations(range(geometry.ngeoms), 2)
-        if not _joined(model, geometry, first, second)
+        if not joined(model, geometry, first, second)
     ]
     touching = _always_touching(model, geometry, pairs)
     derived = set(pairs) - touching
@@ -38,7 +38,7 @@ def counted_pairs(
     ]
 
 
-def _joined(model: pin.Model, geometry: pin.GeometryModel, first: int, second: int) -> bool:
+def joined(model: pin.Model, geometry: pin.GeometryModel, first: int, second: int) -> bool:
     """Whether two bodies are fixed to each other, or are neighbours along a chain of links."""
     one, other = geometry.geometryObjects[first], geometry.geometryObjects[second]
     if one.parentJoint == other.parentJoint:

@@ -1,12 +1,12 @@
 """Fields of the files that describe a robot: robot.yaml, and the file of an arm that it names."""
 
+from sms_handover.configuration.clearance_fields import clearance_fields
 from sms_handover.configuration.field_specification import (
     FLOATS,
     EitherSpec,
     ListSpec,
     MappingSpec,
     NamedSpec,
-    Spec,
     ValueSpec,
     text,
     vector,
@@ -99,34 +99,8 @@ _ARM = MappingSpec(
         )
     },
 )
-_RADIUS = ValueSpec("radius", "m", above=0.0)
-_ROUND = {"radius": _RADIUS, "length": ValueSpec("length along z", "m", above=0.0)}
-_KINDS: dict[str, Spec] = {
-    "box": _EDGES,
-    "cylinder": MappingSpec("a cylinder along z", _ROUND),
-    "capsule": MappingSpec("all points within a radius of a line along z", _ROUND),
-    "sphere": MappingSpec("a sphere", {"radius": _RADIUS}),
-    "mesh": MappingSpec(
-        "the convex hull of a mesh",
-        {"file": text("path relative to this file, or package:// name")},
-        {"scale": vector(3, "factors of its coordinates", above=0.0)},
-    ),
-}
-_SHAPE = MappingSpec(
-    "a solid",
-    optional={**_KINDS, "origin": pose("frame of the solid in its link")},
-    one_of=tuple(_KINDS),
-)
-_CLEARANCE = MappingSpec(
-    "solids, and pairs of links that may touch",
-    optional={
-        "shapes": NamedSpec("solids in place of what is drawn, by link", ListSpec("solids", _SHAPE)),
-        "allow": ValueSpec("pairs of links whose contact does not count", kind=object),
-        "count": ValueSpec("pairs of links whose contact counts, whatever is derived", kind=object),
-    },
-)
 ROBOT_FIELDS = MappingSpec(
     "a free-floating spacecraft with arms",
     {"name": text("name of the robot"), "base": _BASE, "arms": ListSpec("the arms, one or more", _ARM)},
-    {"clearance": _CLEARANCE},
+    {"clearance": clearance_fields(pose("frame of the shape in its link"))},
 )

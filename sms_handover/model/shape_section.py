@@ -34,7 +34,7 @@ def read_contact_pairs(section: Section) -> ContactPairs:
 
 
 def _shape(section: Section) -> Shape:
-    """Return one shape, at the origin of its link unless it has one of its own."""
+    """Return one shape: exactly one kind, and an origin unless it is that of the link."""
     kind = section.one_of("a shape")
     origin = read_origin(section.section("origin")) if "origin" in section else AT_ORIGIN
     return Shape(_geometry(section, kind), origin)
@@ -45,7 +45,8 @@ def _geometry(section: Section, kind: str) -> Geometry:
         return Box(section.vector("box"))
     inner = section.section(kind)
     if kind == "mesh":
-        return Mesh(_uri(inner), inner.vector("scale") if "scale" in inner else (1.0, 1.0, 1.0))
+        scale = inner.vector("scale") if "scale" in inner else (1.0, 1.0, 1.0)
+        return Mesh(_uri(inner), scale)
     if kind == "sphere":
         return Sphere(inner.number("radius"))
     radius, length = inner.number("radius"), inner.number("length")

@@ -216,10 +216,10 @@ class PlantNode(GraphNode[PlantParameters]):
         self._outputs.publish_loop(self._plant, with_reference=with_reference)
         self._loop_clock.published()
         self._outputs.publish_rest(self._plant, with_reference=with_reference)
-        if with_reference:
-            self._clearance.state_published(self._plant)
         if excesses := self._plant.take_excesses():
             self.events.publish_all(excesses)
+        if with_reference:
+            self._clearance.state_published(self._plant)
 
     def _resend(self) -> None:
         """Publish the state of this tick again if nothing has answered it for a while (lock step).

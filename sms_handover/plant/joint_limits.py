@@ -11,7 +11,7 @@ from sms_handover.types import Array
 from sms_handover.units import ns_to_seconds
 
 REPORT, ENFORCE = "report", "enforce"
-_BLOCK = 20  # [states] looked at together
+_BLOCK = 100  # [states] looked at together
 _QUIET_NS = 100_000_000  # [ns] own choice: excesses of one limit that are less apart are one
 
 

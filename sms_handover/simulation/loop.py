@@ -124,7 +124,7 @@ class Loop:
         elif CONTROLLER in self._common.external:
             raise ConfigurationError(
                 "the controller is external: give simulate() a controller, "
-                "or check a recording with 'sms-handover play --closed-loop'"
+                "or check a recording with 'sms-handover verify --with plant'"
             )
         else:
             self.law = parameters.controller.law

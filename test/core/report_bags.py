@@ -39,7 +39,7 @@ def write_bag(
     """Write the bag of a run with the files and records given, and return its folder."""
     with Recording(folder, types=TYPES) as recording:
         recording.describe(urdf=urdf, schedule=schedule, parameters=values, provenance=origin)
-        open_topics(recording)
+        open_topics(recording, arms=run.arms)
         record_run(recording, run)
     return folder
 

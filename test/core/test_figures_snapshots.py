@@ -136,6 +136,8 @@ def test_a_link_has_the_colour_of_its_own_arm(drawn: DrawnRun) -> None:
         colours = [_colour(scene, f"{arm}_link_1", (0.0, 0.0, 0.0)) for arm in arms]
         assert colours == [_pale(colour) for colour in COLOURS[:2]]
         assert _colour(scene, "panel_1", (0.0, 0.0, 0.0)) == _pale((0.0, 0.0, 0.0))
+    many = Scene(**{**vars(drawn.scene), "arms": tuple(f"arm_{letter}" for letter in "abcdefgh")})
+    assert _pale(COLOURS[2]) not in [_colour(many, f"{arm}_link_1", (0.0, 0.0, 0.0)) for arm in many.arms]
 
 
 def test_traces_are_the_way_of_each_tool_since_the_picture_before(drawn: DrawnRun) -> None:

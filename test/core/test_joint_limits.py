@@ -286,9 +286,9 @@ def test_each_excess_is_told_once_with_its_figures() -> None:
         JointLimitWatch(Wheel(upper=0.1, velocity=1.0).robot, _MS), rates, positions
     )
     detail = "arm_joint_1 turned faster than the limit of its rate for 0.004 s, from 0.005 to 0.051 s"
-    assert (first.stamp_ns, first.kind, first.detail) == (160 * _MS, RATE_EXCEEDED, detail)
+    assert (first.stamp_ns, first.kind, first.detail) == (200 * _MS, RATE_EXCEEDED, detail)
     assert (first.value, first.limit, first.unit) == (2.0, 1.0, "rad/s")
-    assert (second.stamp_ns, second.value) == (420 * _MS, 1.01)
+    assert (second.stamp_ns, second.value) == (500 * _MS, 1.01)
     detail = "arm_joint_1 was beyond a limit of its position for 0.1 s, from 0.6 to 0.7 s"
     assert (third.stamp_ns, third.kind, third.detail) == (800 * _MS, POSITION_EXCEEDED, detail)
     assert (third.value, third.limit, third.unit) == (0.2, 0.1, "rad")

@@ -84,7 +84,7 @@ def test_a_law_of_a_small_package_is_as_one_of_ours(
     by_hand = simulate(scenario, controller=my_law.JointPd(setup))
     assert compare_runs(read_run(tmp_path / "mine" / "bag"), by_hand) == ()
     assert read_info(tmp_path / "mine" / "bag").parameters["controller"]["frequency"] == 1.2
-    assert sms_handover("reproduce", "mine", cwd=tmp_path).code == 0
+    assert sms_handover("verify", "mine", cwd=tmp_path).code == 0
     ours = (recorded["nmpc"][0], recorded["pid"][0])
     assert called("compare", "mine", *ours, "--csv", "all.csv", cwd=tmp_path).code == 0
     runs = [line.partition(",")[0] for line in (tmp_path / "all.csv").read_text().splitlines()[1:]]
@@ -140,10 +140,10 @@ def test_its_commands_can_be_played_into_a_plant_but_not_made_again(
     own: dict[str, tuple[Path, Ended]], tmp_path: Path, called: Command
 ) -> None:
     folder, _ = own["helped"]
-    again = called("reproduce", folder, cwd=tmp_path)
+    again = called("verify", folder, cwd=tmp_path)
     assert again.code == 2
-    assert again.errors[0].endswith("check a recording with 'sms-handover play --closed-loop'")
-    played = sms_handover("play", folder, "--closed-loop", cwd=tmp_path)
+    assert again.errors[0].endswith("check a recording with 'sms-handover verify --with plant'")
+    played = sms_handover("verify", folder, "--with", "plant", cwd=tmp_path)
     assert played.code == 0, played
     assert f"the same bit for bit as recorded: {TICKS} states" in played.out
 

@@ -30,7 +30,7 @@ _UNDER_WAY = 0.125  # [-] of a phase, when its motion is under way
 _MARGIN = 0.15  # [m] around arms and deputy
 _CAMERA = Camera(radians(60.0), radians(40.0))
 _LIGHT = np.array([0.48, -0.36, 0.8])  # unit vector towards the sun
-_DEPUTY = COLOURS[2]
+_DEPUTY, _ARMS = COLOURS[2], COLOURS[:2] + COLOURS[3:]
 _PALE = 0.45  # [-] share of white in the colour of an arm, so that its trace stands out
 
 Colour = tuple[float, float, float]
@@ -98,7 +98,7 @@ def _draw_traces(axes: Axes, scene: Scene, before: int, frame: int) -> None:
     """Draw the path of each tool since the previous snapshot."""
     for place, arm in enumerate(scene.arms):
         trace = _CAMERA.seen(scene.tool(arm)[before : frame + 1, :3])
-        axes.plot(*trace.T, color=COLOURS[place], linewidth=1.0, gid=f"{arm}/trace")
+        axes.plot(*trace.T, color=_of_arm(place), linewidth=1.0, gid=f"{arm}/trace")
 
 
 def _window(scene: Scene, frames: list[int]) -> tuple[Array, Array]:
@@ -128,12 +128,12 @@ def _title(scene: Scene, frame: int) -> str:
 def _add_key(axes: Axes, arms: Sequence[str], title: str) -> None:
     """Show in an empty panel the meaning of the colours and the directions of the world axes."""
     handles: list[Patch | Line2D] = [
-        Patch(color=_pale(COLOURS[place]), label=in_print(arm)) for place, arm in enumerate(arms)
+        Patch(color=_pale(_of_arm(place)), label=in_print(arm)) for place, arm in enumerate(arms)
     ]
     handles.append(Patch(color=_DEPUTY, label="deputy"))
     handles.append(Line2D([], [], color=MUTED, linewidth=1.0, label="path of a tool"))
     axes.legend(handles=handles, title=title, loc="upper left", borderpad=0.0)
-    origin = (0.74, 0.4)
+    origin = (0.82, 0.4)
     for name, (right, up) in zip("xyz", 0.2 * _CAMERA.seen(np.eye(3)), strict=True):
         axes.annotate(
             "",
@@ -150,7 +150,12 @@ def _colour(scene: Scene, link: str, described: Colour) -> Colour:
     """Return the colour of a link: that of its arm, or what the description says."""
     of_link = [arm for arm in scene.arms if link.startswith(f"{arm}_")]
     arm = max(of_link, key=len, default=None)  # that of arm_b_link_1 is arm_b, not arm
-    return _pale(described if arm is None else COLOURS[scene.arms.index(arm)])
+    return _pale(described if arm is None else _of_arm(scene.arms.index(arm)))
+
+
+def _of_arm(place: int) -> str:
+    """Return the colour of an arm by its index: not that of the deputy, however many arms there are."""
+    return _ARMS[place % len(_ARMS)]
 
 
 def _pale(colour: str | Colour) -> Colour:
