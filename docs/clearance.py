@@ -15,7 +15,8 @@ from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
 _WHEN = [
     (
         "before",
-        "`run` simulates the run in one process with the law, dynamics and model of the scenario: seconds. "
+        "`check` and `run` simulate the run in one process with the law, dynamics and model of the "
+        "scenario: seconds. "
         "`--no-dry-run` leaves it out; a controller of your own has none",
         "a warning with bodies, time and depth; with `--reject-collisions` exit code 2, nothing is started",
     ),

@@ -183,6 +183,8 @@ def test_collisions_are_told_before_a_run_and_may_be_rejected(
     done = called("run", "--reject-collisions", "--schedule", schedule, "-o", "out", cwd=tmp_path)
     assert done.code == 2 and f"error: bodies collide from 0.86 s on, {worst}" in done.err
     assert tree(tmp_path) == {}
+    done = called("check", "--reject-collisions", "--schedule", schedule, cwd=tmp_path)
+    assert done.code == 2 and worst in done.err and "can be run" not in done.out
     for options, code in (((), 0), (("--reject-collisions",), 1)):
         done = called("simulate", *options, "--schedule", schedule, cwd=tmp_path)
         assert done.code == code and f"warning: bodies collide, {worst}" in done.err
