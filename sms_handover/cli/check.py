@@ -6,6 +6,7 @@ from enum import Enum
 from math import degrees
 from pathlib import Path
 
+from sms_handover.cli.collisions import add_dry_run_options, check_collisions
 from sms_handover.cli.columns import columns
 from sms_handover.cli.options import add_scenario_options, scenario_of
 from sms_handover.configuration.sections import Section
@@ -33,7 +34,7 @@ def add_parser(parser: ArgumentParser) -> None:
     """Describe the command."""
     parser.formatter_class = RawDescriptionHelpFormatter
     parser.description = (
-        "Check whether a scenario can be run, without running it: every value, every target in reach,\n"
+        "Check whether a scenario can be run, without starting it: every value, every target in reach,\n"
         "every grasp at its frame, the sampled loop stable where each phase ends. SCENARIO may also be a\n"
         "file with a schedule or with parameters, checked in the default scenario, or with a robot."
     )
@@ -45,6 +46,7 @@ def add_parser(parser: ArgumentParser) -> None:
         "exit codes: 0 it can be run; 2 it cannot, and one line says why"
     )
     add_scenario_options(parser)
+    add_dry_run_options(parser)
 
 
 def command(options: Namespace) -> int:
@@ -64,6 +66,7 @@ def command(options: Namespace) -> int:
         options.params_file = [*options.params_file, file]
     scenario = scenario_of(options, recorded=True)
     print(_ends(scenario, check_scenario(scenario)))
+    check_collisions(scenario, options)
     print(f"\n{_of_whom(scenario, kind, name)} can be run")
     return 0
 
