@@ -93,6 +93,7 @@ setup(
         "test": [
             "casadi>=3.7,<4",
             "hypothesis>=6.140,<7",  # draws the inputs of the fuzzers
+            "jsonschema>=4.26,<5",  # validates files against the schemas for editors
             "mcap-ros2-support>=0.5.7,<1",
             "mypy>=1.15",
             "playwright>=1.50,<2",  # drives a Chromium that the machine has

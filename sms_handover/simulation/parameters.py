@@ -32,7 +32,7 @@ class CommonParameters:
     schedule: str = parameter("path of a task schedule; empty: that of the scenario")
     values: tuple[str, ...] = parameter(
         "values of robot, deputy and schedule by dotted path on top of the files, such as "
-        "robot.base.mass:=300 or schedule.phases.carry.duration:=12; those of the plant alone begin with "
+        "robot.base.mass:=300 or schedule.phases.carry.duration:=30; those of the plant alone begin with "
         "truth, as in truth.robot.base.mass:=264, those of every other node with model"
     )
     seed: int = parameter("what every random number of the run follows from", minimum=0, maximum=2**53)
