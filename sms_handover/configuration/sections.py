@@ -137,10 +137,6 @@ class Section:
         """Return the number of a key, as its specification allows."""
         return float(self._checked(key))
 
-    def count(self, key: str) -> int:
-        """Return the whole number of a key."""
-        return int(self._checked(key))
-
     def vector(self, key: str, size: int | None = None) -> tuple[float, ...]:
         """Return the numbers of a key; ``size`` is how many where the specification does not say it."""
         numbers: tuple[float, ...] = self._checked(key, size)

@@ -106,7 +106,7 @@ def _on_miss(section: Section, commands: Sequence[GraspCommand], *, is_first: bo
             raise section.error(f"{key!r} needs the number of retries: write {{retry: 2}}", key)
         return OnMiss(MissAction(word))
     inner = section.section(key)
-    retries = inner.count(retry)
+    retries = int(inner.number(retry))
     if is_first:
         raise section.error("a retry repeats the phase before, but this is the first one", key)
     return OnMiss(MissAction.RETRY, retries)

@@ -116,10 +116,16 @@ def one_arm() -> Mapping:
     return content
 
 
+def schedules() -> Iterator[str]:
+    """Yield a schedule with every kind of target and event, and each thing to do about a miss."""
+    for word in ("continue", "abort", "{retry: 2}"):
+        yield SCHEDULE.replace("  - name: carry\n", f"  - name: carry\n    on_miss: {word}\n")
+
+
 KINDS = {
     "robot": Kind(read_robot, (one_arm(),)),
     "arm": Kind(read_arm, (read_yaml(config_file("gen3.yaml")),)),
-    "schedule": Kind(read_schedule, (read_yaml(config_file("handover.yaml")), load(SCHEDULE))),
+    "schedule": Kind(read_schedule, (read_yaml(config_file("handover.yaml")), *map(load, schedules()))),
     "parameters": Kind(read_parameters, (parameters(),)),
     "scenario": Kind(read_scenario, tuple(map(load, SCENARIOS))),
 }
