@@ -21,14 +21,14 @@ MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evi
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover figures report simulate test verify measure bench docs screenshots faults lowest cycles fuzz hostile soak reference clearance scenarios lint install colcon clean
+.PHONY: help handover figures report simulate test verify measure bench docs screenshots faults lowest cycles fuzz hostile soak reference clearance geometries scenarios lint install colcon clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 
 handover: install  ## hand the deputy over under NMPC, then PID, over DDS in lock step; record both; compare
-	$(BIN)/sms-handover run --controller nmpc --output $(RUNS)/nmpc --overwrite
-	$(BIN)/sms-handover run --controller pid --output $(RUNS)/pid --overwrite
+	$(BIN)/sms-handover run paper --controller nmpc --output $(RUNS)/nmpc --overwrite
+	$(BIN)/sms-handover run paper --controller pid --output $(RUNS)/pid --overwrite
 	$(BIN)/sms-handover compare $(RUNS)/nmpc $(RUNS)/pid
 
 figures: install  ## draw the paper's figures from the runs of `make handover`
@@ -87,6 +87,9 @@ screenshots: docs report  ## take the pictures of docs/images again: this site, 
 
 clearance: install  ## simulate the shipped handover under each law and write docs/clearance.md
 	$(BIN)/python -m docs.clearance
+
+geometries: install  ## try random possible geometries of the handover under both laws, write docs/geometries.md
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m docs.geometries
 
 scenarios: install  ## run every shipped scenario in one process and draw it again for docs/scenarios.md
 	$(BIN)/python -m docs.scenario_pictures
