@@ -34,16 +34,17 @@ def add_parser(parser: ArgumentParser) -> None:
     """Describe the command."""
     parser.formatter_class = RawDescriptionHelpFormatter
     parser.description = (
-        "Check whether a scenario can be run, without starting it: every value, every target in reach,\n"
-        "every grasp at its frame, the sampled loop stable where each phase ends. SCENARIO may also be a\n"
-        "file with a schedule or with parameters, checked in the default scenario, or with a robot."
+        "Check whether a scenario can be run: every value, every target in reach, every grasp at its frame,\n"
+        "the sampled loop stable where each phase ends; then by a dry run whether bodies collide. SCENARIO\n"
+        "may also be a file with a schedule or with parameters, checked in the default scenario, or with a\n"
+        "robot."
     )
     parser.epilog = (
         "Where the targets of a phase were found only after restarts, the run may end elsewhere.\n\n"
         "examples:\n"
         "  sms-handover check paper -p robot.base.mass:=120\n"
         "  sms-handover check mine.yaml\n\n"
-        "exit codes: 0 it can be run; 2 it cannot, and one line says why"
+        "exit codes: 0 it can be run; 2 it cannot, or bodies collide and that is to be rejected"
     )
     add_scenario_options(parser)
     add_dry_run_options(parser)
