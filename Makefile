@@ -21,7 +21,7 @@ MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evi
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover figures report simulate test verify measure bench docs screenshots faults lowest cycles fuzz hostile soak reference clearance scenarios lint install colcon clean
+.PHONY: help handover figures report simulate test verify measure bench docs screenshots faults lowest cycles fuzz hostile soak reference clearance geometries scenarios lint install colcon clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -32,7 +32,7 @@ handover: install  ## hand the deputy over under NMPC, then PID, over DDS in loc
 	$(BIN)/sms-handover compare $(RUNS)/nmpc $(RUNS)/pid
 
 figures: install  ## draw the paper's figures from the runs of `make handover`
-	$(BIN)/sms-handover figures $(RUNS)/nmpc $(RUNS)/pid --output $(FIGURES) --format pdf,png,svg
+	$(BIN)/sms-handover report $(RUNS)/nmpc $(RUNS)/pid --figures $(FIGURES) --format pdf,png,svg
 
 report: install  ## write an HTML page on the runs of `make handover`
 	$(BIN)/sms-handover report $(RUNS)/nmpc $(RUNS)/pid --output $(REPORT) --overwrite
@@ -88,6 +88,9 @@ screenshots: docs report  ## take the pictures of docs/images again: this site, 
 clearance: install  ## simulate the shipped handover under each law and write docs/clearance.md
 	$(BIN)/python -m docs.clearance
 
+geometries: install  ## try random possible geometries of the handover under both laws, write docs/geometries.md
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m docs.geometries
+
 scenarios: install  ## run every shipped scenario in one process and draw it again for docs/scenarios.md
 	$(BIN)/python -m docs.scenario_pictures
 
@@ -129,21 +132,21 @@ $(VENV)/.interfaces: $(VENV)/.environment $(INTERFACES) .ci/constraints.txt
 	@touch $@
 
 $(VENV)/.package: $(METADATA) | $(VENV)/.interfaces
-	$(PIP) --editable '.[analysis]'
+	$(PIP) --editable '.[analysis,ros]'
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.package
-	$(PIP) --editable '.[analysis,test]'
+	$(PIP) --editable '.[analysis,ros,test]'
 	@touch $@
 
 $(VENV)/.verify: $(VENV)/.test
-	$(PIP) --editable '.[analysis,test,verify]'
+	$(PIP) --editable '.[analysis,ros,test,verify]'
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.test
-	$(PIP) --editable '.[analysis,test,docs]'
+	$(PIP) --editable '.[analysis,ros,test,docs]'
 	@touch $@
 
 $(VENV)/.bench: $(VENV)/.verify
-	$(PIP) --editable '.[analysis,test,verify,bench]'
+	$(PIP) --editable '.[analysis,ros,test,verify,bench]'
 	@touch $@

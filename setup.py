@@ -66,10 +66,6 @@ setup(
     ],
     python_requires=">=3.10,<3.14",
     install_requires=[
-        "ros-jazzy-rclpy>=7.1.6,<7.2",
-        "ros-jazzy-common-interfaces>=5.3.6,<5.4",
-        "ros-jazzy-rmw-fastrtps-cpp>=8.4.3,<8.5",
-        "sms_handover_interfaces",
         "coal>=3.0.3,<4",
         "eigenpy>=3.13,<4",
         "lz4>=4.3,<5",
@@ -89,12 +85,21 @@ setup(
         ],
         "compiled": ["casadi>=3.7,<4"],  # writes the equations of motion out as C
         "matlab": ["scipy>=1.13,<2"],
+        "pandas": ["pandas>=2.2.2,<4"],
         "parquet": ["pyarrow>=18,<27"],
+        "ros": [  # the graph over DDS; sms_handover_interfaces is in interfaces/, in no index
+            "ros-jazzy-rclpy>=7.1.6,<7.2",
+            "ros-jazzy-common-interfaces>=5.3.6,<5.4",
+            "ros-jazzy-rmw-fastrtps-cpp>=8.4.3,<8.5",
+            "sms_handover_interfaces",
+        ],
         "test": [
             "casadi>=3.7,<4",
             "hypothesis>=6.140,<7",  # draws the inputs of the fuzzers
+            "jsonschema>=4.26,<5",  # validates files against the schemas for editors
             "mcap-ros2-support>=0.5.7,<1",
             "mypy>=1.15",
+            "pandas>=2.2.2,<4",
             "playwright>=1.50,<2",  # drives a Chromium that the machine has
             "pyarrow>=18,<27",
             "pytest>=8.4",

@@ -56,7 +56,7 @@ def alone(dynamics: str) -> float:
 
 def graph(folder: str, arguments: Sequence[str]) -> float:
     """Return the time in s of a tick of the graph; raises CalledProcessError, on a lost message too."""
-    command = [sys.executable, "-m", "sms_handover.cli.main", "run", "--overwrite"]
+    command = [sys.executable, "-m", "sms_handover.cli.main", "run", "--no-dry-run", "--overwrite"]
     command += ["--duration", str(SIMULATED_S), "--output", f"{folder}/run", *arguments]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     return 1e-3 / float(_FACTOR.findall(done.stderr)[-1])

@@ -1,90 +1,27 @@
 """The robot in MuJoCo: a model from the same description, its state in our coordinates."""
 
-from collections.abc import Iterable
-from xml.etree import ElementTree as ET
-
 import mujoco
 import numpy as np
 
-from sms_handover.frames import BASE, tool_frame
-from sms_handover.model.assembly import ArmDescription, RobotDescription
-from sms_handover.model.parts import Inertia, JointDescription, Origin
+from sms_handover.frames import BASE
+from sms_handover.model.assembly import RobotDescription
+from sms_handover.model.mjcf import to_mjcf
+from sms_handover.model.urdf import to_urdf
 from sms_handover.types import Array
 
 State = tuple[Array, Array]  # q (7 + n,) and v (6 + n,) as RobotModel has them
 
-_EXACTLY_AS_WRITTEN = {  # nothing that MuJoCo's compiler would change or add of its own accord
-    "alignfree": "false",
-    "autolimits": "false",
-    "balanceinertia": "false",
-    "boundinertia": "0",
-    "boundmass": "0",
-    "fusestatic": "false",
-    "inertiafromgeom": "false",
-    "settotalmass": "-1",
-}
-_NO_OTHER_FORCES = ("autoreset", "constraint", "contact", "damper", "gravity", "limit", "spring")
+_NO_OTHER_FORCES = ("AUTORESET", "CONSTRAINT", "CONTACT", "DAMPER", "GRAVITY", "LIMIT", "SPRING")
 
 
-def to_mjcf(robot: RobotDescription, *, floating: bool = True) -> str:
-    """Return the robot as MJCF: bodies, joints and tool sites; no shape, no damping, no gravity.
+def mjcf_of(robot: RobotDescription, *, floating: bool) -> str:
+    """Return a robot as MJCF without solids.
 
     With ``floating`` the base moves freely and joints have no limits, as in the plant; without, it is
     fixed to the world and the limits hold, as inverse kinematics sees it.
     """
-    root = ET.Element("mujoco", model=robot.name)
-    ET.SubElement(root, "compiler", _EXACTLY_AS_WRITTEN, angle="radian", eulerseq="XYZ")
-    still = {"gravity": "0 0 0", "wind": "0 0 0", "density": "0", "viscosity": "0"}
-    option = ET.SubElement(root, "option", still, integrator="RK4")
-    if floating:
-        ET.SubElement(option, "flag", dict.fromkeys(_NO_OTHER_FORCES, "disable"))
-    base = ET.SubElement(ET.SubElement(root, "worldbody"), "body", name=BASE)
-    if floating:
-        ET.SubElement(base, "freejoint", name="floating")
-    _inertial(base, robot.base.inertia)
-    for arm in robot.arms:
-        _arm(base, arm, limited=not floating)
-    return ET.tostring(root, encoding="unicode")
-
-
-def _arm(base: ET.Element, arm: ArmDescription, *, limited: bool) -> None:
-    """Add an arm, each body inside the one that carries it."""
-    carrier = _body(base, f"{arm.name}_mount", arm.mount)
-    for joint, link in zip(arm.joints, arm.links, strict=True):
-        carrier = _body(carrier, link.name, joint.origin)
-        _hinge(carrier, joint, limited=limited)
-        _inertial(carrier, link.inertia)
-    gripper = _body(carrier, arm.gripper.name, arm.flange)
-    _inertial(gripper, arm.gripper.inertia)
-    tool = arm.gripper.tool
-    ET.SubElement(gripper, "site", name=tool_frame(arm.name), pos=_text(tool.xyz), euler=_text(tool.rpy))
-
-
-def _body(carrier: ET.Element, name: str, origin: Origin) -> ET.Element:
-    """Add a body whose frame lies at ``origin`` in the one that carries it."""
-    return ET.SubElement(carrier, "body", name=name, pos=_text(origin.xyz), euler=_text(origin.rpy))
-
-
-def _hinge(body: ET.Element, joint: JointDescription, *, limited: bool) -> None:
-    """Let a body turn about the axis of its joint, without friction."""
-    motor = {"armature": _text([joint.rotor_inertia]), "damping": "0", "frictionloss": "0", "stiffness": "0"}
-    bounds = {"limited": "true", "range": _text([joint.lower, joint.upper])} if limited else {}
-    ET.SubElement(body, "joint", motor | bounds, name=joint.name, type="hinge", axis=_text(joint.axis))
-
-
-def _inertial(body: ET.Element, inertia: Inertia) -> None:
-    """Give a body its inertia by its principal axes.
-
-    They are found here: MuJoCo 3.10 stops its own search for them at about 1e-7 rad.
-    """
-    moments, axes = np.linalg.eigh(inertia.matrix)
-    place = {"pos": _text(inertia.com), "xyaxes": _text([*axes[:, 0], *axes[:, 1]])}
-    ET.SubElement(body, "inertial", place, mass=_text([inertia.mass]), diaginertia=_text(moments))
-
-
-def _text(values: Iterable[float]) -> str:
-    """Return the values with as many digits as it takes to read them back exactly."""
-    return " ".join(repr(float(value)) for value in values)
+    rotors = {joint.name: joint.rotor_inertia for arm in robot.arms for joint in arm.joints}
+    return to_mjcf(to_urdf(robot), rotors, floating=floating, limited=not floating)
 
 
 class MujocoRobot:
@@ -95,7 +32,9 @@ class MujocoRobot:
     """
 
     def __init__(self, description: RobotDescription) -> None:
-        self.model = mujoco.MjModel.from_xml_string(to_mjcf(description))
+        self.model = mujoco.MjModel.from_xml_string(mjcf_of(description, floating=True))
+        for name in _NO_OTHER_FORCES:
+            self.model.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
         self.data = mujoco.MjData(self.model)
         joints = range(1, self.model.njnt)
         self.joint_names = tuple(mujoco.mj_id2name(self.model, mujoco.mjtObj.mjOBJ_JOINT, i) for i in joints)

@@ -14,6 +14,7 @@ SCRIPTS: tuple[str, ...] = (  # in the order of the document
     "engines",
     "inverse_kinematics",
     "growth",
+    "clearance",
     "startup",
     "lockstep",
     "realtime",

@@ -37,11 +37,11 @@ def played(run: Path, folder: Path, rate: float, domain: int) -> str:
     """Play a run into a recorder that writes to ``folder``; return what the player said of it."""
     in_domain = ("--domain-id", str(domain))
     with subprocess.Popen(
-        [*_COMMAND, "record", "--all", "-o", str(folder), *in_domain],
+        [*_COMMAND, "bag", "record", "--all", "-o", str(folder), *in_domain],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     ) as recorder:
-        player = [*_COMMAND, "play", str(run), "--rate", str(rate), "--wait", "60", *in_domain]
+        player = [*_COMMAND, "bag", "play", str(run), "--rate", str(rate), "--wait", "60", *in_domain]
         done = subprocess.run(player, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)
         recorder.send_signal(signal.SIGINT)
     if done.returncode not in (0, 3) or recorder.returncode:  # 3: types that are not installed

@@ -54,6 +54,7 @@ def load(wanted: bool) -> Iterator[None]:
 def run_graph(folder: Path, arguments: Sequence[str]) -> Path:
     """Run the graph in real time, not lock step, and return its bag; raises RuntimeError if there is none."""
     command = [sys.executable, "-m", "sms_handover.cli.main", "run", "--real-time", "--overwrite"]
+    command += ["--no-dry-run"]
     command += ["--duration", str(DURATION_S), "--output", str(folder / "run"), *arguments]
     done = subprocess.run(command, check=False, capture_output=True, text=True)
     if not (folder / "run" / "bag").exists():

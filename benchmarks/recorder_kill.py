@@ -96,6 +96,7 @@ class Witness:
 def kill_recorder(folder: Path, moment_s: float, jitter_s: float) -> Kill:
     """Run the graph, kill its recorder after a simulated time, and recover the bag."""
     command = [sys.executable, "-m", "sms_handover.cli.main", "run", "-o", str(folder / "run")]
+    command += ["--no-dry-run"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     try:
         witness = Witness(_domain_of(process))

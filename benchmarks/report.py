@@ -14,7 +14,7 @@ from sms_handover.report.animation import animation
 from sms_handover.report.engine import plotly_script
 from sms_handover.report.page import report_page
 from sms_handover.report.plots import plot_groups
-from sms_handover.report.recorded_run import RecordedRun
+from sms_handover.report.recorded_run import RecordedRun, compare_recorded
 
 ROUNDS = 3
 LAWS = ("nmpc", "pid")
@@ -36,12 +36,13 @@ def measure(paths: Sequence[Path], folder: Path) -> Result:
     page = folder / "report.html"
     command = (*_COMMAND, "report", *map(str, paths), "--output", str(page), "--overwrite")
     runs: tuple[RecordedRun, ...] = read_all(paths)
+    clearances = [item.clearance for item in compare_recorded(runs).runs.values()]
     times = interleaved(
         {
             "the whole command": lambda: subprocess.run(command, check=True, capture_output=True),
             "reading the bags": lambda: read_all(paths),
             "signals, thinned": lambda: plot_groups([run.data for run in runs]),
-            "scenes for the animation": lambda: animation(runs),
+            "scenes for the animation": lambda: animation(runs, clearances),
             "the page, both of these included": lambda: report_page(runs),
         },
         ROUNDS,
@@ -50,7 +51,7 @@ def measure(paths: Sequence[Path], folder: Path) -> Result:
     parts = {
         "the page": size_mb,
         "of it plotly.js": len(plotly_script()) / _MB,
-        "of it the animation, three.js included": len(animation(runs).html) / _MB,
+        "of it the animation, three.js included": len(animation(runs, clearances).html) / _MB,
     }
     verdict = (
         f"Allowed are {LONGEST_S:g} s and {LARGEST_MB:g} MB; "

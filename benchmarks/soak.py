@@ -98,7 +98,7 @@ def soak(minutes: float, folder: Path, more: Sequence[str]) -> Soak:
     schedule = write_schedule(folder / "schedule.yaml", 60.0 * minutes)
     command = [sys.executable, "-m", "sms_handover.cli.main", "run", "-o", str(folder / "run")]
     command += ["--schedule", str(schedule), "--time-law", "quintic", "--duration", str(60.0 * minutes)]
-    command += ["-p", f"recorder.split_duration:={_SPLIT_S}", *more]
+    command += ["--no-dry-run", "-p", f"recorder.split_duration:={_SPLIT_S}", *more]
     log = folder / "printed"
     begin = monotonic()
     with log.open("wb") as stream:

@@ -12,6 +12,33 @@ from sms_handover.simulation.simulate import simulate
 from sms_handover.trajectory.time_law import TIME_LAWS
 from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
 
+_WHEN = [
+    (
+        "before",
+        "`run` simulates the run in one process with the law, dynamics and model of the scenario: seconds. "
+        "`--no-dry-run` leaves it out; a controller of your own has none",
+        "a warning with bodies, time and depth; with `--reject-collisions` exit code 2, nothing is started",
+    ),
+    (
+        "during",
+        "`common.clearance: online`: the plant measures each reference period and publishes "
+        "[`clearance`](topics.md)",
+        "an event `collision` when it begins, a warning",
+    ),
+    (
+        "during",
+        "`common.on_collision: abort`, which sets the above",
+        "the phase has failed one period later: [the joints are held]"
+        "(watchdogs.md#a-phase-that-has-failed), the run ends with exit code 1, its bag is complete",
+    ),
+    (
+        "after",
+        "`simulate`, `compare`, `report`, from the recorded states: each reference period, and each tick "
+        "around the least distance of a group",
+        "rows in their tables; `simulate` warns, with `--reject-collisions` its exit code is 1",
+    ),
+]
+
 PAGE = Path(__file__).resolve().parent / "clearance.md"
 
 
@@ -47,10 +74,25 @@ figures; `compare`, `report` and `simulate` show them for every run, from the ro
 schedule in its bag.
 
 Every rigid body of robot and deputy counts: the spacecraft, its panels, links and grippers as the
-description draws them, and the deputy as a box. Not counted are pairs that no joint moves against each
-other, neighbours along an arm, and pairs that touch whatever the joint angles. Distances are signed, by
-coal through Pinocchio, and agree with closed forms (`test/core/test_clearance.py`) and with MuJoCo
-([verification](verification.md)).
+description draws them or [gives their solids](configuration.md#solids-and-pairs-for-clearance), and the
+deputy as a box. Not counted are pairs that no joint moves against each other, neighbours along an arm, and
+pairs that touch at each of 200 random configurations; a robot file can allow more pairs, or count them.
+Pairs that touch at none of these configurations are counted: samples do not prove that they never will.
+Distances are signed, by coal through Pinocchio, depend on the configuration alone to the last bit, and agree
+with closed forms (`test/core/test_clearance.py`) and with MuJoCo ([verification](verification.md)).
+
+Contact of gripper and deputy is **declared** from the phase on in which the arm goes to a grasp frame, or
+from its grasp, until it has let go and the two have come apart. It may be `common.contact_depth` (1 mm) deep.
+
+## Before, during and after a run
+
+{table(("When", "How", "Collision"), _WHEN)}
+
+`simulate` is its own dry run. With `report`, the default, a collision changes no exit code: the scenario
+`colliding` is there to be run. Online a contact that begins and ends between two reference periods is
+missed; after the run it is found. Measuring changes no bit of a run, and the distances over DDS are those in
+one process (`test/system/test_equality.py`). The restarts of inverse kinematics by which a schedule is
+checked begin at configurations without overlaps; about a third of random ones have some.
 
 ## Least distance in the shipped handover
 
@@ -60,17 +102,17 @@ contact of gripper and deputy is declared: "contact". The columns are control la
 {table(["Bodies", *runs], distances)}
 
 **The shipped task collides.** Under step targets both laws press a gripper into the deputy, and under PID
-the grippers pass through each other. The simulation has no contact forces, so the run goes on and the
-paper's claims are judged as if nothing had touched; read them with this table beside them. With smooth
-(quintic) targets the grippers stay 140 mm apart; what is left is that arm A stands in the way while arm B
-pulls the deputy past it.
+the grippers pass through each other. The simulation has no contact forces, so the run goes on; `compare`
+says that it is not complete, and of the paper's claims *completion* does not hold. With smooth (quintic)
+targets the grippers stay 140 mm apart; what is left is that arm A stands in the way while arm B pulls the
+deputy past it.
 
 ## Limits of the joints
 
 {table(["Figure", *runs], limits)}
 
-Position and rate limits are reported, not enforced: the plant has no joint stops, and its motors no
-torque-speed line. A negative position is the distance from the nearest limit.
+Position and rate limits are reported, not enforced, unless `plant.joint_limits` is `enforce`
+([dynamics.md](dynamics.md)). A negative position is the distance from the nearest limit.
 """
 
 

@@ -17,7 +17,8 @@ from collections.abc import Iterable, Iterator
 from importlib import import_module
 
 from docs.tables import WRITTEN_BY, plain, table
-from sms_handover.cli.main import _COMMANDS
+from sms_handover.cli import bag
+from sms_handover.cli.verbs import BAG, GROUPS, OLD_NAMES, PROGRAM
 
 _EXIT_CODES = [
     ("0", "success"),
@@ -39,36 +40,61 @@ After `make handover` the command is `.venv/bin/sms-handover`; in a ROS workspac
 of any command prints the text of this page. An error is one line on standard error with the value, its unit
 and what is allowed.""",
         table(("Exit code", "Meaning"), _EXIT_CODES),
-        table(
-            ("Command", "Does"), [(f"[`{name}`](#sms-handover-{name})", t) for name, t in _COMMANDS.items()]
-        ),
+        table(("Command", "Does"), _listed()),
+        f"""\
+Names of the first edition work for one more release and say what replaces them: {_replaced()}.""",
     ]
-    for name in _COMMANDS:
-        parser = ArgumentParser(prog=f"sms-handover {name}")
-        import_module(f"sms_handover.cli.{name}").add_parser(parser)
-        parts += _command(parser, "##")
+    for verbs in GROUPS.values():
+        for verb in verbs:
+            parts += _of_bag() if verb == BAG else _command(verb, "##")
     return "\n\n".join(parts) + "\n"
 
 
-def sub_parsers(parser: ArgumentParser) -> list[ArgumentParser]:
-    """Return the parsers of the commands of a command, in their order."""
-    nested = [action.choices for action in parser._actions if isinstance(action.choices, dict)]
-    return [sub for group in nested for sub in group.values()]
+def parser_of(verb: str) -> ArgumentParser:
+    """Return the parser of a verb such as ``compare`` or ``bag info``."""
+    parser = ArgumentParser(prog=f"{PROGRAM} {verb}")
+    import_module(f"sms_handover.cli.{verb.replace(' ', '.')}").add_parser(parser)
+    return parser
 
 
-def _command(parser: ArgumentParser, level: str) -> Iterator[str]:
-    """Yield the sections of a command and of its own commands."""
+def _listed() -> Iterator[tuple[str, str]]:
+    """Yield a row per verb, those of ``bag`` below it."""
+    for verbs in GROUPS.values():
+        for verb, text in verbs.items():
+            yield _link(verb), text
+            if verb == BAG:
+                yield from ((_link(f"{BAG} {name}"), text) for name, text in bag.COMMANDS.items())
+
+
+def _link(verb: str) -> str:
+    """Return a link to the section of a verb."""
+    return f"[`{verb}`](#{PROGRAM}-{verb.replace(' ', '-')})"
+
+
+def _replaced() -> str:
+    """Return every old name with what it is now."""
+    old = [line.split() for line in (*OLD_NAMES, "play --closed-loop")]
+    return ", ".join(f"`{' '.join(words)}` is `{OLD_NAMES[words[0]](words[1:])[0]}`" for words in old)
+
+
+def _of_bag() -> Iterator[str]:
+    """Yield the section of ``bag`` and those of its own verbs."""
+    yield f"## {PROGRAM} {BAG}"
+    yield " ".join(bag.DESCRIPTION.split())
+    for name in bag.COMMANDS:
+        yield from _command(f"{BAG} {name}", "###")
+
+
+def _command(verb: str, level: str) -> Iterator[str]:
+    """Yield the section of a verb."""
+    parser = parser_of(verb)
     yield f"{level} {parser.prog}"
     yield from _text(parser.description or "", parser)
-    subs = sub_parsers(parser)
     taken = [action for action in parser._actions if not isinstance(action, _HelpAction)]
-    if not subs:
-        words = [parser.prog, *(_positional(a) for a in taken if not a.option_strings)]
-        yield f"```text\n{' '.join(words)} [options]\n```"
-        yield table(("Argument", "Meaning"), _rows(taken))
+    words = [parser.prog, *(_positional(a) for a in taken if not a.option_strings)]
+    yield f"```text\n{' '.join(words)} [options]\n```"
+    yield table(("Argument", "Meaning"), _rows(taken))
     yield from _text(parser.epilog or "", parser)
-    for sub in subs:
-        yield from _command(sub, level + "#")
 
 
 def _text(text: str, parser: ArgumentParser) -> Iterator[str]:

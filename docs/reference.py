@@ -1,10 +1,11 @@
-"""Generate the reference pages: parameters, topics, commands and messages."""
+"""Generate the reference pages (parameters, topics, commands, messages) and the schemas of YAML files."""
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from docs.commands import commands_page
 from docs.messages import messages_page
+from docs.schemas import schemas
 from docs.tables import WRITTEN_BY, table
 from sms_handover.graph.services import SERVICES
 from sms_handover.graph.topics import CONTROLLER, NODES, RECORDER, graph_topics
@@ -21,6 +22,7 @@ from sms_handover.ros.reference.interfaces import (
 from sms_handover.ros.reference.topic_descriptions import contents_of
 
 DOCS = Path(__file__).resolve().parent
+SCHEMAS = DOCS.parent / "config" / "schemas"
 
 
 def parameters_page() -> str:
@@ -56,7 +58,7 @@ def topics_page() -> str:
             _nodes(node for node in subscribers_of(topic) if node != RECORDER),
             contents_of(topic),
         )
-        for topic in graph_topics([ANY_ARM])
+        for topic in graph_topics([ANY_ARM], clearance=True)
     ]
     services = [
         (f"`{s.relative_name}`", f"`{s.type}`", f"`{s.server}`", _nodes(s.clients), s.does) for s in SERVICES
@@ -82,12 +84,13 @@ the sampled topics.""",
 
 
 def pages() -> dict[Path, str]:
-    """Return the text of every page that is written here."""
+    """Return the text of every page, and of every schema, that is written here."""
     return {
         DOCS / "parameters.md": parameters_page(),
         DOCS / "topics.md": topics_page(),
         DOCS / "commands.md": commands_page(),
         DOCS / "messages.md": messages_page(),
+        **{SCHEMAS / name: text for name, text in schemas().items()},
     }
 
 
@@ -111,6 +114,7 @@ def _nodes(names: Iterable[str]) -> str:
 
 def main() -> None:
     """Write the pages."""
+    SCHEMAS.mkdir(exist_ok=True)
     for path, text in pages().items():
         path.write_text(text, encoding="utf-8")
 

@@ -16,14 +16,20 @@ class ConfigurationError(SmsHandoverError, ValueError):
 class UnknownNameError(ConfigurationError):
     """A name is unknown; the message lists the known ones and the nearest."""
 
-    def __init__(self, kind: str, name: str, known: Iterable[str], where: str = "") -> None:
-        """Compose the message, e.g. ``unknown controller 'pdi': known are 'nmpc', 'pid'``."""
+    def __init__(
+        self, kind: str, name: str, known: Iterable[str], where: str = "", listed_by: str = ""
+    ) -> None:
+        """Compose the message, e.g. ``unknown controller 'pdi': known are 'nmpc', 'pid'``.
+
+        ``listed_by`` is the command that lists the known ones where they are too many for a message.
+        """
         self.kind = kind
         self.name = name
         self.known = tuple(known)
         nearest = get_close_matches(str(name), self.known, n=1)
         hint = f" (did you mean {nearest[0]!r}?)" if nearest else ""
         listed = ", ".join(repr(item) for item in self.known) or "none"
+        listed = f"those of {listed_by!r}" if listed_by else listed
         prefix = f"{where}: " if where else ""
         super().__init__(f"{prefix}unknown {kind} {name!r}{hint}: known are {listed}")
 
@@ -38,6 +44,10 @@ class ScheduleError(ConfigurationError):
 
 class UnstableLoopError(ConfigurationError):
     """The sampled closed loop of gains and tick diverges at the start configuration."""
+
+
+class CollisionError(ConfigurationError):
+    """Bodies of a scenario collide in a dry run."""
 
 
 class ControllerError(SmsHandoverError):

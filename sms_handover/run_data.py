@@ -26,7 +26,8 @@ class RunData:
     Rows per reference period: ``reference_ns`` (M,); reference position and velocity (M, n);
     per arm ``target_pose`` and ``tool_pose`` (M, 7) in ``world``; ``deputy_pose`` (M, 7);
     momentum (M, 3) in ``world`` axes, the angular one about the centre of mass; ``kinetic_energy``
-    and ``work`` (M,) J; ``ik_status`` (M,) the number of the IkStatus message, -1 where none was asked.
+    and ``work`` (M,) J, of the joint efforts less what joint stops have taken; ``ik_status`` (M,) the number
+    of the IkStatus message, -1 where none was asked.
     """
 
     joint_names: tuple[str, ...]

@@ -14,6 +14,8 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from sms_handover.units import MM_PER_M, ns_to_seconds
+
 Array = npt.NDArray[np.float64]
 
 BASE_NQ = 7  # position and quaternion of the base at the head of a configuration
@@ -222,6 +224,26 @@ class GraspEvent:
     angle_error: float
     relative_speed: float
     detail: str
+
+
+@dataclass(frozen=True)
+class Collision:
+    """Two bodies that are nearer to each other than ``allowed`` at ``stamp_ns``: signed distances in m.
+
+    ``group`` is what reports count the two to; ``allowed`` is 0, or minus the depth of a declared contact.
+    """
+
+    stamp_ns: int
+    group: str
+    bodies: tuple[str, str]
+    distance: float
+    allowed: float
+
+    def __str__(self) -> str:
+        """Return which two bodies overlap, by how much and when."""
+        first, second = self.bodies
+        depth_mm, time_s = -self.distance * MM_PER_M, ns_to_seconds(self.stamp_ns)
+        return f"{first} and {second} overlap by {depth_mm:.2f} mm at {time_s:.2f} s"
 
 
 class PhaseState(Enum):

@@ -14,17 +14,21 @@ from pathlib import Path
 import pytest
 from my_controller.task_space_pd import TaskSpaceGains
 
-from docs.commands import sub_parsers
-from sms_handover.cli.main import _COMMANDS
+from sms_handover.cli import bag
+from sms_handover.cli.verbs import BAG, VERBS, call_of
 from sms_handover.configuration.scenario_file import COMMON
 from sms_handover.configuration.values import DOCUMENTS as DOCUMENTS_WITH_VALUES
 from sms_handover.configuration.values import ROLES
+from sms_handover.control.parameters import parameters_with
+from sms_handover.control.registry import law_named
+from sms_handover.errors import ConfigurationError
 from sms_handover.graph.services import SERVICES
 from sms_handover.graph.topics import CONTROLLER, TF, graph_topics
 from sms_handover.ros.launching.launch_arguments import ARGUMENTS
 from sms_handover.ros.reference.interfaces import COMMON_GROUP, OWN_GROUPS, groups_of
 from sms_handover.simulation.scenario import load_scenario
 
+from .core.laws import offer
 from .documents import DOCUMENTS, SHELL, Block, anchors, blocks, commands, inline_code, links
 from .workspace import PACKAGE, ROOT, executables
 
@@ -62,22 +66,15 @@ class StrictParser(ArgumentParser):
         """Let ``--help`` be."""
 
 
-def parser_of(command: str) -> ArgumentParser:
-    """Return the parser of one of our commands."""
-    if command not in _COMMANDS:
-        raise Refused(f"sms-handover has no command {command!r}")
-    parser = StrictParser(prog=command)
-    import_module(f"sms_handover.cli.{command}").add_parser(parser)
-    return parser
-
-
-def options_of(parser: ArgumentParser) -> list[str]:
-    """Return every option of a parser and of its sub-commands."""
-    nested = [action.choices.values() for action in parser._actions if isinstance(action.choices, dict)]
-    return [
-        *parser._option_string_actions,
-        *(o for group in nested for sub in group for o in options_of(sub)),
-    ]
+def called(words: list[str]) -> tuple[StrictParser, tuple[str, ...]]:
+    """Return the parser of the verb that a command line names, and what it has to parse."""
+    try:
+        call = call_of(words)
+    except ConfigurationError as error:
+        raise Refused(str(error)) from error
+    parser = StrictParser(prog=call.verb)
+    import_module(call.module).add_parser(parser)
+    return parser, call.arguments
 
 
 def check(words: list[str]) -> None:
@@ -100,7 +97,8 @@ def check_ours(words: list[str]) -> None:
     """Check a call of ``sms-handover``."""
     if not words or words[0] in ("--help", "--version"):
         return
-    options = parser_of(words[0]).parse_args(words[1:])
+    parser, arguments = called(words)
+    options = parser.parse_args(arguments)
     for text in getattr(options, "param", []):
         node, _, name = text.partition(":=")[0].partition(".")
         if node in (*DOCUMENTS_WITH_VALUES, *ROLES):
@@ -108,8 +106,11 @@ def check_ours(words: list[str]) -> None:
             continue
         groups = {"common": COMMON_GROUP, **OWN_GROUPS}
         require([node], groups, "node")
-        theirs = node == CONTROLLER and getattr(options, "own_controller", None)
-        cls = TaskSpaceGains if theirs else groups[node].cls  # the pages start our example
+        cls = groups[node].cls
+        if node == CONTROLLER and getattr(options, "own_controller", None):
+            cls = TaskSpaceGains  # the pages start our example
+        elif node == CONTROLLER and options.controller:
+            cls = parameters_with(law_named(options.controller))
         require([name], [item.name for item in fields(cls)], f"parameter of {node}")
 
 
@@ -136,7 +137,7 @@ def check_ros2(words: list[str]) -> None:
         known = [*ARGUMENTS, *re.findall(r'DeclareLaunchArgument\(\s*"(\w+)"', source)]
         require([word.partition(":=")[0] for word in words[3:] if ":=" in word], known, "launch argument")
     elif words[0] == "topic":
-        known = ["/" + topic.name.lstrip("/") for topic in graph_topics(ARMS)]
+        known = ["/" + topic.name.lstrip("/") for topic in graph_topics(ARMS, clearance=True)]
         require([word for word in words[2:] if word.startswith("/")], [*known, TF], "topic")
     elif words[:2] == ["service", "call"]:
         require(
@@ -158,6 +159,12 @@ def require(names: Iterable[str], known: Iterable[str], what: str) -> None:
     for name in names:
         if name not in list(known):
             raise Refused(f"{name!r} is no {what}")
+
+
+@pytest.fixture(autouse=True)
+def law_of_the_example(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The pages install it."""
+    monkeypatch.syspath_prepend(offer(tmp_path_factory.mktemp("site"), "my_law", joint_pd="my_law:LAW"))
 
 
 def place(block: Block) -> str:
@@ -182,8 +189,11 @@ def test_commands_in_the_text_exist(path: Path) -> None:
         if words[:1] == ["make"]:
             check(words)
         elif words[:1] == ["sms-handover"] and len(words) > 1 and words[1].islower():
-            options = [word for word in words[2:] if word.startswith("--")]
-            require(options, options_of(parser_of(words[1])), f"option of {words[1]}")
+            if words[1:] == [BAG]:
+                continue
+            parser, arguments = called(words[1:])
+            options = [word for word in arguments if word.startswith("--")]
+            require(options, parser._option_string_actions, f"option of {words[1]}")
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
@@ -207,13 +217,14 @@ def test_every_page_is_in_the_navigation() -> None:
     assert pages <= set(listed), f"add to docs/index.md: {sorted(pages - set(listed))}"
 
 
-@pytest.mark.parametrize("name", _COMMANDS)
-def test_examples_of_the_help_are_right(name: str) -> None:
-    parser = parser_of(name)
-    for text in (each.epilog or "" for each in (parser, *sub_parsers(parser))):
-        for line in re.findall(r"^  (sms-handover .*)$", text, re.MULTILINE):
-            command = re.split(r"\s{2,}", line)[0]  # what it does stands behind
-            check(next(commands(command)))
+@pytest.mark.parametrize(
+    "verb", [*(verb for verb in VERBS if verb != BAG), *(f"{BAG} {verb}" for verb in bag.COMMANDS)]
+)
+def test_examples_of_the_help_are_right(verb: str) -> None:
+    parser, _ = called(verb.split())
+    for line in re.findall(r"^  (sms-handover .*)$", parser.epilog or "", re.MULTILINE):
+        command = re.split(r"\s{2,}", line)[0]  # what it does stands behind
+        check(next(commands(command)))
 
 
 @pytest.mark.parametrize("block", OF_PYTHON, ids=place)

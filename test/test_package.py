@@ -13,6 +13,8 @@ import yaml
 
 import sms_handover
 from docs.reference import pages
+from sms_handover.configuration import package_files
+from sms_handover.errors import ConfigurationError
 
 from .workspace import ROOT, entry_points
 
@@ -37,7 +39,7 @@ KEYS = {
     "zstandard": "mcap-ros2-support",
 }
 # Extras that a user installs with pip: rosdep has no key for them.
-BY_PIP_ONLY = {"casadi", "playwright", "plotly", "pyarrow"}
+BY_PIP_ONLY = {"casadi", "pandas", "playwright", "plotly", "pyarrow"}
 ROS_PACKAGE = re.compile(r"rclpy|rosidl_\w+|ament_index_python|tf2_\w+|\w+_(msgs|srvs|interfaces)")
 
 
@@ -95,6 +97,31 @@ def test_a_reference_page_is_up_to_date(path: Path) -> None:
     assert path.read_text(encoding="utf-8") == PAGES[path], "run: make reference"
 
 
+@pytest.mark.parametrize(
+    ("package", "share"),
+    [
+        ("venv/lib/python3.11/site-packages", "venv/share"),
+        ("target", "target/share"),
+        ("clone", ""),
+    ],
+)
+def test_config_is_found_where_pip_puts_it(
+    package: str, share: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By itself, with --user and --prefix, and with --target; `.ci/wheel` tries it with pip."""
+    home = tmp_path / share / "sms_handover" if share else tmp_path / package
+    (home / "config").mkdir(parents=True)
+    (home / "config" / "robot.yaml").touch()
+    file = tmp_path / package / "sms_handover" / "configuration" / "package_files.py"
+    monkeypatch.setattr(package_files, "__file__", str(file))
+    monkeypatch.setattr("sysconfig.get_path", lambda name: "/nowhere")
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    assert package_files.share_directory() == home
+    monkeypatch.setattr(package_files, "__file__", "/sms_handover/configuration/package_files.py")
+    with pytest.raises(ConfigurationError, match="not installed; searched /, /nowhere/share/sms_handover"):
+        package_files.share_directory()
+
+
 def requirements() -> dict[str, list[str]]:
     """Return what setup.py requires, by extra; '' is what is always installed."""
     tree = ast.parse((ROOT / "setup.py").read_text(encoding="utf-8"))
@@ -114,7 +141,7 @@ def test_the_lowest_versions_are_those_that_are_declared() -> None:
     lowest = dict(line.split("==") for line in lines if not line.startswith("#"))
     users = {
         name: bound
-        for extra in ("", "analysis", "compiled", "matlab", "parquet")
+        for extra in ("", "analysis", "compiled", "matlab", "pandas", "parquet")
         for name, bound in bounds[extra].items()
     }
     assert users.keys() <= lowest.keys()

@@ -16,7 +16,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
-    install_requires=["sms_handover"],
+    install_requires=["sms_handover[ros]"],
     zip_safe=False,
     entry_points={
         "console_scripts": [

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import inf, isnan, nan
 
 from sms_handover.analysis.base_motion import BaseMotion
+from sms_handover.analysis.completion import collisions_in_words
 from sms_handover.analysis.grasps import Hold, holds
 from sms_handover.analysis.metrics import RunMetrics, common_settling
 from sms_handover.analysis.numbers import largest
@@ -37,13 +38,17 @@ class Finding:
 
 @dataclass(frozen=True)
 class Claim:
-    """One claim: what is compared, the quotation from the paper, the figures, and the verdict."""
+    """One claim: what is compared, the quotation from the paper, the figures, and the verdict.
+
+    ``notes`` has what else decided it, in words.
+    """
 
     name: str
     text: str
     paper: str
     findings: tuple[Finding, ...]
     holds: bool
+    notes: tuple[str, ...] = ()
 
 
 def judge(nmpc: RunMetrics, pid: RunMetrics) -> tuple[Claim, ...]:
@@ -65,6 +70,8 @@ def _completion(nmpc: RunMetrics, pid: RunMetrics) -> Claim:
         ("deputy passes from A to B at", "s"),
         ("B at the end: distance to its target", "mm"),
         ("B at the end: angle to its target", "deg"),
+        ("collisions", "-"),
+        ("least clearance beyond what is allowed", "mm"),
     )
     findings = tuple(
         Finding(label, unit, outcomes[0].values[place], outcomes[1].values[place])
@@ -73,26 +80,39 @@ def _completion(nmpc: RunMetrics, pid: RunMetrics) -> Claim:
     return Claim(
         "completion",
         f"Both laws complete the handover: A holds the deputy by {GRASP_BY:g} s, it passes from A to B at "
-        f"{HANDOVER_AT:g} s, and B, holding it, ends settled on its final pose.",
+        f"{HANDOVER_AT:g} s, and B, holding it, ends settled on its final pose; no bodies enter each other "
+        "outside declared contacts.",
         "Both controllers successfully completed the mission objective",
         findings,
         all(outcome.complete for outcome in outcomes),
+        (*_clearance_notes("NMPC", nmpc), *_clearance_notes("PID", pid)),
     )
+
+
+def _clearance_notes(law: str, metrics: RunMetrics) -> tuple[str, ...]:
+    """Return the worst collision of a run in words, or that nothing is known of them."""
+    if metrics.clearance is None:
+        return (f"{law}: clearance unknown, the run does not say what robot and schedule it had",)
+    found = collisions_in_words(metrics.clearance)
+    if len(found) > 1:
+        return (f"{law}: {len(found)} collisions, the worst: {found[0]}",)
+    return tuple(f"{law}: {text}" for text in found)
 
 
 @dataclass(frozen=True)
 class _Outcome:
-    """Grasp time s, handover time s, final distance mm and angle deg of arm B, and the verdict."""
+    """What came of a handover: the figures of the claim, in the order of its findings, and the verdict."""
 
-    values: tuple[float, float, float, float]
+    values: tuple[float, float, float, float, float, float]
     complete: bool
 
 
 def _outcome(metrics: RunMetrics) -> _Outcome:
     """Return how far a run got with the first handover that was commanded."""
     arms, changes = _giver_and_taker(metrics.run), holds(metrics.run.grasp_events)
+    collisions, margin = _collisions(metrics)
     if len(arms) <= 1 or not metrics.phases:
-        return _Outcome((nan, nan, nan, nan), complete=False)
+        return _Outcome((nan, nan, nan, nan, collisions, margin), complete=False)
     giver, taker = arms
     grasped = _time_of(changes, lambda change: change.holder == giver)
     passed = _time_of(changes, lambda change: change.holder == taker and change.giver in {giver, ""})
@@ -103,9 +123,18 @@ def _outcome(metrics: RunMetrics) -> _Outcome:
         and changes[-1].holder == taker
         and not isnan(tool.settling_time)
         and tool.final_orientation_error <= FINAL_ANGLE
+        and not collisions > 0.0  # NaN where the bodies are unknown
     )
     final = (tool.final_error * MM_PER_M, tool.final_orientation_error * DEG_PER_RAD)
-    return _Outcome((grasped, passed, *final), complete)
+    return _Outcome((grasped, passed, *final, collisions, margin), complete)
+
+
+def _collisions(metrics: RunMetrics) -> tuple[float, float]:
+    """Return how many groups of bodies collide, and the least margin in mm; NaN where it is unknown."""
+    if metrics.clearance is None:
+        return nan, nan
+    least = min((group.margin for group in metrics.clearance.groups), default=nan)
+    return float(len(metrics.clearance.collisions)), least * MM_PER_M
 
 
 def _giver_and_taker(run: RunData) -> list[str]:

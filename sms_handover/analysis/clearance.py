@@ -1,15 +1,18 @@
 """The clearance of a run: how near bodies came to each other, when, and whether they might touch."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+import logging
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sms_handover.analysis.clearance_series import ClearanceSeries, SeriesOfGroups
 from sms_handover.analysis.grasps import holds
-from sms_handover.clearance.bodies import Body, BodyKind
+from sms_handover.clearance.contacts import CONTACT_DEPTH, GraspContact, Group, contacts_of, fixed_groups
 from sms_handover.clearance.distances import ClearanceModel
+from sms_handover.clearance.solids import MissingMeshError, require_meshes
+from sms_handover.clearance.worst_pair import NearestRecord
 from sms_handover.errors import RobotDescriptionError, ScheduleError, UnknownNameError
 from sms_handover.frames import tool_frame
 from sms_handover.model.floating_model import floating_model, joint_columns
@@ -18,9 +21,9 @@ from sms_handover.run_data import RunData
 from sms_handover.trajectory.schedule_text import deputy_size, grasping_arms
 from sms_handover.types import BASE_NQ, Array, Pose
 
-Rows = npt.NDArray[np.bool_]  # one per reference period
+_LOG = logging.getLogger(__name__)
 
-CONTACT_DEPTH = 0.001  # [m] by which gripper and deputy may enter each other in a declared contact
+Rows = npt.NDArray[np.bool_]  # one per reference period
 
 
 @dataclass(frozen=True)
@@ -49,9 +52,10 @@ class GroupClearance:
 
 @dataclass(frozen=True)
 class RunClearance:
-    """The clearance of every group of bodies of a run, the worst one first."""
+    """The clearance of every group of bodies of a run, the worst one first, and its course over time."""
 
     groups: tuple[GroupClearance, ...]
+    series: ClearanceSeries | None = field(default=None, compare=False, repr=False)
 
     @property
     def collisions(self) -> tuple[GroupClearance, ...]:
@@ -61,45 +65,50 @@ class RunClearance:
 
 @dataclass(frozen=True)
 class TaskTexts:
-    """What a run was made with, as its bag carries it: the robot as URDF, the schedule as YAML."""
+    """What a run was made with, as its bag carries it: the robot as URDF, the schedule as YAML.
+
+    ``contact_depth`` m is how deep gripper and deputy may be in each other in a declared contact.
+    """
 
     urdf: str
     schedule: str
+    contact_depth: float = CONTACT_DEPTH
 
     def fit(self, run: RunData) -> bool:
-        """Whether they describe a robot with the joints of a run, and a deputy."""
+        """Whether they describe a robot with the joints of a run, and a deputy; meshes must be there."""
         try:
             joint_columns(floating_model(self.urdf), run.joint_names)
             deputy_size(self.schedule), grasping_arms(self.schedule)
+            require_meshes(self.urdf)
+        except MissingMeshError as error:
+            _LOG.warning("the clearance of the run is not judged: %s", error)
+            return False
         except (RobotDescriptionError, ScheduleError, UnknownNameError):
             return False
         return True
 
 
-def run_clearance(run: RunData, texts: TaskTexts, contact_depth: float = CONTACT_DEPTH) -> RunClearance:
+def run_clearance(run: RunData, texts: TaskTexts) -> RunClearance:
     """Return how near the bodies of a run came to each other.
 
     Distances are taken at every reference period, and at every tick around the least one of each group. A
     held deputy moves with the tool that holds it. Contact between a gripper and the deputy is declared, and
-    may be ``contact_depth`` m deep, from the phase on in which the arm goes to a grasp frame, or from its
-    grasp, until it has let go and has come off. Raises RobotDescriptionError or ScheduleError where the
+    may be ``texts.contact_depth`` m deep, from the phase on in which the arm goes to a grasp frame, or from
+    its grasp, until it has let go and has come off. Raises RobotDescriptionError or ScheduleError where the
     texts do not say what bodies and targets there are, and UnknownNameError where joints differ.
     """
     course = _Course(run, texts)
     sampled = course.sampled()
-    groups: dict[tuple[str, bool], list[tuple[int, Rows]]] = {}
-    for pair, (one, other) in enumerate(course.model.pairs):
-        for name, contact, rows in course.groups_of(one, other, sampled[:, pair]):
-            if rows.any():
-                groups.setdefault((name, contact), []).append((pair, rows))
-    found = []
-    for (name, contact), members in groups.items():
+    found, series = [], SeriesOfGroups(sampled)
+    for group, members in course.groups(sampled).items():
         pair, rows = min(members, key=lambda member: float(sampled[member[1], member[0]].min()))
         least, stamp_ns = course.refined(pair, rows, sampled[:, pair])
         one, other = course.model.pairs[pair]
-        allowed = -contact_depth if contact else 0.0
-        found.append(GroupClearance(name, least, allowed, stamp_ns, (one.name, other.name)))
-    return RunClearance(tuple(sorted(found, key=lambda group: group.margin)))
+        allowed = group.allowed(texts.contact_depth)
+        found.append(GroupClearance(group.label, least, allowed, stamp_ns, (one.name, other.name)))
+        series.add(group.label, allowed, found[-1].margin, members)
+    worst_first = tuple(sorted(found, key=lambda group: group.margin))
+    return RunClearance(worst_first, course.series(series, texts.contact_depth))
 
 
 class _Course:
@@ -109,6 +118,7 @@ class _Course:
         self._pin = floating_model(texts.urdf)
         self._run, self._data = run, self._pin.createData()
         self.model = ClearanceModel(self._pin, texts.urdf, run.arms, deputy_size(texts.schedule))
+        self._nearest = NearestRecord(self.model)
         self._columns = joint_columns(self._pin, run.joint_names)
         usable = np.isfinite(run.deputy_pose).all(axis=1)
         ticks = np.searchsorted(run.tick_ns, run.reference_ns)
@@ -123,31 +133,30 @@ class _Course:
 
     def sampled(self) -> Array:
         """Return the distances (M, pairs) m at the reference periods."""
-        return np.array(
-            [self.model.distances(self._q(tick), self._deputy(row)) for row, tick in enumerate(self._ticks)]
-        ).reshape(self._ticks.size, len(self.model.pairs))
+        distances = np.empty((self._ticks.size, len(self.model.pairs)))
+        for row, tick in enumerate(self._ticks):
+            distances[row] = self.model.distances(self._q(tick), self._deputy(row))
+            self._nearest.keep(distances[row])
+        return distances
 
-    def groups_of(self, one: Body, other: Body, distances: Array) -> Iterator[tuple[str, bool, Rows]]:
-        """Yield the groups that a pair counts to: name, whether the contact is declared, and when."""
-        whole = {body.kind is BodyKind.GRIPPER for body in (one, other)} == {True}
-        names = [body.label if whole else body.arm or body.label for body in (one, other)]
-        if BodyKind.DEPUTY not in (one.kind, other.kind) or BodyKind.GRIPPER not in (one.kind, other.kind):
-            name = f"{names[0]} - {names[1]}" if names[0] != names[1] else f"{names[0]} itself"
-            yield name, False, np.ones(self._ticks.size, dtype=bool)
-            return
-        arm = one.arm or other.arm
-        holding = self._held_by(arm)
-        held_before = np.logical_or.accumulate(holding)
-        declared = self._declared(arm, holding, distances)
-        stages = {
-            "before grasp": ~held_before,
-            "held": holding,
-            "after release": held_before & ~holding,
-        }
-        for stage, rows in stages.items():
-            name = f"gripper {arm} - deputy, {stage}"
-            yield name, False, rows & ~declared
-            yield f"{name} (contact)", True, rows & declared
+    def series(self, groups: SeriesOfGroups, contact_depth: float) -> ClearanceSeries:
+        """Return the sampled distances over time, with the worst pair of each reference period."""
+        worst = self._nearest.worst(self._stamps, groups.sampled, groups.declared, contact_depth)
+        return ClearanceSeries(self._stamps, groups.groups(), groups.allowed, worst)
+
+    def groups(self, sampled: Array) -> dict[Group, list[tuple[int, Rows]]]:
+        """Return the pairs that count to each group, and in which of the sampled periods they do."""
+        found: dict[Group, list[tuple[int, Rows]]] = {}
+        if sampled.size:
+            always = np.ones(self._ticks.size, dtype=bool)
+            for group, pairs in fixed_groups(self.model.pairs).items():
+                found[group] = [(pair, always) for pair in pairs]
+        for pair, contact in contacts_of(self.model.pairs).items():
+            groups = self._groups_of(contact, sampled[:, pair])
+            for group in dict.fromkeys(groups):
+                rows = np.array([item == group for item in groups])
+                found.setdefault(group, []).append((pair, rows))
+        return found
 
     def refined(self, pair: int, rows: Rows, distances: Array) -> tuple[float, int]:
         """Return the least distance m of a pair while ``rows`` hold, to the tick, and its stamp in ns."""
@@ -163,13 +172,11 @@ class _Course:
                     least, stamp_ns = distance, int(self._run.tick_ns[tick])
         return least, stamp_ns
 
-    def _declared(self, arm: str, holding: Rows, distances: Array) -> Rows:
-        """Return when an arm may touch the deputy: on its way to a grasp frame, holding, coming off."""
-        meant = self._aims[arm] | holding
-        declared: Rows = meant.copy()
-        for row in range(1, declared.size):
-            declared[row] = meant[row] or (declared[row - 1] and distances[row] <= 0.0)
-        return declared
+    def _groups_of(self, contact: GraspContact, distances: Array) -> list[Group]:
+        """Return the group of a gripper and the deputy in each period."""
+        aims, holds = self._aims[contact.arm], self._held_by(contact.arm)
+        rows = zip(distances.tolist(), aims.tolist(), holds.tolist(), strict=True)
+        return [contact.advance(distance, aims=aim, holds=hold) for distance, aim, hold in rows]
 
     def _aiming(self, grasping: tuple[frozenset[str], ...]) -> dict[str, Rows]:
         """Return when each arm goes to a grasp frame."""

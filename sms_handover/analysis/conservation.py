@@ -20,8 +20,8 @@ class PhysicsResiduals:
     """Largest violation of each conservation law in a run that starts at rest.
 
     ``linear_momentum`` kg m/s and ``angular_momentum`` kg m^2/s, the latter about the centre of
-    mass; ``energy`` is the largest |change of kinetic energy - work of the torques|, relative to
-    ``peak_kinetic_energy`` J, and NaN if nothing moved.
+    mass; ``energy`` is the largest |change of kinetic energy - work of torques and joint stops|, relative
+    to ``peak_kinetic_energy`` J, and NaN if nothing moved.
     """
 
     linear_momentum: float

@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 from sms_handover.analysis.base_motion import UNKNOWN_MOTION, BaseMotion, base_motion
 from sms_handover.analysis.clearance import RunClearance, TaskTexts, run_clearance
+from sms_handover.analysis.completion import Completion, completion
 from sms_handover.analysis.conservation import IkOutcomes, PhysicsResiduals, ik_outcomes, physics_residuals
 from sms_handover.analysis.joint_limits import LimitUse, limit_use
 from sms_handover.analysis.loop_timing import LoopTiming, loop_timing
@@ -59,6 +60,11 @@ class RunMetrics:
     loop: LoopTiming | None = None
     clearance: RunClearance | None = None
     limits: LimitUse | None = None
+
+    @property
+    def completion(self) -> Completion:
+        """Whether the run did its task, and what it lacks."""
+        return completion(self.run, self.clearance)
 
     def phase(self, name: str) -> PhaseMetrics | None:
         """Return the phase with a name, None if the run has none."""

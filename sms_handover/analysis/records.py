@@ -1,10 +1,12 @@
 """Records: every figure of a comparison as one row of a long table, for a data frame or a CSV file."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from operator import attrgetter
+from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
 
 from sms_handover.analysis.comparison import Comparison
+from sms_handover.analysis.definitions import CLEARANCE
 from sms_handover.analysis.joint_limits import LimitUse
 from sms_handover.analysis.metrics import PhaseMetrics, RunMetrics
 from sms_handover.analysis.numbers import largest, lengths
@@ -59,7 +61,7 @@ def _of_run(comparison: Comparison, name: str, metrics: RunMetrics) -> Iterator[
     yield from _conserved("", metrics)
     if metrics.clearance:
         for group in metrics.clearance.groups:
-            yield "", "", f"clearance: {group.group}", "m", group.least
+            yield "", "", CLEARANCE.replace("GROUP", group.group), "m", group.least
     if metrics.limits:
         yield from _rows("", "", _LIMITS, metrics.limits)
     if metrics.loop:
@@ -155,4 +157,12 @@ _LOOP = _attributes(
     period_max="s",
     late_ticks="-",
     held_commands="-",
+)
+_OF_PHASES: tuple[_Column[Any], ...] = (*_TOOL, *_ORIENTATION, *_TORQUE, *_WORK, *_PHASE, *_BASE, *_DRIFT)
+_OF_RUNS: tuple[_Column[Any], ...] = (*_PHYSICS, *_IK, *_LIMITS, *_LOOP)
+UNITS: Mapping[str, str] = MappingProxyType(
+    {
+        **{figure: unit for figure, unit, _ in (*_OF_PHASES, *_OF_RUNS)},
+        CLEARANCE: "m",
+    }
 )

@@ -32,6 +32,7 @@ def summary(comparison: Comparison) -> Summary:
 
 def _run(metrics: RunMetrics, drift: Mapping[str, BaseMotion]) -> Summary:
     return {
+        "completion": {"complete": metrics.completion.complete, **_values(metrics.completion)},
         "phases": [_phase(item, drift[item.phase.name]) for item in metrics.phases],
         **_common(metrics),
         "loop": _values(metrics.loop) if metrics.loop else None,

@@ -11,6 +11,7 @@ from sms_handover.analysis.claims import Claim
 from sms_handover.analysis.clearance import TaskTexts
 from sms_handover.analysis.clearance_rows import clearance_sections
 from sms_handover.analysis.comparison import Comparison, compare
+from sms_handover.analysis.completion import command_in_words
 from sms_handover.analysis.grasps import Tolerance
 from sms_handover.analysis.joints import F
 from sms_handover.analysis.layout import MISSING, WIDTH, Row, Section, layout, number, row
@@ -20,7 +21,7 @@ from sms_handover.analysis.numbers import largest, lengths
 from sms_handover.analysis.tracking import Motion, ToolTracking
 from sms_handover.graph.events import Severity
 from sms_handover.run_data import RunData
-from sms_handover.types import GraspAction, GraspCommand, GraspEvent
+from sms_handover.types import GraspAction, GraspEvent
 from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
 
 _MICRO = 1e6
@@ -54,9 +55,10 @@ def render(comparison: Comparison, tolerance: Tolerance | None = None) -> str:
 
 
 def figure_sections(comparison: Comparison, tolerance: Tolerance | None = None) -> tuple[Section, ...]:
-    """Return every figure of a comparison except the claims: grasps, each phase, torques, physics."""
+    """Return every figure of a comparison but the claims: completion, grasps, phases, torques, physics."""
     runs = list(comparison.runs.values())
     return (
+        Section("Task", _completion_rows(comparison)),
         Section("Grasp events", _grasp_rows(runs, tolerance)),
         *_run_event_section(runs),
         *(_phase_section(comparison, name) for name in comparison.phase_names),
@@ -67,6 +69,22 @@ def figure_sections(comparison: Comparison, tolerance: Tolerance | None = None) 
     )
 
 
+def _completion_rows(comparison: Comparison) -> tuple[Row, ...]:
+    """Return whether each run is complete, and below, run by run, what it lacks."""
+    found = {name: run.completion for name, run in comparison.runs.items()}
+    rows = [Row("complete", tuple("yes" if item.complete else "no" for item in found.values()))]
+    for name, item in found.items():
+        unknown = () if item.clearance_known else ("clearance unknown",)
+        for text in (*item.shortfalls, *unknown):
+            rows += [Row(line) for line in _wrapped(f"  {name}: {text}")]
+    return tuple(rows)
+
+
+def _wrapped(text: str) -> list[str]:
+    """Return the lines of a text that is as wide as the table at most."""
+    return wrap(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+
+
 def _grasp_rows(runs: Sequence[RunMetrics], tolerance: Tolerance | None) -> tuple[Row, ...]:
     """Return the outcome of every grasp command, with the errors at which the gripper closed."""
     by_run = [{(event.stamp_ns, event.command): event for event in item.run.grasp_events} for item in runs]
@@ -75,7 +93,7 @@ def _grasp_rows(runs: Sequence[RunMetrics], tolerance: Tolerance | None) -> tupl
     for key in sorted(keys, key=lambda key: key[0]):
         stamp_ns, command = key
         events = [found.get(key) for found in by_run]
-        label = f"{ns_to_seconds(stamp_ns):g} s: {_in_words(command)}"
+        label = f"{ns_to_seconds(stamp_ns):g} s: {command_in_words(command)}"
         rows.append(Row(label, tuple(event.status.value if event else MISSING for event in events)))
         if command.action is not GraspAction.RELEASE:
             for what, value, limit in _REACHED:
@@ -108,14 +126,6 @@ _REACHED: tuple[tuple[str, Callable[[GraspEvent], float], Callable[[Tolerance], 
         lambda most: most.speed * MM_PER_M,
     ),
 )
-
-
-def _in_words(command: GraspCommand) -> str:
-    """Return a grasp command in words."""
-    if command.action is GraspAction.RELEASE:
-        return f"{command.arm} lets go"
-    giver = f" from {command.from_arm}" if command.from_arm else ""
-    return f"{command.arm} takes {command.grasp_frame}{giver}"
 
 
 def _phase_section(comparison: Comparison, name: str) -> Section:
@@ -244,14 +254,12 @@ def _claim_section(claims: Sequence[Claim]) -> Section:
     held = sum(claim.holds for claim in claims)
     rows: list[Row] = []
     for claim in claims:
-        text = wrap(
-            f"{_VERDICTS[claim.holds]}: {claim.text}", WIDTH, subsequent_indent="  ", break_on_hyphens=False
-        )
-        quote = wrap(f'  Paper: "{claim.paper}"', WIDTH, subsequent_indent="  ", break_on_hyphens=False)
         missing = _NEVER if claim.name == "settling" else MISSING
-        rows += [Row(line) for line in (*([""] if rows else []), *text, *quote)]
+        head = (f"{_VERDICTS[claim.holds]}: {claim.text}", f'  Paper: "{claim.paper}"')
+        rows += [Row(""), *(Row(line) for text in head for line in _wrapped(text))]
         rows += [
             Row(f"  {item.label} [{item.unit}]", (number(item.nmpc, missing), number(item.pid, missing)))
             for item in claim.findings
         ]
-    return Section(f"Claims of the paper: {held} of {len(claims)} hold", tuple(rows))
+        rows += [Row(line) for note in claim.notes for line in _wrapped(f"  {note}")]
+    return Section(f"Claims of the paper: {held} of {len(claims)} hold", tuple(rows[1:]))

@@ -32,7 +32,7 @@ class RecorderParameters:
     @property
     def split(self) -> Split:
         """Return when the bag is split."""
-        return Split(seconds_to_ns(self.split_duration), round(self.split_size * _BYTES_PER_MB))
+        return _split(self.split_duration, self.split_size)
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,22 @@ class TopicRecorderParameters:
     exclude_topics: tuple[str, ...] = parameter("topics not to record")
     exclude_regex: str = parameter("regular expression; topics that match it are not recorded")
     duration: float = parameter("wall time to record; 0: until interrupted", unit="s", minimum=0.0)
+    split_duration: float = parameter(
+        "wall time after which the bag is split; 0: never", unit="s", minimum=0.0
+    )
+    split_size: float = parameter("size after which the bag is split; 0: never", unit="MB", minimum=0.0)
+
+    @property
+    def split(self) -> Split:
+        """Return when the bag is split."""
+        return _split(self.split_duration, self.split_size)
 
     @property
     def choice(self) -> TopicChoice:
         """Return the choice of topics."""
         return TopicChoice(self.topics, self.regex, self.exclude_topics, self.exclude_regex)
+
+
+def _split(duration_s: float, size_mb: float) -> Split:
+    """Return the split at a duration in s and a size in MB."""
+    return Split(seconds_to_ns(duration_s), round(size_mb * _BYTES_PER_MB))

@@ -6,7 +6,6 @@ from enum import Enum
 
 import pinocchio as pin
 
-from sms_handover.errors import RobotDescriptionError
 from sms_handover.frames import BASE, DEPUTY, mount_frame, tool_frame
 from sms_handover.model.assembly import gripper_name
 
@@ -40,25 +39,6 @@ class Body:
 DEPUTY_BODY = Body(DEPUTY, BodyKind.DEPUTY)
 
 
-def read_geometry(model: pin.Model, urdf: str) -> pin.GeometryModel:
-    """Return the solids of a description as Pinocchio's geometry, without pairs.
-
-    ``model`` is Pinocchio's reading of the same text. A solid is what has a collision element; what is drawn
-    and has none, as a solar panel in recordings of the first edition, is solid too. Raises
-    RobotDescriptionError if the shapes cannot be read.
-    """
-    try:
-        solids = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION)
-        drawn = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.VISUAL)
-    except (ValueError, RuntimeError) as error:
-        raise RobotDescriptionError(f"the shapes of the robot cannot be read: {error}") from error
-    known = list(solids.geometryObjects)
-    for item in drawn.geometryObjects:
-        if not any(_same(item, solid) for solid in known):
-            solids.addGeometryObject(item)
-    return solids
-
-
 def bodies_of(model: pin.Model, geometry: pin.GeometryModel, arms: Iterable[str]) -> tuple[Body, ...]:
     """Return what each geometry object is, in their order, named as its link, numbered from the second on."""
     chains = {arm: _links_of(model, arm) for arm in arms}
@@ -73,13 +53,6 @@ def bodies_of(model: pin.Model, geometry: pin.GeometryModel, arms: Iterable[str]
             kind = BodyKind.BASE if link == BASE and name == BASE else BodyKind.PANEL
         bodies.append(Body(name, kind, arm))
     return tuple(bodies)
-
-
-def _same(one: pin.GeometryObject, other: pin.GeometryObject) -> bool:
-    """Whether two geometry objects are the same solid at the same place."""
-    if one.parentFrame != other.parentFrame or type(one.geometry) is not type(other.geometry):
-        return False
-    return bool(one.placement.isApprox(other.placement) and one.geometry == other.geometry)
 
 
 def _links_of(model: pin.Model, arm: str) -> set[str]:

@@ -20,6 +20,11 @@ def add_topic_options(parser: ArgumentParser, verb: str) -> None:
     group.add_argument("-x", "--exclude-regex", metavar="REGEX", help=f"do not {verb} the topics that match")
 
 
+def add_storage_option(parser: ArgumentParser) -> None:
+    """Add the storage format, which a command line of ``ros2 bag`` may name: there is one."""
+    parser.add_argument("-s", "--storage", choices=("mcap",), default="mcap", help="storage format")
+
+
 def add_graph_options(parser: ArgumentParser) -> None:
     """Add the option that chooses the graph."""
     parser.add_argument(

@@ -1,8 +1,9 @@
-"""``sms-handover report``: recorded runs as one HTML page."""
+"""``sms-handover report``: recorded runs as one HTML page, or as figures for print."""
 
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from pathlib import Path
 
+from sms_handover.cli.figure_files import LISTED, add_figure_options, draw, figures_of
 from sms_handover.cli.recorded_runs import read_all
 from sms_handover.cli.text_files import write_text
 from sms_handover.errors import ConfigurationError
@@ -10,6 +11,7 @@ from sms_handover.report.page import report_page
 from sms_handover.terminal.progress import Progress
 
 _PAGE = "index.html"
+_FOLDER = Path("report")
 _BYTES_PER_MB = 1e6
 
 
@@ -20,36 +22,48 @@ def add_parser(parser: ArgumentParser) -> None:
         "Write one HTML page on recorded runs: the figures side by side, plots to zoom into, the\n"
         "paper's claims with verdicts (of one run under nmpc and one under pid), what the bags were\n"
         "made with and where they differ, and the handover in 3D.\n\n"
-        "The page is a single file that needs no network: open it in any browser, send it by mail."
+        "The page is a single file that needs no network: open it in any browser, send it by mail.\n"
+        "With --figures draw the paper's figures instead, or beside it if --output is given too."
     )
     parser.epilog = (
         "examples:\n"
         "  sms-handover report runs/nmpc runs/pid            writes report/index.html\n"
-        "  sms-handover report runs/mine -o mine.html        one run, into a file of that name\n\n"
-        "exit codes: 0 the page is written; 1 a package is missing; 2 wrong input, as a bag that is\n"
-        "not ours or a page that exists already, and nothing was written"
+        "  sms-handover report runs/mine -o mine.html        one run, into a file of that name\n"
+        "  sms-handover report runs/nmpc --figures figures   figures for print, no page\n\n"
+        f"figures (docs/figures.md):\n{LISTED}\n\n"
+        "exit codes: 0 the page or the figures are written; 1 a package is missing; 2 wrong input, as a\n"
+        "bag that is not ours or a page that exists already, and nothing was written"
     )
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="output folder of a run, or a bag")
     parser.add_argument(
         "-o",
         "--output",
         type=Path,
-        default=Path("report"),
         metavar="PATH",
-        help=f"folder for {_PAGE}, or a file that ends in .html (default: report)",
+        help=f"folder for {_PAGE}, or a file that ends in .html (default: {_FOLDER})",
     )
     parser.add_argument("--overwrite", action="store_true", help="replace the page if it exists")
+    add_figure_options(parser)
 
 
 def command(options: Namespace) -> int:
     """Run the command; return the exit code."""
-    page: Path = options.output if options.output.suffix == ".html" else options.output / _PAGE
-    if page.exists() and not options.overwrite:
+    figures = figures_of(options)
+    page = _page(options.output or _FOLDER) if options.output or not figures else None
+    if page and page.exists() and not options.overwrite:
         raise ConfigurationError(f"{page} exists; choose another place, or --overwrite it")
     with Progress() as progress:
         runs = read_all(options.runs, progress)
         progress.show("drawing")
-        content = report_page(runs)
-    write_text(page, content, parents=True)
-    print(f"{page}: {len(content.encode()) / _BYTES_PER_MB:.1f} MB; open it in a browser")
+        content = report_page(runs) if page else ""
+    if page:
+        write_text(page, content, parents=True)
+        print(f"{page}: {len(content.encode()) / _BYTES_PER_MB:.1f} MB; open it in a browser")
+    if figures:
+        draw(runs, figures)
     return 0
+
+
+def _page(place: Path) -> Path:
+    """Return the file of the page."""
+    return place if place.suffix == ".html" else place / _PAGE

@@ -10,6 +10,7 @@ from contextlib import contextmanager, nullcontext
 from datetime import datetime
 from pathlib import Path
 
+from sms_handover.cli.collisions import add_dry_run_options, check_collisions
 from sms_handover.cli.exit_codes import EXIT_INTERRUPTED, EXIT_LOSS
 from sms_handover.cli.options import add_scenario_options, scenario_of
 from sms_handover.cli.task_code import task_code
@@ -43,6 +44,7 @@ def add_parser(parser: ArgumentParser) -> None:
         "To look at the running graph with other tools, give --domain-id and set ROS_DOMAIN_ID to it."
     )
     add_scenario_options(parser)
+    add_dry_run_options(parser)
     group = parser.add_argument_group("graph")
     group.add_argument(
         "-o", "--output", type=Path, metavar="FOLDER", help="new folder (default: runs/<law>_<date>_<time>)"
@@ -107,6 +109,7 @@ def command(options: Namespace) -> int:
     external = (CONTROLLER,) if own or options.without_controller else ()
     scenario = scenario_of(options, mode, recorded=not options.no_record, external=external)
     check_scenario(scenario)
+    check_collisions(scenario, options)
     with (
         reservation(options.domain_id, shared=bool(elsewhere)) as held,
         _earlier_run_aside(options.output) if _replaces(options) else nullcontext(),

@@ -4,7 +4,10 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from sms_handover.analysis.clearance import TaskTexts
-from sms_handover.analysis.table import comparison_table
+from sms_handover.analysis.comparison import compare
+from sms_handover.analysis.table import render
+from sms_handover.cli.collisions import warn_of_collisions
+from sms_handover.cli.exit_codes import EXIT_FAILED
 from sms_handover.cli.options import add_scenario_options, scenario_of
 from sms_handover.cli.task_code import task_code
 from sms_handover.launcher.display import Display
@@ -21,9 +24,13 @@ def add_parser(parser: ArgumentParser) -> None:
         "same, bit for bit, as those of a run over DDS in lock step."
     )
     parser.epilog = (
-        "exit codes: 0 the task is done; 1 it failed; 2 wrong input; 4 a grasp missed and no retry mended it"
+        "exit codes: 0 the task is done; 1 it failed, or bodies have collided and that was to be "
+        "rejected; 2 wrong input; 4 a grasp missed and no retry mended it"
     )
     add_scenario_options(parser)
+    parser.add_argument(
+        "--reject-collisions", action="store_true", help="fail, with exit code 1, if bodies have collided"
+    )
     parser.add_argument(
         "-o", "--output", type=Path, metavar="FILE.npz", help="write the arrays of the run to a NumPy archive"
     )
@@ -43,11 +50,18 @@ def command(options: Namespace) -> int:
         run = simulate(scenario, progress=show)
         display.show_run(int(run.tick_ns[-1]), run.phases[-1].name, last=True)
     name, tolerance = scenario.parameters.controller.law, scenario.parameters.plant.grasp_tolerance
-    texts = TaskTexts(scenario.truth.robot.urdf, scenario.truth.schedule.text)
+    urdf, schedule = scenario.truth.robot.urdf, scenario.truth.schedule.text
+    texts = TaskTexts(urdf, schedule, common.contact_depth)
     for event in run.run_events:
         print(event)
-    print(comparison_table({name: run}, tolerance=tolerance, texts={name: texts}))
+    comparison = compare({name: run}, texts={name: texts})
+    print(render(comparison, tolerance))
+    clearance = comparison.runs[name].clearance
+    if clearance:
+        warn_of_collisions(clearance)
     if options.output:
         save_run(run, options.output)
         print(f"arrays written to {options.output}")
+    if options.reject_collisions and clearance and clearance.collisions:
+        return EXIT_FAILED
     return task_code(run.grasp_events, run.run_events, failed=run.phases[-1].failed)

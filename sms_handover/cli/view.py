@@ -6,12 +6,16 @@ import webbrowser
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from pathlib import Path
 
+from sms_handover.analysis.clearance import run_clearance
+from sms_handover.bag.info import read_info
+from sms_handover.bag.run.reader import read_run
 from sms_handover.cli.recorded_runs import named
 from sms_handover.cli.text_files import write_text
 from sms_handover.errors import BagError, ConfigurationError
 from sms_handover.launcher.run_folder import bag_of
+from sms_handover.report.animation import recorded_scene
+from sms_handover.report.recorded_run import RecordedRun
 from sms_handover.scene.page import animation_html
-from sms_handover.scene.recorded_scene import read_scene
 from sms_handover.scene.scene import FRAME_RATE, Scene
 
 
@@ -21,7 +25,7 @@ def add_parser(parser: ArgumentParser) -> None:
     parser.description = (
         "Show runs in 3D. With bags: write one page that plays them and needs no network, and open it;\n"
         "of several runs the first is solid and the others are translucent over it. With --live: show a\n"
-        "graph that runs, or that 'sms-handover play' plays back, as it goes; it never holds the graph up."
+        "graph that runs, or a bag that 'bag play' plays back, as it goes; it never holds the graph up."
     )
     parser.epilog = (
         "examples:\n"
@@ -48,6 +52,11 @@ def add_parser(parser: ArgumentParser) -> None:
         "--port", type=int, metavar="N", help="port of the page (default: 8017; 0: any free one)"
     )
     live.add_argument("--domain-id", type=int, metavar="N", help="ROS domain (default: ROS_DOMAIN_ID)")
+
+
+def needs_ros(options: Namespace) -> bool:
+    """Return whether a running graph is to be shown."""
+    return bool(options.live)
 
 
 def command(options: Namespace) -> int:
@@ -84,10 +93,17 @@ def _follow(options: Namespace) -> int:
 
 def _scenes(options: Namespace) -> dict[str, Scene]:
     frame_rate = FRAME_RATE if options.frame_rate is None else options.frame_rate
+    scenes = {}
     try:
-        return {name: read_scene(path, frame_rate) for name, path in named(map(bag_of, options.runs)).items()}
+        for name, path in named(map(bag_of, options.runs)).items():
+            run = RecordedRun(name, read_run(path), read_info(path))
+            clearance = run_clearance(run.data, run.texts) if run.texts else None
+            scenes[name] = recorded_scene(run, clearance, frame_rate)
     except BagError as error:
-        raise ConfigurationError(str(error)) from error  # exit code 2: what was given cannot be used
+        text = str(error)
+        place = "" if str(path) in text else f"{path}: "
+        raise ConfigurationError(f"{place}{text}") from error  # exit code 2: it cannot be used
+    return scenes
 
 
 def _temporary_file() -> Path:

@@ -9,6 +9,7 @@ import yaml
 from sms_handover.configuration.merge import merged
 from sms_handover.configuration.robot_content import read_robot_content, with_arm_descriptions
 from sms_handover.configuration.scenario_file import DESCRIPTION, ScenarioFile
+from sms_handover.configuration.value_paths import require_known
 from sms_handover.configuration.values import DEPUTY, ROBOT, ROLES, SCHEDULE, roles_of, with_values
 from sms_handover.configuration.yaml_reader import Mapping, load_mapping, read_file
 
@@ -79,6 +80,8 @@ def _for_everybody(scenario: ScenarioFile, given: Replacements) -> Documents:
         path = Path(given.schedule)
         text = read_file(path)
         schedule = load_mapping(text, path)
+    require_known(given.values, ROBOT, robot)
+    require_known(given.values, SCHEDULE, schedule)
     changed = with_values(schedule, SCHEDULE, given.values)
     if changed is not schedule or not text:
         text = as_yaml(changed)

@@ -79,5 +79,5 @@ def _is_named(value: Any) -> bool:
     return (
         isinstance(value, list)
         and bool(value)
-        and all(isinstance(item, Mapping) and _NAME in item for item in value)
+        and all(isinstance(item, Mapping) and isinstance(item.get(_NAME), str) for item in value)
     )

@@ -13,12 +13,12 @@ def share_directory() -> Path:
     """Return the folder that holds ``config/``; raises ConfigurationError.
 
     Searched in this order: the source tree, every prefix of AMENT_PREFIX_PATH, the environment of the
-    interpreter.
+    interpreter, and where ``pip install --user``, ``--prefix`` and ``--target`` put it.
     """
-    prefixes = [p for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p]
-    prefixes.append(sysconfig.get_path("data"))
-    candidates = [Path(__file__).resolve().parent.parent.parent]
-    candidates += [Path(prefix) / "share" / _PACKAGE for prefix in prefixes]
+    found_in = Path(__file__).resolve().parent.parent.parent
+    prefixes = [Path(p) for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p]
+    prefixes += [Path(sysconfig.get_path("data")), *found_in.parents[2:3], found_in]
+    candidates = [found_in, *dict.fromkeys(prefix / "share" / _PACKAGE for prefix in prefixes)]
     for candidate in candidates:
         if (candidate / "config" / "robot.yaml").is_file():
             return candidate

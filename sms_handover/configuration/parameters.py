@@ -6,13 +6,11 @@ The numbers are in ``config/``.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, field, fields
-from math import inf
+from dataclasses import MISSING, field, fields, replace
 from pathlib import Path
-from reprlib import repr as shortened
 from typing import Any, TypeVar, get_type_hints
 
-from sms_handover.configuration.checks import check_number
+from sms_handover.configuration.field_specification import ValueSpec
 from sms_handover.configuration.sections import Section
 from sms_handover.errors import ConfigurationError, UnknownNameError
 
@@ -30,17 +28,6 @@ class ParameterValues(dict[str, object]):
         self.places: dict[str, str] = {}
 
 
-@dataclass(frozen=True)
-class ParameterSpec:
-    """Meaning, unit and allowed values of a parameter."""
-
-    description: str
-    unit: str = ""
-    minimum: float | None = None
-    maximum: float | None = None
-    choices: tuple[str, ...] = ()
-
-
 def parameter(
     description: str,
     *,
@@ -50,18 +37,18 @@ def parameter(
     choices: Sequence[str] = (),
     default: Any = MISSING,
 ) -> Any:
-    """Return a dataclass field with a :class:`ParameterSpec`; bounds are inclusive.
+    """Return a dataclass field with a ``ValueSpec``; bounds are inclusive.
 
     Parameters of this package have their defaults in ``config/``, others may give a ``default``.
     """
-    spec = ParameterSpec(description, unit, minimum, maximum, tuple(choices))
+    spec = ValueSpec(description, unit, minimum, maximum, tuple(choices))
     return field(default=default, metadata={_SPEC: spec})
 
 
-def spec_of(item: "Field[Any]") -> ParameterSpec:
-    """Return the specification of a field made by :func:`parameter`."""
-    spec: ParameterSpec = item.metadata[_SPEC]
-    return spec
+def specs_of(cls: type[object]) -> dict[str, ValueSpec]:
+    """Return the specifications of the fields of a parameter group, which :func:`parameter` made."""
+    hints, all_fields = get_type_hints(cls), fields(cls)  # type: ignore[arg-type]
+    return {item.name: replace(item.metadata[_SPEC], kind=hints[item.name]) for item in all_fields}
 
 
 def build(
@@ -73,8 +60,7 @@ def build(
     where it is known. A list gives a tuple, an integer is accepted as a float. Raises
     ConfigurationError on a missing or bad value and UnknownNameError on a name that ``cls`` does not have.
     """
-    hints = get_type_hints(cls)
-    known = {item.name: item for item in fields(cls)}  # type: ignore[arg-type]
+    known = specs_of(cls)
     origin = {name: where for name in (*known, *values)} | dict(places or {})
     for name in values:
         if name not in known:
@@ -84,8 +70,7 @@ def build(
     if missing:
         raise ConfigurationError(f"{where}: parameter {missing[0]!r} is missing")
     checked = {
-        name: _check(values[name], hints[name], spec_of(item), f"{origin[name]}: parameter {name!r}")
-        for name, item in known.items()
+        name: spec.check(values[name], f"{origin[name]}: parameter {name!r}") for name, spec in known.items()
     }
     return cls(**checked)
 
@@ -109,22 +94,3 @@ def read_parameter_files(paths: Sequence[Path], section: str) -> ParameterValues
             merged.update((name, values.value(name)) for name in values.keys)
             merged.places.update((name, values.where(name)) for name in values.keys)
     return merged
-
-
-def _check(value: object, hint: Any, spec: ParameterSpec, what: str) -> object:
-    """Return ``value`` as the type ``hint`` asks for, or raise ConfigurationError."""
-    if hint == tuple[float, ...] or hint == tuple[str, ...]:
-        if not isinstance(value, list | tuple):
-            raise ConfigurationError(f"{what} is {shortened(value)}, must be a list")
-        inner = float if hint == tuple[float, ...] else str
-        return tuple(_check(item, inner, spec, what) for item in value)
-    if hint is bool or hint is str:
-        if not isinstance(value, hint):
-            allowed = "text" if hint is str else "true or false"
-            raise ConfigurationError(f"{what} is {shortened(value)}, must be {allowed}")
-        if spec.choices and value not in spec.choices:
-            raise UnknownNameError("value", str(value), spec.choices, what)
-        return value
-    minimum = -inf if spec.minimum is None else spec.minimum
-    maximum = inf if spec.maximum is None else spec.maximum
-    return check_number(value, what, spec.unit, minimum=minimum, maximum=maximum, whole=hint is int)

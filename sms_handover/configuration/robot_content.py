@@ -7,6 +7,7 @@ from typing import Any
 from sms_handover.configuration.yaml_reader import Mapping, read_yaml
 
 _ARMS, _DESCRIPTION = "arms", "description"
+_CLEARANCE, _FILE = "clearance", "file"
 
 
 def read_robot_content(path: Path) -> Mapping:
@@ -16,6 +17,8 @@ def read_robot_content(path: Path) -> Mapping:
 
 def with_arm_descriptions(content: Mapping, folder: Path) -> Mapping:
     """Return the content of a robot with the arm files that it names read, relative to ``folder``.
+
+    So are the paths of meshes.
 
     Anything that is not as a robot has it is left to the reader of robots.
     """
@@ -27,6 +30,21 @@ def with_arm_descriptions(content: Mapping, folder: Path) -> Mapping:
         named = copy(arms)
         named.update({name: _described(arm, folder) for name, arm in arms.items()})
         result[_ARMS] = named
+    if isinstance(content.get(_CLEARANCE), Mapping):
+        result[_CLEARANCE] = _placed(content[_CLEARANCE], folder)
+    return result
+
+
+def _placed(value: Any, folder: Path) -> Any:
+    """Return a part of the section on clearance with the files of meshes as URIs, which hold anywhere."""
+    if isinstance(value, list):
+        return [_placed(item, folder) for item in value]
+    if not isinstance(value, Mapping):
+        return value
+    result = copy(value)
+    for key, item in value.items():
+        is_path = key == _FILE and isinstance(item, str) and item and "://" not in item
+        result[key] = (folder / item).resolve().as_uri() if is_path else _placed(item, folder)
     return result
 
 

@@ -20,7 +20,7 @@ EXTENDS, DESCRIPTION, LAW, SEED = "extends", "description", "law", "seed"
 _SUFFIX = ".yaml"
 _SECTIONS = (COMMON, *LOOP_NODES)
 SHORT = {LAW: CONTROLLER, SEED: COMMON}  # paths that stand for a parameter of the same name
-_KEYS = (EXTENDS, DESCRIPTION, ROBOT, SCHEDULE, DEPUTY, *SHORT, *ROLES, *_SECTIONS)
+KEYS = (EXTENDS, DESCRIPTION, ROBOT, SCHEDULE, DEPUTY, *SHORT, *ROLES, *_SECTIONS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ def _load(source: str, folder: Path, where: str, extended_by: Sequence[Path]) ->
         chain = " extends ".join(one.stem for one in (*extended_by, path))
         raise ConfigurationError(f"{where}: scenarios extend each other: {chain}")
     root = Section.read(path)
-    root.only((), _KEYS)
+    root.only((), KEYS)
     base = None
     if EXTENDS in root:
         base = _load(root.text(EXTENDS), path.parent, root.where(EXTENDS), (*extended_by, path))

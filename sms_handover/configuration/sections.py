@@ -2,31 +2,52 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from math import inf
+from dataclasses import replace
 from pathlib import Path
 from reprlib import repr as shortened
 from typing import Any
 
-from sms_handover.configuration.checks import check_number, check_vector
+from sms_handover.configuration.field_specification import (
+    EitherSpec,
+    ListSpec,
+    MappingSpec,
+    NamedSpec,
+    Spec,
+    ValueSpec,
+)
 from sms_handover.configuration.yaml_reader import Mapping, read_yaml
 from sms_handover.errors import ConfigurationError, UnknownNameError
 
 
 class Section:
-    """A mapping of a YAML file; ``kind`` is the error that its getters raise."""
+    """A mapping of a YAML file; ``kind`` is the error that its getters raise.
+
+    With a specification of its fields, unknown and missing keys are rejected at once, and each getter
+    checks the value of its key as specified.
+    """
 
     def __init__(
-        self, values: Mapping, file: Path, kind: type[ConfigurationError] = ConfigurationError, path: str = ""
+        self,
+        values: Mapping,
+        file: Path,
+        kind: type[ConfigurationError] = ConfigurationError,
+        path: str = "",
+        spec: Spec | None = None,
     ) -> None:
         self._values, self._file, self._kind, self._path = values, values.file or file, kind, path
+        self._spec = spec
         for key in values:
             if not isinstance(key, str):
                 raise self.error(f"key {key!r} must be text", key)
+        if isinstance(spec, MappingSpec):
+            self.only(tuple(spec.required), tuple(spec.optional))
 
     @classmethod
-    def read(cls, file: Path, kind: type[ConfigurationError] = ConfigurationError) -> "Section":
+    def read(
+        cls, file: Path, kind: type[ConfigurationError] = ConfigurationError, spec: Spec | None = None
+    ) -> "Section":
         """Return the top-level mapping of a file; raises ConfigurationError."""
-        return cls(read_yaml(file), file, kind)
+        return cls(read_yaml(file), file, kind, spec=spec)
 
     def __contains__(self, key: str) -> bool:
         return key in self._values
@@ -81,18 +102,21 @@ class Section:
 
     def section(self, key: str) -> "Section":
         """Return the mapping of a key."""
-        return self._mapping(self.value(key), key, self.path(key))
+        return self._mapping(self.value(key), key, self.path(key), self._field(key))
 
     def sections(self, key: str) -> list["Section"]:
         """Return the mappings in the list of a key; each has its name, or its index, in its path."""
-        values = self.value(key)
+        values, spec = self.value(key), self._field(key)
         if not isinstance(values, list):
             raise self._refusal(key, "a list")
+        if isinstance(spec, ListSpec) and len(values) < spec.shortest:
+            raise self.error(f"{self.path(key)} has {len(values)} entries, must be >= {spec.shortest}", key)
+        each = spec.each if isinstance(spec, ListSpec) else None
         found = []
         for index, item in enumerate(values):
             name = item.get("name") if isinstance(item, Mapping) else None
             place = f".{name}" if isinstance(name, str) and name else f"[{index}]"
-            found.append(self._mapping(item, key, self.path(key) + place))
+            found.append(self._mapping(item, key, self.path(key) + place, each))
         return found
 
     def text(self, key: str) -> str:
@@ -109,27 +133,48 @@ class Section:
             raise self.unknown(kind, name, known, key)
         return name
 
-    def number(
-        self, key: str, unit: str = "", *, minimum: float = -inf, maximum: float = inf, above: float = -inf
-    ) -> float:
-        """Return the finite number of a key."""
-        value, what, kind = self.value(key), self._what(key), self._kind
-        return check_number(value, what, unit, minimum=minimum, maximum=maximum, above=above, error=kind)
+    def number(self, key: str) -> float:
+        """Return the number of a key, as its specification allows."""
+        return float(self._checked(key))
 
-    def count(self, key: str, minimum: int, maximum: int) -> int:
-        """Return the whole number of a key."""
-        value, what = self.value(key), self._what(key)
-        return int(check_number(value, what, minimum=minimum, maximum=maximum, whole=True, error=self._kind))
+    def vector(self, key: str, size: int | None = None) -> tuple[float, ...]:
+        """Return the numbers of a key; ``size`` is how many where the specification does not say it."""
+        numbers: tuple[float, ...] = self._checked(key, size)
+        return numbers
 
-    def vector(self, key: str, size: int, unit: str = "", *, above: float = -inf) -> tuple[float, ...]:
-        """Return the ``size`` finite numbers of a key."""
-        return check_vector(self.value(key), size, self._what(key), unit, above=above, error=self._kind)
+    def one_of(self, what: str) -> str:
+        """Return which of the keys the mapping has, of which its specification asks for exactly one."""
+        known = self._spec.one_of if isinstance(self._spec, MappingSpec) else ()
+        given = [key for key in known if key in self]
+        if len(given) != 1:
+            raise self.error(f"{what} must have exactly one of {', '.join(known)}")
+        return given[0]
 
-    def _mapping(self, value: object, key: str, path: str) -> "Section":
+    def _field(self, key: str) -> Spec | None:
+        """Return the specification of a key; of a word or something else, that of something else."""
+        spec = self._spec
+        found = (
+            spec.fields[key]
+            if isinstance(spec, MappingSpec)
+            else spec.each
+            if isinstance(spec, NamedSpec)
+            else None
+        )
+        return found.other if isinstance(found, EitherSpec) else found
+
+    def _checked(self, key: str, size: int | None = None) -> Any:
+        """Return the value of a key, checked as specified."""
+        spec = self._field(key)
+        if not isinstance(spec, ValueSpec):
+            raise TypeError(f"{self.path(key)} is not specified as a value")
+        spec = spec if size is None else replace(spec, size=size)
+        return spec.check(self.value(key), self._what(key), self._kind)
+
+    def _mapping(self, value: object, key: str, path: str, spec: Spec | None) -> "Section":
         """Return a mapping at a key as a section."""
         if not isinstance(value, Mapping):
             raise self.error(f"{path} is {shortened(value)}, must be a mapping", key)
-        return Section(value, self._file, self._kind, path)
+        return Section(value, self._file, self._kind, path, spec)
 
     def _refusal(self, key: str, allowed: str) -> ConfigurationError:
         """Return the error on a value of the wrong type."""

@@ -32,7 +32,7 @@ def with_values(content: Mapping, document: str, values: Sequence[str], role: st
     ConfigurationError; keys and values that a document may not have are left to its own checks.
     """
     for text in values:
-        of_role, of_document, steps = _path(text)
+        of_role, of_document, steps = path_of(text)
         if (of_role, of_document) == (role, document):
             content = _set(content, steps, load_value(text.partition(":=")[2], text), text)
     return content
@@ -40,11 +40,11 @@ def with_values(content: Mapping, document: str, values: Sequence[str], role: st
 
 def roles_of(values: Sequence[str]) -> Iterator[str]:
     """Yield the roles of the values that are set for one role alone; raises ConfigurationError."""
-    yield from (role for role, _, _ in map(_path, values) if role)
+    yield from (role for role, _, _ in map(path_of, values) if role)
 
 
-def _path(text: str) -> tuple[str, str, list[str]]:
-    """Return role ('' for everybody), document, and the steps below it, of an assignment."""
+def path_of(text: str) -> tuple[str, str, list[str]]:
+    """Return role ('' for everybody), document, and the steps below it, of an assignment ``path:=value``."""
     path, assigned, _ = text.partition(":=")
     role, steps = "", _STEP.findall(path)
     if steps and steps[0] in ROLES:

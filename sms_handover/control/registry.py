@@ -45,6 +45,13 @@ def law_named(name: str, where: str = "") -> Law[Any]:
     return _loaded(points[0])
 
 
+def package_of(name: str) -> str:
+    """Return the name of the package that offers a law; raises UnknownNameError if there is no such law."""
+    require_law(name)
+    points = [*entry_points(group=GROUP, name=name)]
+    return GROUP.partition(".")[0] if name in SHIPPED else _package(points[0])
+
+
 def _loaded(point: EntryPoint) -> Law[Any]:
     """Return the law that an entry point refers to; raises ConfigurationError where it is none."""
     try:

@@ -1,4 +1,4 @@
-"""Events of a run: what nodes have decided, such as watchdogs, rejected messages and retried phases.
+"""Events of a run: what nodes have decided or found, such as watchdogs, retried phases and exceeded limits.
 
 ``docs/watchdogs.md`` has the kinds of events and their causes. A kind is a plain word, so that a bag with
 kinds of another version can be read.
@@ -17,7 +17,9 @@ NO_ANSWER = "no_answer"
 RESYNCHRONISED = "resynchronised"
 GRASP_MISSED, PHASE_RETRIED, GRASP_FAILED = "grasp_missed", "phase_retried", "grasp_failed"
 IK_FAILED = "ik_failed"
+COLLISION = "collision"
 MESSAGE_REFUSED = "refused"
+POSITION_EXCEEDED, RATE_EXCEEDED = "position_exceeded", "rate_exceeded"
 
 
 class Severity(Enum):

@@ -67,6 +67,7 @@ JOINT_REFERENCE = "joint_reference"
 TASK_PHASE = "task/phase"
 GRASP_EVENT = "task/grasp_event"
 DEPUTY_POSE = "deputy/pose"
+CLEARANCE = "clearance"  # only where it is measured online
 LINEAR_MOMENTUM = "momentum/linear"
 ANGULAR_MOMENTUM = "momentum/angular"
 ENERGY = "energy"
@@ -96,8 +97,8 @@ SOLVE_IK = "solve_ik"  # service of the ik node
 _OURS = "sms_handover_interfaces/msg"
 
 
-def graph_topics(arms: Iterable[str]) -> tuple[Topic, ...]:
-    """Return every topic of the graph for a robot with these arms."""
+def graph_topics(arms: Iterable[str], *, clearance: bool = False) -> tuple[Topic, ...]:
+    """Return every topic of the graph for a robot with these arms; ``clearance`` if it is measured online."""
     everyone_else = (TRAJECTORY, IK, CONTROLLER)
     pose, vector = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/Vector3Stamped"
     odometry = "nav_msgs/msg/Odometry"
@@ -127,6 +128,8 @@ def graph_topics(arms: Iterable[str]) -> tuple[Topic, ...]:
         Topic(CLOCK, "rosgraph_msgs/msg/Clock", (PLANT,), (), Rate.CLOCK),
         Topic(DIAGNOSTICS, "diagnostic_msgs/msg/DiagnosticArray", LOOP_NODES, (), Rate.WALL),
     ]
+    if clearance:
+        table.append(Topic(CLEARANCE, f"{_OURS}/Clearance", (PLANT,), (TRAJECTORY,), Rate.REFERENCE))
     for arm in arms:
         table.append(Topic(target_pose(arm), pose, (TRAJECTORY,), (), Rate.REFERENCE))
         table.append(Topic(tool_pose(arm), pose, (PLANT,), (), Rate.REFERENCE))

@@ -5,7 +5,15 @@ from typing import Any
 
 from sms_handover.graph.events import RunEvent, Severity
 from sms_handover.graph.message_constants import member_of
-from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, PhaseState, TaskPhase
+from sms_handover.types import (
+    Collision,
+    GraspAction,
+    GraspCommand,
+    GraspEvent,
+    GraspStatus,
+    PhaseState,
+    TaskPhase,
+)
 from sms_handover.units import NS_PER_S
 
 
@@ -66,6 +74,16 @@ def grasp_event(message: Any) -> GraspEvent:
         angle_error=message.angle_error,
         relative_speed=message.relative_speed,
         detail=message.detail,
+    )
+
+
+def collisions(message: Any) -> tuple[Collision, ...]:
+    """Return the groups of a Clearance whose bodies are nearer to each other than is allowed."""
+    stamp_ns = header_ns(message)
+    return tuple(
+        Collision(stamp_ns, item.group, (item.first_body, item.second_body), item.distance, item.allowed)
+        for item in message.groups
+        if item.distance < item.allowed
     )
 
 

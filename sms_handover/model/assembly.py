@@ -1,12 +1,15 @@
 """Assembly of parts to arms, and of arms and a spacecraft to the robot, checked when it is made."""
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from re import fullmatch
+from types import MappingProxyType
 
-from sms_handover.errors import RobotDescriptionError
-from sms_handover.frames import joint_name
+from sms_handover.errors import RobotDescriptionError, UnknownNameError
+from sms_handover.frames import BASE, DEPUTY, joint_name, mount_frame, tool_frame
 from sms_handover.model.parts import Floats, Gripper, Inertia, JointDescription, LinkDescription, Origin
+from sms_handover.model.shapes import ContactPairs, Shapes
 from sms_handover.model.validation import vector
 
 
@@ -83,18 +86,39 @@ class Base:
 
 @dataclass(frozen=True)
 class RobotDescription:
-    """A free-floating spacecraft with one or more arms, in the order of the file."""
+    """A free-floating spacecraft with one or more arms, in the order of the file.
+
+    ``shapes`` has the solids of some links by name, in place of what is drawn for them, and ``contacts``
+    the pairs of links, or of a link and the deputy, whose contact counts, or does not, whatever is derived.
+    """
 
     name: str
     base: Base
     arms: tuple[ArmDescription, ...]
+    shapes: Mapping[str, Shapes] = field(default_factory=dict)
+    contacts: ContactPairs = field(default_factory=ContactPairs)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "shapes", MappingProxyType(dict(self.shapes)))
         if not self.arms:
             raise RobotDescriptionError("the robot has 0 arms, must be >= 1")
         name, count = Counter(arm.name for arm in self.arms).most_common(1)[0]
         if count > 1:
             raise RobotDescriptionError(f"arm name {name!r} is given {count} times")
+        named = [link for pair in (*self.contacts.allow, *self.contacts.count) for link in pair]
+        for links, known in ((self.shapes, self.link_names), (named, (*self.link_names, DEPUTY))):
+            for link in links:
+                if link not in known:
+                    raise RobotDescriptionError(str(UnknownNameError("link", link, known)))
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """The names of all links, those of frames without a body included."""
+        names = [BASE]
+        for arm in self.arms:
+            links = (link.name for link in arm.links)
+            names += [mount_frame(arm.name), *links, arm.gripper.name, tool_frame(arm.name)]
+        return tuple(names)
 
     @property
     def mass(self) -> float:

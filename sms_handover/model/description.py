@@ -5,6 +5,7 @@ from pathlib import Path
 
 from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.robot_content import read_robot_content
+from sms_handover.configuration.robot_fields import ROBOT_FIELDS, UNIFORM_BOX
 from sms_handover.configuration.sections import Section
 from sms_handover.configuration.yaml_reader import Mapping
 from sms_handover.errors import RobotDescriptionError
@@ -12,8 +13,7 @@ from sms_handover.frames import BASE
 from sms_handover.model.arm_file import override_limits, read_arm, read_origin
 from sms_handover.model.assembly import ArmDescription, Base, Panel, RobotDescription, gripper_name
 from sms_handover.model.parts import Floats, Gripper, Inertia, box_moments
-
-_UNIFORM_BOX = "uniform_box"
+from sms_handover.model.shape_section import read_contact_pairs, read_shapes
 
 
 def load_robot(path: Path | None = None) -> RobotDescription:
@@ -30,45 +30,41 @@ def robot_of(content: Mapping) -> RobotDescription:
 
     Raises RobotDescriptionError on a key or value that no robot can have, with file and line.
     """
-    root = Section(content, Path(), RobotDescriptionError)
-    root.only(("name", "base", "arms"))
+    root = Section(content, Path(), RobotDescriptionError, spec=ROBOT_FIELDS)
     name, base = root.text("name"), _base(root.section("base"))
     arms = tuple(map(_arm, root.sections("arms")))
     with root.located("arms"):
-        return RobotDescription(name, base, arms)
+        robot = RobotDescription(name, base, arms)
+    if "clearance" not in root:
+        return robot
+    section = root.section("clearance")
+    with section.located():
+        return replace(robot, shapes=read_shapes(section), contacts=read_contact_pairs(section))
 
 
 def _base(section: Section) -> Base:
     """Return the spacecraft."""
-    section.only(("mass", "size", "com", "inertia"), optional=("panels",))
-    mass, size = section.number("mass", "kg", above=0.0), section.vector("size", 3, "m", above=0.0)
-    com, moments = section.vector("com", 3, "m"), _base_moments(section, mass, size)
+    mass, size = section.number("mass"), section.vector("size")
+    com, moments = section.vector("com"), _base_moments(section, mass, size)
     with section.located("inertia"):
         inertia = Inertia(BASE, mass, com, moments)
     panels = section.sections("panels") if "panels" in section else ()
-    return Base(inertia, size, tuple(map(_panel, panels)))
+    return Base(inertia, size, tuple(Panel(item.vector("xyz"), item.vector("size")) for item in panels))
 
 
 def _base_moments(section: Section, mass: float, size: Floats) -> Floats:
     """Return the six moments given, or those of a uniform box."""
     if isinstance(section.value("inertia"), str):
-        section.name("inertia", "inertia", [_UNIFORM_BOX])
+        section.name("inertia", "inertia", [UNIFORM_BOX])
         return box_moments(mass, size)
-    return section.vector("inertia", 6, "kg m^2")
-
-
-def _panel(section: Section) -> Panel:
-    """Return one solar panel."""
-    section.only(("xyz", "size"))
-    return Panel(section.vector("xyz", 3, "m"), section.vector("size", 3, "m", above=0.0))
+    return section.vector("inertia")
 
 
 def _arm(section: Section) -> ArmDescription:
     """Return one arm: its own description file, with what the robot file adds or overrides."""
-    section.only(("name", "description", "mount", "gripper", "rotor_inertia"), optional=("limits",))
     name = section.text("name")
     joints, links, flange = read_arm(section.section("description"), name)
-    rotor = section.vector("rotor_inertia", len(joints), "kg m^2")
+    rotor = section.vector("rotor_inertia", len(joints))
     with section.located("rotor_inertia"):
         joints = [replace(joint, rotor_inertia=kg_m2) for joint, kg_m2 in zip(joints, rotor, strict=True)]
     if "limits" in section:
@@ -80,7 +76,6 @@ def _arm(section: Section) -> ArmDescription:
 
 def _gripper(section: Section, arm: str) -> Gripper:
     """Return the gripper of an arm."""
-    section.only(("mass", "radius", "length"))
-    mass = section.number("mass", "kg", above=0.0)
-    radius, length = (section.number(key, "m", above=0.0) for key in ("radius", "length"))
-    return Gripper(gripper_name(arm), mass, radius, length)
+    return Gripper(
+        gripper_name(arm), section.number("mass"), section.number("radius"), section.number("length")
+    )

@@ -3,6 +3,7 @@
 import numpy as np
 import pinocchio as pin
 
+from sms_handover.configuration.sections import Section
 from sms_handover.types import Array, Pose, Twist, frozen
 
 
@@ -25,6 +26,11 @@ def pose_from_xyz_rpy(xyz: Array, rpy: Array) -> Pose:
     """Return a pose from a position in m and fixed-axis roll, pitch, yaw in rad (as in URDF)."""
     rotation = pin.rpy.rpyToMatrix(np.asarray(rpy, dtype=np.float64))
     return pose_of(pin.SE3(rotation, np.asarray(xyz, dtype=np.float64)))
+
+
+def read_pose(section: Section) -> Pose:
+    """Return the pose that a section gives by ``xyz`` and ``rpy``."""
+    return pose_from_xyz_rpy(np.array(section.vector("xyz")), np.array(section.vector("rpy")))
 
 
 def pose_row(pose: Pose) -> Array:

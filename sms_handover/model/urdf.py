@@ -3,13 +3,16 @@
 Numbers keep full double precision. URDF has no rotor inertia.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from math import atan2, hypot
 from xml.etree import ElementTree as ET
 
 from sms_handover.frames import BASE, mount_frame, tool_frame
 from sms_handover.model.assembly import ArmDescription, RobotDescription
 from sms_handover.model.parts import Inertia, JointDescription, LinkDescription, Origin
+from sms_handover.model.shape_elements import replace_solids, write_contacts
+from sms_handover.model.shapes import AT_ORIGIN
+from sms_handover.model.urdf_values import add_origin, numbers
 
 _COLOURS = {  # [-] red, green, blue, opacity; appearance only
     "body": (0.75, 0.68, 0.45, 1.0),
@@ -17,7 +20,6 @@ _COLOURS = {  # [-] red, green, blue, opacity; appearance only
     "link": (0.80, 0.82, 0.85, 1.0),
     "gripper": (0.25, 0.27, 0.30, 1.0),
 }
-_AT_ORIGIN = Origin((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 def to_urdf(robot: RobotDescription) -> str:
@@ -25,17 +27,20 @@ def to_urdf(robot: RobotDescription) -> str:
 
     Per arm: link ``<arm>_mount`` fixed to the body, joints ``<arm>_joint_<i>`` moving links
     ``<arm>_link_<i>``, then ``<arm>_gripper`` with its frame on the flange and ``<arm>_tool``, fixed.
-    Shapes are boxes and cylinders; the solar panels are visual only.
+    Shapes are boxes and cylinders; the solar panels are visual only. What the description says of clearance
+    replaces the collision elements of links, and is in an element of its own that others ignore.
     """
     root = ET.Element("robot", name=robot.name)
     for name, rgba in _COLOURS.items():
-        ET.SubElement(ET.SubElement(root, "material", name=name), "color", rgba=_numbers(rgba))
+        ET.SubElement(ET.SubElement(root, "material", name=name), "color", rgba=numbers(rgba))
     base = _link(root, BASE, robot.base.inertia)
-    _box(base, robot.base.size, _AT_ORIGIN, "body", solid=True)
+    _box(base, robot.base.size, AT_ORIGIN, "body", solid=True)
     for panel in robot.base.panels:
         _box(base, panel.size, Origin(panel.xyz, (0.0, 0.0, 0.0)), "panel", solid=False)
     for arm in robot.arms:
         _arm(root, arm)
+    replace_solids(root, robot.shapes)
+    write_contacts(root, robot.shapes, robot.contacts)
     ET.indent(root)
     return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
@@ -64,10 +69,10 @@ def _link(root: ET.Element, name: str, inertia: Inertia | None = None) -> ET.Ele
     link = ET.SubElement(root, "link", name=name)
     if inertia is not None:
         element = ET.SubElement(link, "inertial")
-        _origin(element, Origin(inertia.com, (0.0, 0.0, 0.0)))
-        ET.SubElement(element, "mass", value=_numbers([inertia.mass]))
+        add_origin(element, Origin(inertia.com, (0.0, 0.0, 0.0)))
+        ET.SubElement(element, "mass", value=numbers([inertia.mass]))
         keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-        moments = {key: _numbers([moment]) for key, moment in zip(keys, inertia.moments, strict=True)}
+        moments = {key: numbers([moment]) for key, moment in zip(keys, inertia.moments, strict=True)}
         ET.SubElement(element, "inertia", moments)
     return link
 
@@ -81,19 +86,19 @@ def _moving(root: ET.Element, parent: str, joint: JointDescription, link: LinkDe
     """Add the joint that moves a link."""
     element = ET.SubElement(root, "joint", name=joint.name, type="revolute")
     _connect(element, parent, link.name, joint.origin)
-    ET.SubElement(element, "axis", xyz=_numbers(joint.axis))
+    ET.SubElement(element, "axis", xyz=numbers(joint.axis))
     limits = {
-        "lower": _numbers([joint.lower]),
-        "upper": _numbers([joint.upper]),
-        "velocity": _numbers([joint.velocity]),
-        "effort": _numbers([joint.effort]),
+        "lower": numbers([joint.lower]),
+        "upper": numbers([joint.upper]),
+        "velocity": numbers([joint.velocity]),
+        "effort": numbers([joint.effort]),
     }
     ET.SubElement(element, "limit", limits)
 
 
 def _connect(joint: ET.Element, parent: str, child: str, origin: Origin) -> None:
     """Add parent and child of a joint, and its frame in the parent."""
-    _origin(joint, origin)
+    add_origin(joint, origin)
     ET.SubElement(joint, "parent", link=parent)
     ET.SubElement(joint, "child", link=child)
 
@@ -101,7 +106,7 @@ def _connect(joint: ET.Element, parent: str, child: str, origin: Origin) -> None
 def _box(link: ET.Element, size: Sequence[float], origin: Origin, colour: str, *, solid: bool) -> None:
     """Add a box to the visuals and, if solid, to the collision shapes."""
     for element in _shapes(link, origin, colour, solid=solid):
-        ET.SubElement(element, "box", size=_numbers(size))
+        ET.SubElement(element, "box", size=numbers(size))
 
 
 def _cylinder_to(link: ET.Element, end: Sequence[float], radius: float, colour: str) -> None:
@@ -113,7 +118,7 @@ def _cylinder_to(link: ET.Element, end: Sequence[float], radius: float, colour: 
         return
     middle = Origin((x / 2.0, y / 2.0, z / 2.0), (0.0, atan2(across, z), atan2(y, x)))
     for element in _shapes(link, middle, colour, solid=True):
-        ET.SubElement(element, "cylinder", radius=_numbers([radius]), length=_numbers([length]))
+        ET.SubElement(element, "cylinder", radius=numbers([radius]), length=numbers([length]))
 
 
 def _shapes(link: ET.Element, origin: Origin, colour: str, *, solid: bool) -> list[ET.Element]:
@@ -121,18 +126,8 @@ def _shapes(link: ET.Element, origin: Origin, colour: str, *, solid: bool) -> li
     geometries = []
     for kind in ("visual", "collision") if solid else ("visual",):
         element = ET.SubElement(link, kind)
-        _origin(element, origin)
+        add_origin(element, origin)
         geometries.append(ET.SubElement(element, "geometry"))
         if kind == "visual":
             ET.SubElement(element, "material", name=colour)
     return geometries
-
-
-def _origin(parent: ET.Element, origin: Origin) -> None:
-    """Place an element in the frame of its link."""
-    ET.SubElement(parent, "origin", xyz=_numbers(origin.xyz), rpy=_numbers(origin.rpy))
-
-
-def _numbers(values: Iterable[float]) -> str:
-    """Return the values with as many digits as it takes to read them back exactly."""
-    return " ".join(repr(float(value)) for value in values)

@@ -1,7 +1,7 @@
 """Plant node: the simulated robot and deputy, and the clock of the loop."""
 
 import gc
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from time import monotonic
 from typing import Any
@@ -12,6 +12,7 @@ from sms_handover_interfaces.msg import RunState
 from std_msgs.msg import String
 
 from sms_handover.errors import MessageError, Reason
+from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import (
     DEPUTY_MARKER,
     GRASP_EVENT,
@@ -26,6 +27,7 @@ from sms_handover.graph.topics import (
     TASK_PHASE,
 )
 from sms_handover.nodes.parts.marker import deputy_marker
+from sms_handover.nodes.parts.plant_clearance import PlantClearance
 from sms_handover.nodes.parts.plant_outputs import PlantOutputs
 from sms_handover.nodes.parts.run_control import RunControl
 from sms_handover.nodes.parts.watchdogs import AnswerWatchdog, CommandWatchdog, lag_skipped
@@ -84,6 +86,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self._reconfigured = self.runs > 0
         self._wait_for_others()
         self._make_endpoints()
+        self._clearance = PlantClearance(self.robot, schedule, self.common, self.endpoints.publisher)
         self.create_timer(_TIMING_PERIOD_S, self._publish_timing)
         if self.lockstep:
             self.create_timer(self.parameters.resend_after, self._resend)
@@ -214,6 +217,15 @@ class PlantNode(GraphNode[PlantParameters]):
         self._outputs.publish_loop(self._plant, with_reference=with_reference)
         self._loop_clock.published()
         self._outputs.publish_rest(self._plant, with_reference=with_reference)
+        if excesses := self._plant.take_excesses():
+            self._publish_excesses(excesses)
+        if with_reference:
+            self._clearance.state_published(self._plant)
+
+    def _publish_excesses(self, excesses: Iterable[RunEvent]) -> None:
+        """Publish limits of joints that have been exceeded."""
+        for event in excesses:
+            self.events.publish(event)
 
     def _resend(self) -> None:
         """Publish the state of this tick again if nothing has answered it for a while (lock step).
@@ -312,9 +324,11 @@ class PlantNode(GraphNode[PlantParameters]):
         self._failed_phase = task.name if task.failed else ""
         if task.end_ns:
             self._last_tick = self.common.last_tick(task.end_ns, failed=task.failed)
+        self._clearance.phase_begins(self._plant, task.index)
         for event in self._plant.execute(task.commands):
             self._publish[GRASP_EVENT].publish(event_message(event))
             self.get_logger().info(f"{event.command.action.value}: {event.status.value}, {event.detail}")
+        self._clearance.commands_executed(self._plant)
 
     # What the services of the run's control ask for
 
@@ -330,12 +344,15 @@ class PlantNode(GraphNode[PlantParameters]):
 
     def restart(self) -> None:
         """End this run and wait for the next one at time zero."""
+        if not self.finished:
+            self._publish_excesses(self._plant.end_excesses())
         self.enter(RunState.WAITING, "reset")
         if not self.finished:
             self.membership.end()
         self.membership.finished = False
         self._control.reset_run()
         self._plant.reset()
+        self._clearance.reset()
         self._inputs.reset_run()
         for order in self._orders.values():
             order.reset()
@@ -353,6 +370,7 @@ class PlantNode(GraphNode[PlantParameters]):
         """End the run and publish what real time has cost; every node then publishes its counts."""
         if not self.lockstep and self._loop_clock.misses:
             detail = f"{detail}; {self._loop_clock.misses}"
+        self._publish_excesses(self._plant.end_excesses())
         self.membership.finished = True
         self.enter(state, detail)
         self.membership.end()

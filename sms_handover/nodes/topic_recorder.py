@@ -49,7 +49,7 @@ class TopicRecorderNode(RunnableNode):
         self._choice = self.parameters.choice
         folder = self.parameters.folder or datetime.now().strftime("rosbag2_%Y_%m_%d-%H_%M_%S")
         try:
-            self._writer = BagWriter(Path(folder))
+            self._writer = BagWriter(Path(folder), split=self.parameters.split)
         except BagError as error:
             raise ConfigurationError(str(error)) from error
         self._subscribed: dict[str, tuple[str, QoSProfile]] = {}  # type and profile by topic

@@ -10,6 +10,7 @@ from sms_handover_interfaces.srv import SolveIK
 from sms_handover.errors import GraphError
 from sms_handover.frames import BASE, WORLD
 from sms_handover.graph.topics import (
+    CLEARANCE,
     DEPUTY_POSE,
     GRASP_EVENT,
     IK_STATUS,
@@ -24,7 +25,7 @@ from sms_handover.graph.topics import (
 from sms_handover.messages.values import time_ns
 from sms_handover.model.poses import pose_row
 from sms_handover.ros.codecs.convert import joints_in_order, set_joint_positions, set_pose
-from sms_handover.ros.codecs.events import read_grasp_event
+from sms_handover.ros.codecs.events import read_collisions, read_grasp_event
 from sms_handover.ros.codecs.loop_messages import (
     JointStateCodec,
     PoseCodec,
@@ -59,7 +60,9 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
 
     def prepare(self) -> None:
         """Set up the generator; that its targets are in reach, the IK node checks."""
-        self._generator = TrajectoryGenerator(self.robot, self.schedule, self.parameters)
+        self._generator = TrajectoryGenerator(
+            self.robot, self.schedule, self.parameters, abort_on_collision=self.common.aborts_on_collision
+        )
         self._reference_codec = JointStateCodec(self.robot.joint_names, ("position", "velocity"))
         self._pose_codec, self._phase_codec = PoseCodec(WORLD), PhaseCodec()
         self._lockstep = self.common.mode == LOCKSTEP
@@ -78,6 +81,9 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._reference = self.endpoints.publisher(JOINT_REFERENCE)
         self._targets = {arm: self.endpoints.publisher(target_pose(arm)) for arm in self.robot.arms}
         self.inputs.subscribe(GRASP_EVENT, self._on_grasp, stamped)
+        self._unmeasured_ns: int | None = None  # the stamp of the clearance that decides on the next period
+        if self.common.measures_clearance:
+            self.inputs.subscribe(CLEARANCE, self._on_clearance, stamped)
         state = StateCodec(self.robot.joint_names, WORLD, BASE)
         checks = (state.joints.checked, state.odometry.checked, self._pose_codec.checked)
         for topic, checked in zip(_INPUTS, checks, strict=True):
@@ -94,7 +100,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._stamp_ns = self._newest_ns = self._failures = 0
         self._overdue += self._requested is not None
         self._outputs = []
-        self._requested = None
+        self._requested = self._unmeasured_ns = None
 
     def report(self) -> NodeReport:
         """Return how many references were given and how many IK requests did not converge."""
@@ -108,6 +114,8 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
             return SOLVE_IK
         if self._waits_for_grasps:
             return GRASP_EVENT
+        if self._waits_for_clearance:
+            return CLEARANCE
         stamp = self._inputs.oldest_ns
         return (self._inputs.missing(stamp, _INPUTS) if stamp is not None else "") or DEPUTY_POSE
 
@@ -117,6 +125,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         if self._inputs.restarts_run(stamp):
             self._inputs.reset()
             self._generator.reset()
+            self._unmeasured_ns = None
         if topic == DEPUTY_POSE and self._requested is not None:
             self._repeat_request(stamp)
         elif topic == DEPUTY_POSE and stamp == self._stamp_ns:
@@ -137,9 +146,24 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         if self._requested is None:
             self._proceed(self._newest_ns)
 
+    @property
+    def _waits_for_clearance(self) -> bool:
+        """Whether the task waits for the clearance of the period before (lock step)."""
+        return self._lockstep and self._unmeasured_ns is not None
+
+    def _on_clearance(self, message: Stamped[bytes], sent_ns: int) -> None:
+        """Take the clearance of a period; the next state may have come before it."""
+        stamp, content = message
+        if self._lockstep and stamp != self._unmeasured_ns:
+            return  # it is of the run before
+        self._unmeasured_ns = None
+        self._generator.collided(read_collisions(content))
+        if self._requested is None:
+            self._proceed(self._newest_ns)
+
     def _proceed(self, stamp: int) -> None:
         """Work on the state of a stamp if all of it is there."""
-        if self._waits_for_grasps:
+        if self._waits_for_grasps or self._waits_for_clearance:
             return
         inputs = self._inputs.take(stamp, _INPUTS)
         if inputs is None:
@@ -207,6 +231,8 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         for arm, pose in targets_in_world.items():
             data = self._pose_codec.pack(state.stamp_ns, pose_row(pose))
             self._outputs.append((self._targets[arm], data))
+        if self.common.measures_clearance:
+            self._unmeasured_ns = state.stamp_ns
         self._publish_again()
 
     def _publish_again(self) -> None:

@@ -6,11 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from sms_handover.errors import ConfigurationError
+from sms_handover.graph.events import RunEvent
 from sms_handover.model.conserved import ConservedQuantities, conserved_quantities
 from sms_handover.model.robot_model import BASE_NQ, RobotModel
 from sms_handover.plant.deputy import DeputyMotion, MasslessDeputy
+from sms_handover.plant.enforced_limits import EnforcedLimits
 from sms_handover.plant.grasping import execute_grasp
 from sms_handover.plant.integrators import TABLEAUS
+from sms_handover.plant.joint_limits import ENFORCE, Excess, JointLimitWatch
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.plant.stepper import PinocchioStepper, Stepper
 from sms_handover.types import (
@@ -38,14 +41,16 @@ class InitialState:
 
 @dataclass(frozen=True, eq=False)
 class PlantState:
-    """Everything that the later motion of a plant and its counts depend on."""
+    """Everything that the later motion of a plant, its counts and its events depend on."""
 
     tick: int
     q: Array
     v: Array
     joint_effort: Array
     work: float
+    losses: float
     saturated_ticks: tuple[int, ...]
+    excesses: tuple[Excess, ...]
     deputy: DeputyMotion
 
 
@@ -53,6 +58,7 @@ class FreeFloatingPlant:
     """H(q) v' + c(q, v) = (0, u): a base without actuators that carries arms, and no gravity.
 
     The efforts of a tick are held constant over it. Time is counted in whole ticks, so stamps are exact.
+    Enforced joint limits are in :class:`~sms_handover.plant.enforced_limits.EnforcedLimits`.
     ``q``, ``v`` and ``joint_effort`` are those of :attr:`state`, as read-only arrays, new ones each tick.
     """
 
@@ -71,6 +77,10 @@ class FreeFloatingPlant:
         self._tick_ns = tick_ns
         self._tick_s = ns_to_seconds(tick_ns)
         self._stepper = stepper or PinocchioStepper(robot, TABLEAUS[parameters.integrator], self._tick_s)
+        self._watch = JointLimitWatch(robot, tick_ns)
+        self._enforced: EnforcedLimits | None = None
+        if parameters.joint_limits == ENFORCE:
+            self._enforced = EnforcedLimits(robot, self._stepper, parameters.rated_speed, self._tick_s)
         self._check_start()
         self.reset()
 
@@ -81,14 +91,24 @@ class FreeFloatingPlant:
         self.q = read_only(robot.configuration(initial.base_in_world, initial.joint_position))
         self.v = read_only(np.zeros(robot.pin.nv))
         self.joint_effort = read_only(np.zeros(robot.n_joints))
-        self._work = 0.0
+        self._work = self._losses = 0.0
+        self._watch.reset()
         self._saturated_ticks = np.zeros(robot.n_joints, dtype=np.int64)
         self._deputy = MasslessDeputy(initial.deputy_in_world, initial.deputy_grasp_frames)
 
     def snapshot(self) -> PlantState:
         """Return the state to :meth:`restore`."""
-        counts, motion = tuple(self._saturated_ticks.tolist()), self._deputy.motion
-        return PlantState(self.tick, self.q, self.v, self.joint_effort, self._work, counts, motion)
+        return PlantState(
+            self.tick,
+            self.q,
+            self.v,
+            self.joint_effort,
+            self._work,
+            self._losses,
+            tuple(self._saturated_ticks.tolist()),
+            self._watch.excesses(self.stamp_ns),
+            self._deputy.motion,
+        )
 
     def restore(self, state: PlantState) -> None:
         """Go back to a former state; raises ConfigurationError if it is that of another robot."""
@@ -97,9 +117,10 @@ class FreeFloatingPlant:
             raise ConfigurationError(
                 f"the snapshot has {state.joint_effort.size} joints, must have {self.joint_effort.size}"
             )
-        self.tick, self._work = state.tick, state.work
+        self.tick, self._work, self._losses = state.tick, state.work, state.losses
         self.q, self.v, self.joint_effort = (read_only(a) for a in (state.q, state.v, state.joint_effort))
         self._saturated_ticks = np.array(state.saturated_ticks, dtype=np.int64)
+        self._watch.restore(state.excesses)
         self._deputy.restore(state.deputy)
 
     @property
@@ -122,6 +143,16 @@ class FreeFloatingPlant:
     def work(self) -> float:
         """Work in J that the joint efforts have done since the start."""
         return self._work
+
+    @property
+    def losses(self) -> float:
+        """Energy in J that has become heat since the start, in joint stops."""
+        return self._losses
+
+    @property
+    def net_work(self) -> float:
+        """Work less losses in J: by how much the kinetic energy has grown since the start."""
+        return self._work - self._losses
 
     @property
     def saturated_ticks(self) -> dict[str, int]:
@@ -151,14 +182,26 @@ class FreeFloatingPlant:
             for command in commands
         )
 
+    def take_excesses(self) -> tuple[RunEvent, ...]:
+        """Return the excesses of joint limits that are over; to be asked once for every state."""
+        return self._watch.add(self.tick, self.q, self.v)
+
+    def end_excesses(self) -> tuple[RunEvent, ...]:
+        """Return the excesses of joint limits that go on at the end of the run."""
+        return self._watch.end(self.stamp_ns)
+
     def apply(self, asked: Array) -> None:
-        """Integrate one tick under read-only efforts (n,), each limited to what its joint can give.
+        """Integrate one tick under read-only efforts (n,), each limited to what its motor can give.
 
         The work is u . (q_m(t + h) - q_m(t)), exact because u is constant over the tick.
         """
         effort = self._limited(asked)
         before = self.q
-        q, v = self._stepper.step(before, self.v, effort)
+        if self._enforced is None:
+            q, v = self._stepper.step(before, self.v, effort)
+        else:
+            q, v, effort, lost = self._enforced.step(before, self.v, effort)
+            self._losses += lost
         for part in (effort * (q[BASE_NQ:] - before[BASE_NQ:])).tolist():
             self._work += part
         self.q, self.v, self.joint_effort = q, v, effort

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from sms_handover.configuration.parameters import parameter
 from sms_handover.plant.deputy import GraspTolerance
 from sms_handover.plant.integrators import TABLEAUS
+from sms_handover.plant.joint_limits import ENFORCE, REPORT
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,17 @@ class PlantParameters:
         "largest speed of the tool relative to the grasp frame at which a grasp holds",
         unit="m/s",
         minimum=0.0,
+    )
+    joint_limits: str = parameter(
+        "report: joints may exceed their limits, and each excess is an event; enforce: motors drive no joint "
+        "past the limit of its rate, and joints stop at the limits of their positions",
+        choices=(REPORT, ENFORCE),
+    )
+    rated_speed: float = parameter(
+        "enforced limits: share of the rate limit up to which a motor gives its full torque; from there it "
+        "falls linearly, to zero at the limit",
+        minimum=0.0,
+        maximum=0.99,
     )
     command_hold: float = parameter(
         "real time: how long the last command is held while no newer one comes",

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from sms_handover.analysis.completion import Completion
 from sms_handover.analysis.highlights import succeeded
 from sms_handover.bag.ledger import Ledger, ledger_table
 from sms_handover.graph.events import graver_in_words
@@ -30,17 +31,27 @@ class RunCard:
     ledger: str
 
 
-def run_card(run: RecordedRun, style: RunStyle) -> RunCard:
-    """Return the card of a run, with the loss ledger as text."""
+def run_card(run: RecordedRun, style: RunStyle, completion: Completion) -> RunCard:
+    """Return the card of a run, with whether it is complete, and the loss ledger as text."""
     ticks, ledger = run.data.tick_ns, run.info.ledger
     return RunCard(
         style=style,
         duration=ns_to_seconds(int(ticks[-1] - ticks[0])) if len(ticks) else 0.0,
         started=run.info.provenance.get("start", ""),
         messages=run.info.message_count,
-        verdicts=(_grasps(run), *_decisions(run), _recording(ledger)),
+        verdicts=(_completion(completion), _grasps(run), *_decisions(run), _recording(ledger)),
         ledger="" if ledger is None else ledger_table(ledger),
     )
+
+
+def _completion(found: Completion) -> Verdict:
+    """Return whether the run did its task; the worst that it lacks stands first."""
+    if found.complete:
+        known = "" if found.clearance_known else ", but nothing is known of collisions"
+        return Verdict(f"task complete{known}", True if found.clearance_known else None)
+    first, *others = found.shortfalls
+    more = f", and {len(others)} more" if others else ""
+    return Verdict(f"task not complete: {first}{more}", good=False)
 
 
 def _grasps(run: RecordedRun) -> Verdict:

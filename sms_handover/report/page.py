@@ -8,6 +8,7 @@ from sms_handover.analysis.table import figure_sections
 from sms_handover.errors import ConfigurationError
 from sms_handover.report.animation import animation
 from sms_handover.report.cards import run_card
+from sms_handover.report.clearance_plot import clearance_plots
 from sms_handover.report.engine import plotly_script, render, web_file
 from sms_handover.report.page_data import page_data
 from sms_handover.report.plots import plot_groups
@@ -32,8 +33,9 @@ def report_page(runs: Sequence[RecordedRun]) -> str:
     comparison = compare_recorded(runs)
     styles = run_styles(names, [run.law for run in runs])
     infos, data = [run.info for run in runs], [run.data for run in runs]
-    groups = plot_groups(data)
-    moving = animation(runs)
+    clearances = [comparison.runs[name].clearance for name in names]
+    groups = (*plot_groups(data), clearance_plots(data, clearances))
+    moving = animation(runs, clearances)
     scripts = (plotly_script(), "\n".join(web_file(name) for name in _SCRIPTS))
     return render(
         "report.html.j2",
@@ -42,7 +44,10 @@ def report_page(runs: Sequence[RecordedRun]) -> str:
         policy=content_security_policy((*scripts, *inline_scripts(moving.html))),
         style=web_file("report.css"),
         scripts=scripts,
-        runs=[run_card(run, style) for run, style in zip(runs, styles, strict=True)],
+        runs=[
+            run_card(run, style, comparison.runs[run.name].completion)
+            for run, style in zip(runs, styles, strict=True)
+        ],
         highlights=highlights(comparison),
         sections=figure_sections(comparison, common_tolerance(runs)),
         claims=comparison.claims,

@@ -39,6 +39,8 @@ def _plot(plot: Plot) -> PageData:
         "unit": plot.unit,
         "series": list(plot.series),
         "magnitude": plot.magnitude,
+        "levels": [{"value": level.value, "text": level.text} for level in plot.levels],
+        "ceiling": plot.ceiling,
         "lines": [
             {
                 "run": line.run,

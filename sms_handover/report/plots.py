@@ -29,12 +29,21 @@ class Line:
     values: Array
 
 
+@dataclass(frozen=True)
+class Level:
+    """A horizontal line at ``value`` across a plot, with what it means."""
+
+    value: float
+    text: str
+
+
 @dataclass(frozen=True, eq=False)
 class Plot:
     """One plot over time; ``series`` has the names of the lines of each run.
 
     ``lines`` is empty if no run recorded the signal. A plot of a ``magnitude`` may have a logarithmic
-    scale, because no value is negative.
+    scale, because no value is negative. The axis of values ends at the ``ceiling`` if there is one, and
+    shows the ``levels``.
     """
 
     key: str
@@ -43,6 +52,8 @@ class Plot:
     series: tuple[str, ...]
     lines: tuple[Line, ...]
     magnitude: bool
+    levels: tuple[Level, ...] = ()
+    ceiling: float | None = None
 
 
 @dataclass(frozen=True)
@@ -91,7 +102,7 @@ def plot_groups(runs: Sequence[RunData]) -> tuple[PlotGroup, ...]:
     """Return all plots of the runs."""
     found = [signals.signals_of(run) for run in runs]
     arms = tuple(dict.fromkeys(arm for run in runs for arm in run.arms))
-    cuts = [_cuts(run) for run in runs]
+    cuts = [cuts_of(run) for run in runs]
 
     def plots(kinds: Sequence[_Kind], names: Sequence[str]) -> tuple[Plot, ...]:
         return tuple(_plot(kind, name, found, cuts) for kind in kinds for name in names)
@@ -149,7 +160,7 @@ def thin(time: Array, values: Array, cuts: Sequence[float]) -> tuple[Array, Arra
     return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
 
 
-def _cuts(run: RunData) -> list[float]:
+def cuts_of(run: RunData) -> list[float]:
     """Return the times in s at which a transient begins or ends."""
     cuts: list[float] = []
     for span in phase_spans(run):

@@ -10,6 +10,7 @@ from sms_handover.analysis.comparison import Comparison, compare
 from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.run.loop_record import LoopRecord, read_loop
 from sms_handover.bag.run.reader import read_run
+from sms_handover.clearance.contacts import CONTACT_DEPTH
 from sms_handover.errors import BagError, ConfigurationError
 from sms_handover.graph.topics import CONTROLLER, PLANT
 from sms_handover.plant.deputy import GraspTolerance
@@ -17,6 +18,7 @@ from sms_handover.run_data import RunData
 
 UNKNOWN_LAW = "unknown"
 
+_CONTACT_DEPTH = "contact_depth"
 _TOLERANCES = ("grasp_position_tolerance", "grasp_angle_tolerance", "grasp_speed_tolerance")
 
 
@@ -39,7 +41,8 @@ class RecordedRun:
         urdf, schedule = self.info.urdf_text, self.info.schedule_text
         if urdf is None or schedule is None:
             return None
-        texts = TaskTexts(urdf, schedule)
+        depth = self.info.parameters.get(PLANT, {}).get(_CONTACT_DEPTH)
+        texts = TaskTexts(urdf, schedule, float(depth) if isinstance(depth, int | float) else CONTACT_DEPTH)
         return texts if texts.fit(self.data) else None
 
     @property

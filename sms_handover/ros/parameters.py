@@ -4,20 +4,20 @@ from collections.abc import Mapping
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from sms_handover.configuration.field_specification import ValueSpec
 from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.parameters import (
     EVERY_NODE,
-    ParameterSpec,
     build,
     defaults_of,
     read_parameter_files,
-    spec_of,
+    specs_of,
 )
 from sms_handover.configuration.scenario_file import ScenarioFile, load_scenario_file
 from sms_handover.errors import ConfigurationError, UnknownNameError
@@ -51,16 +51,15 @@ def declare(
     if file is not None:
         values.update(read_parameter_files([config_file(file)], section))
     values.update(scenario or {})
-    given = [item.name for item in fields(cls) if node.has_parameter(item.name)]  # type: ignore[arg-type]
+    specs = specs_of(cls)
+    given = [name for name in specs if node.has_parameter(name)]
     values.update({name: node.get_parameter(name).value for name in given})
     checked = build(cls, values, node.get_name())  # before ROS checks the range with errors of its own
-    hints = get_type_hints(cls)
-    for item in fields(cls):  # type: ignore[arg-type]
-        descriptor = _descriptor(spec_of(item), hints[item.name])
-        if item.name in given:
-            node.set_descriptor(item.name, descriptor)
+    for name, spec in specs.items():
+        if name in given:
+            node.set_descriptor(name, _descriptor(spec))
         else:
-            node.declare_parameter(item.name, values[item.name], descriptor)
+            node.declare_parameter(name, values[name], _descriptor(spec))
     return checked
 
 
@@ -108,7 +107,7 @@ def _yaml(value: object) -> str:
     return repr(value)
 
 
-def _descriptor(spec: ParameterSpec, hint: Any) -> ParameterDescriptor:
+def _descriptor(spec: ValueSpec) -> ParameterDescriptor:
     """Return what ``ros2 param describe`` shows of a parameter."""
     unit = f" [{spec.unit}]" if spec.unit else ""
     descriptor = ParameterDescriptor(
@@ -120,11 +119,11 @@ def _descriptor(spec: ParameterSpec, hint: Any) -> ParameterDescriptor:
     if spec.minimum is not None or spec.maximum is not None:
         low = -_LARGEST if spec.minimum is None else spec.minimum
         high = _LARGEST if spec.maximum is None else spec.maximum
-        if hint is float:
+        if spec.kind is float:
             descriptor.floating_point_range = [
                 FloatingPointRange(from_value=float(low), to_value=float(high))
             ]
-        if hint is int:
+        if spec.kind is int:
             top = _LARGEST_INT if spec.maximum is None else int(high)
             descriptor.integer_range = [IntegerRange(from_value=int(low), to_value=top)]
     return descriptor

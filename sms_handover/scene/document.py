@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from sms_handover.clearance.worst_pair import WorstPair
 from sms_handover.frames import DEPUTY
 from sms_handover.model.poses import pose_row
 from sms_handover.run_data import Stamps
@@ -25,6 +26,7 @@ def scene_document(name: str, scene: Scene) -> Document:
         **still_document(name, scene.shapes, scene.links, scene.arms, scene.deputy_size),
         **moving_document(scene.stamp_ns, np.concatenate(blocks, axis=1)),
         **task_document(scene.phases, scene.grasp_events),
+        **({"clearance": _clearance(scene.worst_pair)} if scene.worst_pair else {}),
     }
 
 
@@ -51,6 +53,17 @@ def task_document(phases: Sequence[TaskPhase], events: Sequence[GraspEvent]) -> 
     return {
         "phases": [{"name": phase.name, "start": ns_to_seconds(phase.stamp_ns)} for phase in phases],
         "events": [{"time": ns_to_seconds(event.stamp_ns), "text": _outcome(event)} for event in events],
+    }
+
+
+def _clearance(worst: WorstPair) -> Document:
+    """Return, per instant, the index of the worst pair (T,), its distance (T,) m and points (T, 2, 3) m."""
+    used, index = np.unique(worst.pair, return_inverse=True)
+    return {
+        "pairs": [" - ".join(worst.bodies[pair]) for pair in used.tolist()],
+        "pair": _base64(index, "<u2"),
+        "distances": _base64(worst.distance, "<f4"),
+        "points": _base64(worst.points_in_world, "<f4"),
     }
 
 

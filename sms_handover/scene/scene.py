@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from sms_handover.clearance.worst_pair import WorstPair
 from sms_handover.errors import ConfigurationError
 from sms_handover.frames import tool_frame
 from sms_handover.run_data import RunData, Stamps
@@ -25,7 +26,7 @@ class Scene:
     ``stamp_ns`` (T,) is simulation time; ``link_in_world`` (T, L, 7) is in the order of ``links``;
     ``deputy_size`` (3,) m are the edges of the deputy and ``deputy_in_world`` (T, 7) is its centre;
     ``target_in_world`` has (T, 7) per arm. What was not recorded is NaN. ``phases`` has one entry per
-    start of a phase.
+    start of a phase. ``worst_pair`` has the two bodies nearest to each other, None if that is unknown.
     """
 
     shapes: tuple[Shape, ...]
@@ -38,6 +39,7 @@ class Scene:
     target_in_world: Mapping[str, Array]
     phases: tuple[TaskPhase, ...]
     grasp_events: tuple[GraspEvent, ...]
+    worst_pair: WorstPair | None = None
 
     def __post_init__(self) -> None:
         self.stamp_ns.setflags(write=False)
@@ -55,7 +57,13 @@ class Scene:
         return self.link(tool_frame(arm))
 
 
-def make_scene(run: RunData, urdf: str, deputy_size: Array, frame_rate: float = FRAME_RATE) -> Scene:
+def make_scene(
+    run: RunData,
+    urdf: str,
+    deputy_size: Array,
+    frame_rate: float = FRAME_RATE,
+    worst_pair: WorstPair | None = None,
+) -> Scene:
     """Return the scene of a run at about ``frame_rate`` instants per s of simulation time.
 
     Each instant is a stamp at which both the state and the references were recorded, so every pose is a
@@ -78,6 +86,7 @@ def make_scene(run: RunData, urdf: str, deputy_size: Array, frame_rate: float = 
         target_in_world={arm: poses[periods] for arm, poses in run.target_pose.items()},
         phases=tuple(_beginnings(run.phases)),
         grasp_events=run.grasp_events,
+        worst_pair=worst_pair.at(stamps) if worst_pair else None,
     )
 
 

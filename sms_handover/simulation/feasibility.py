@@ -2,10 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf
 
 import numpy as np
 
+from sms_handover.clearance.bodies import BodyKind
+from sms_handover.clearance.distances import ClearanceModel
 from sms_handover.errors import ScheduleError
 from sms_handover.ik.levenberg_marquardt import solve_ik
 from sms_handover.ik.parameters import IkParameters
@@ -24,6 +27,7 @@ _PATH_STEPS = 64  # [-] midpoint steps along a joint path; their error is far be
 _MAX_SETTLE = 40  # [-] each round shrinks the error by about the arms' share of the mass
 _SETTLED = 1e-9  # [m, rad] change of the base pose in a round
 _SETTLED_OUT_OF_REACH = 1e-4  # [m, rad] the same where only the size of a miss is wanted
+_DRAWS = 20  # [-] random configurations drawn for one that is free: a third overlaps with the shipped robot
 _RESTARTS = 10  # [-] random configurations tried where the present one does not lead to the target
 _WORTH_FOLLOWING = 0.9  # [-] share of the best error energy below which a restart is followed up
 _SEED = 20250101  # [-] so that a schedule always gets the same verdict
@@ -131,20 +135,18 @@ class _Walk:
     def _reach(self, phase: Phase) -> tuple[_Rest, int]:
         """Return where a phase ends and after how many restarts; raises ScheduleError where it cannot."""
         random = np.random.default_rng(_SEED)
-        robot = self._robot
         best = self._settle(phase, self._base, self._joints)
-        restarts = 0
+        restarts, overlapping = 0, None
         while best.missed and restarts < _RESTARTS:
             restarts += 1
-            seed = np.array(best.joint_position)
-            for arm in best.missed:
-                part = robot.arm_joints[arm]
-                low, high = np.maximum(robot.lower[part], -np.pi), np.minimum(robot.upper[part], np.pi)
-                seed[part] = random.uniform(low, high)
-            trial = self._solve(best.base_in_world, seed, best.targets)
+            trial = self._solve(best.base_in_world, self._restart(best, random), best.targets)
             if trial.energy < _WORTH_FOLLOWING * best.energy:
                 settled = self._settle(phase, trial.base_in_world, trial.joint_position)
-                best = min(best, settled, key=lambda rest: rest.energy)
+                if settled.missed or self._is_free(settled.base_in_world, settled.joint_position):
+                    best = min(best, settled, key=lambda rest: rest.energy)
+                else:
+                    overlapping = overlapping or settled  # taken if no other restart leads there
+        best = overlapping if best.missed and overlapping else best
         for arm, (position, angle) in best.missed.items():
             x, y, z = best.targets[arm].position
             raise ScheduleError(
@@ -153,6 +155,39 @@ class _Walk:
                 f"{angle * DEG_PER_RAD:.3g} deg away"
             )
         return best, restarts
+
+    def _restart(self, best: _Rest, random: np.random.Generator) -> Array:
+        """Return random joints of the arms that miss, at which no two bodies of the robot overlap.
+
+        If they do in many draws, as in a narrow place, the last one has to do.
+        """
+        robot, seed = self._robot, np.array(best.joint_position)
+        for _ in range(_DRAWS):
+            for arm in best.missed:
+                part = robot.arm_joints[arm]
+                low, high = np.maximum(robot.lower[part], -np.pi), np.minimum(robot.upper[part], np.pi)
+                seed[part] = random.uniform(low, high)
+            if self._is_free(best.base_in_world, seed):
+                break
+        return seed
+
+    def _is_free(self, base_in_world: Pose, joints: Array) -> bool:
+        """Whether no two bodies of the robot overlap; what the deputy may touch depends on the phase."""
+        q = self._robot.configuration(base_in_world, joints)
+        distances = self._clearance.distances(q, self._deputy.state.deputy_in_world)
+        return bool(distances[self._of_robot].min(initial=inf) >= 0.0)
+
+    @cached_property
+    def _clearance(self) -> ClearanceModel:
+        """The distances of the bodies, made where a restart needs them."""
+        robot = self._robot
+        return ClearanceModel(robot.pin, robot.urdf, robot.arms, self._schedule.deputy.size)
+
+    @cached_property
+    def _of_robot(self) -> list[int]:
+        """The pairs of bodies without the deputy."""
+        pairs = enumerate(self._clearance.pairs)
+        return [index for index, (_, other) in pairs if other.kind is not BodyKind.DEPUTY]
 
     def _settle(self, phase: Phase, base_in_world: Pose, seed: Array) -> _Rest:
         """Return the rest at which joints and base agree, by fixed-point iteration from a seed.

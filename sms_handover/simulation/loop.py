@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from sms_handover.clearance.monitor import PeriodClearance
 from sms_handover.control.law import Need
 from sms_handover.control.protocol import CheckedController, Controller, Guidance
 from sms_handover.control.registry import law_named
@@ -14,7 +15,7 @@ from sms_handover.ik.levenberg_marquardt import find_joints
 from sms_handover.model.conserved import ConservedQuantities
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.snapshot import Snapshot, controller_data, restore_controller
-from sms_handover.simulation.wiring import make_controller, make_plant
+from sms_handover.simulation.wiring import make_controller, make_monitor, make_plant
 from sms_handover.trajectory.generator import TrajectoryGenerator
 from sms_handover.types import (
     Array,
@@ -32,9 +33,10 @@ from sms_handover.types import (
 class Period:
     """What is worked out once per reference period, at the instant at which it begins.
 
-    Tool poses and targets are in ``world``; ``work`` J is that of the joint efforts since the start;
-    ``ik_status`` is None where no tool had a target. ``events`` has what came of grasp commands,
-    ``decisions`` what was decided about the task.
+    Tool poses and targets are in ``world``; ``work`` J is that of the joint efforts since the start, less
+    what joint stops have taken; ``ik_status`` is None where no tool had a target. ``events`` has what came
+    of grasp commands, ``decisions`` what was decided about the task. ``clearance`` is None unless it is
+    measured online.
     """
 
     phase: TaskPhase
@@ -47,13 +49,15 @@ class Period:
     ik_status: IkStatus | None
     events: tuple[GraspEvent, ...]
     decisions: tuple[RunEvent, ...]
+    clearance: PeriodClearance | None = None
 
 
 class Observation(NamedTuple):
     """One tick: the state at ``stamp_ns``, and the efforts (n,) N m that answer it.
 
     ``q`` (7 + n,), ``v`` (6 + n,) and ``joint_effort`` (n,) are those of :attr:`state`. ``period`` is there
-    at the instants at which a reference period begins.
+    at the instants at which a reference period begins. ``excesses`` tells of limits of the joints that were
+    exceeded, once that is over.
     """
 
     stamp_ns: int
@@ -63,6 +67,7 @@ class Observation(NamedTuple):
     effort: Array
     guidance: Guidance
     period: Period | None
+    excesses: tuple[RunEvent, ...] = ()
 
     @property
     def phase(self) -> TaskPhase:
@@ -106,7 +111,11 @@ class Loop:
         robot, schedule = self.scenario.model.robot, self.scenario.model.schedule
         self._common = parameters.common
         self._plant = make_plant(truth.robot, truth.schedule, self._common, parameters.plant)
-        self._generator = TrajectoryGenerator(robot, schedule, parameters.trajectory)
+        self._generator = TrajectoryGenerator(
+            robot, schedule, parameters.trajectory, abort_on_collision=self._common.aborts_on_collision
+        )
+        measured = self._common.measures_clearance
+        self._monitor = make_monitor(truth.robot, truth.schedule, self._common) if measured else None
         self._per_reference = self._common.ticks_per_reference
         self._controller: Controller
         if controller is not None:
@@ -115,7 +124,7 @@ class Loop:
         elif CONTROLLER in self._common.external:
             raise ConfigurationError(
                 "the controller is external: give simulate() a controller, "
-                "or check a recording with 'sms-handover play --closed-loop'"
+                "or check a recording with 'sms-handover verify --with plant'"
             )
         else:
             self.law = parameters.controller.law
@@ -132,6 +141,8 @@ class Loop:
         self._plant.reset()
         self._generator.reset()
         self._controller.reset()
+        if self._monitor:
+            self._monitor.reset()
         schedule, rest = self.scenario.model.schedule, self._plant.state
         phase = TaskPhase(0, 0, schedule.phases[0].name, end_ns=schedule.end_ns)
         reference = JointReference(0, rest.joint_position, rest.joint_velocity)
@@ -158,13 +169,15 @@ class Loop:
         if self.finished:
             raise ConfigurationError(f"the run ended at {plant.stamp_ns} ns: reset or restore the loop first")
         tick, stamp_ns, q, v, acted = plant.tick, plant.stamp_ns, plant.q, plant.v, plant.joint_effort
+        excesses = plant.take_excesses()
         period = None if tick % self._per_reference else self._begin_period()
         effort = self._controller.effort(stamp_ns, q, v)
         if tick < self.last_tick:
             plant.apply(effort)
         else:
             self.finished = True
-        return Observation(stamp_ns, q, v, acted, effort, self._guidance, period)
+            excesses += plant.end_excesses()
+        return Observation(stamp_ns, q, v, acted, effort, self._guidance, period, excesses)
 
     def advance_period(self) -> tuple[Observation, ...]:
         """Carry out the ticks up to the next reference period, or to the end of the run."""
@@ -180,7 +193,10 @@ class Loop:
         """
         controller = controller_data(self._controller, self.law)
         plant, trajectory = self._plant.snapshot(), self._generator.snapshot()
-        return Snapshot(self.seed, plant, trajectory, self.law, controller, self._guidance, self.finished)
+        clearance = self._monitor.snapshot() if self._monitor else None
+        return Snapshot(
+            self.seed, plant, trajectory, self.law, controller, self._guidance, self.finished, clearance
+        )
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot: the rest of the run is the same bit for bit.
@@ -190,6 +206,8 @@ class Loop:
         """
         self._plant.restore(snapshot.plant)
         self._generator.restore(snapshot.trajectory)
+        if self._monitor and snapshot.clearance:
+            self._monitor.restore(snapshot.clearance)
         self._guidance, phase = snapshot.guidance, snapshot.guidance.phase
         self.last_tick = self._common.last_tick(phase.end_ns, failed=phase.failed)
         self.seed, self.finished = snapshot.seed, snapshot.finished
@@ -214,9 +232,26 @@ class Loop:
         self._controller.guide(self._guidance)
         events = plant.execute(phase.commands)
         generator.grasped(events)
+        clearance = None
+        if self._monitor:
+            pose, holder = deputy.deputy_in_world, plant.deputy.holder
+            clearance = self._monitor.measure(state.stamp_ns, state.q, pose, phase.index, holder)
+            generator.collided(clearance.collisions)
         status = solution.status if solution else None
         if status:
             generator.solved(converged=status is IkStatus.CONVERGED)
         self.last_tick = self._common.last_tick(phase.end_ns, failed=phase.failed)
         decisions = generator.take_decisions()
-        return Period(phase, reference, aims, tools, deputy, conserved, plant.work, status, events, decisions)
+        return Period(
+            phase,
+            reference,
+            aims,
+            tools,
+            deputy,
+            conserved,
+            plant.net_work,
+            status,
+            events,
+            decisions,
+            clearance,
+        )

@@ -14,6 +14,10 @@ TRANSPORTS = (DIRECT, EXECUTOR)
 PINOCCHIO, COMPILED = "pinocchio", "compiled"
 DYNAMICS = (PINOCCHIO, COMPILED)
 EXTERNAL = (CONTROLLER,)
+AFTER, ONLINE = "after", "online"
+CLEARANCE = (AFTER, ONLINE)
+REPORT, ABORT = "report", "abort"
+ON_COLLISION = (REPORT, ABORT)
 
 
 @dataclass(frozen=True)
@@ -32,7 +36,7 @@ class CommonParameters:
     schedule: str = parameter("path of a task schedule; empty: that of the scenario")
     values: tuple[str, ...] = parameter(
         "values of robot, deputy and schedule by dotted path on top of the files, such as "
-        "robot.base.mass:=300 or schedule.phases.carry.duration:=12; those of the plant alone begin with "
+        "robot.base.mass:=300 or schedule.phases.carry.duration:=30; those of the plant alone begin with "
         "truth, as in truth.robot.base.mass:=264, those of every other node with model"
     )
     seed: int = parameter("what every random number of the run follows from", minimum=0, maximum=2**53)
@@ -43,6 +47,22 @@ class CommonParameters:
     )
     mode: str = parameter(
         "lockstep: every tick waits for its command; realtime: paced by the wall clock", choices=MODES
+    )
+    clearance: str = parameter(
+        "when distances between bodies are measured; after: the run, from its states; online: each reference "
+        "period of it too, as topic 'clearance', with an event where bodies collide",
+        choices=CLEARANCE,
+    )
+    on_collision: str = parameter(
+        "what becomes of the task when bodies collide; report: it goes on; abort: its phase has failed; "
+        "abort sets clearance online",
+        choices=ON_COLLISION,
+    )
+    contact_depth: float = parameter(
+        "depth to which gripper and deputy may enter each other where their contact is declared",
+        unit="m",
+        minimum=0.0,
+        maximum=1.0,
     )
     transport: str = parameter(
         "how a node takes its inputs; direct: from rcl; executor: by the executor of rclpy, which is slower "
@@ -89,6 +109,16 @@ class CommonParameters:
         """Return the number of ticks that the run integrates; a failed task ends it early."""
         end_ns = seconds_to_ns(self.duration) if self.duration > 0.0 else task_end_ns
         return (min(end_ns, task_end_ns) if failed else end_ns) // self.tick_ns
+
+    @property
+    def measures_clearance(self) -> bool:
+        """Whether distances between bodies are measured as the run goes on."""
+        return self.clearance == ONLINE or self.aborts_on_collision
+
+    @property
+    def aborts_on_collision(self) -> bool:
+        """Whether the task fails when bodies collide."""
+        return self.on_collision == ABORT
 
     @property
     def ticks_per_reference(self) -> int:

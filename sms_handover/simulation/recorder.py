@@ -47,6 +47,8 @@ class RunRecorder:
         effort[k] = tick.joint_effort
         command[k] = tick.effort
         self._count += 1
+        if tick.excesses:
+            self._decisions.extend(tick.excesses)
         if tick.period:
             self._add_period(tick.period)
 

@@ -10,6 +10,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from sms_handover.clearance.monitor import MonitorState
 from sms_handover.control.protocol import CheckedController, Controller, Guidance, Resumable
 from sms_handover.errors import ConfigurationError, ControllerError
 from sms_handover.plant.free_floating import PlantState
@@ -21,7 +22,8 @@ from sms_handover.types import read_only
 class Snapshot:
     """All that the rest of a run depends on besides its scenario, before a tick.
 
-    ``controller`` is the state of the controller under ``law``, as plain data.
+    ``controller`` is the state of the controller under ``law``, as plain data; ``clearance`` is None where
+    clearance is not measured during the run.
     """
 
     seed: int
@@ -31,6 +33,11 @@ class Snapshot:
     controller: Any
     guidance: Guidance
     finished: bool
+    clearance: MonitorState | None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the JSON form: read-only mappings have no pickled form of their own."""
+        return structured, (Snapshot, plain(self))
 
 
 def save_snapshot(snapshot: Snapshot, path: Path) -> None:

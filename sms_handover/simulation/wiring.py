@@ -4,6 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from sms_handover.clearance.distances import ClearanceModel
+from sms_handover.clearance.monitor import ClearanceMonitor
 from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
 from sms_handover.control.computed_torque import ComputedTorque
 from sms_handover.control.law import LawSetup, Need
@@ -50,6 +52,12 @@ def make_stepper(robot: RobotModel, dynamics: str, tableau: Tableau, h: float) -
     """Return the stepper for steps of ``h`` s; raises ConfigurationError."""
     kind = CompiledStepper if dynamics == COMPILED else PinocchioStepper
     return kind(robot, tableau, h)
+
+
+def make_monitor(robot: RobotModel, schedule: Schedule, common: CommonParameters) -> ClearanceMonitor:
+    """Return what measures the clearance of a run as it goes on; raises RobotDescriptionError."""
+    model = ClearanceModel(robot.pin, robot.urdf, robot.arms, schedule.deputy.size)
+    return ClearanceMonitor(model, schedule.grasping_arms, common.contact_depth)
 
 
 def gains_by_phase(schedule: Schedule, parameters: ControllerParameters) -> tuple[Any, ...]:

@@ -24,6 +24,7 @@ from sms_handover.trajectory.task_progress import ProgressState, Stage, TaskProg
 from sms_handover.trajectory.time_law import TIME_LAWS, Progress
 from sms_handover.types import (
     Array,
+    Collision,
     GraspEvent,
     IkRequest,
     JointReference,
@@ -73,10 +74,17 @@ class TrajectoryGenerator:
     Inverse kinematics is solved by the caller: in the graph it is a service.
     """
 
-    def __init__(self, robot: RobotModel, schedule: Schedule, parameters: TrajectoryParameters) -> None:
+    def __init__(
+        self,
+        robot: RobotModel,
+        schedule: Schedule,
+        parameters: TrajectoryParameters,
+        *,
+        abort_on_collision: bool = False,
+    ) -> None:
         self._robot = robot
         self._schedule = schedule
-        self._progress = TaskProgress(schedule, parameters)
+        self._progress = TaskProgress(schedule, parameters, abort_on_collision=abort_on_collision)
         self._time_law = TIME_LAWS[parameters.time_law]
         self._damping = parameters.jacobian_damping
         self.reset()
@@ -114,6 +122,10 @@ class TrajectoryGenerator:
     def grasped(self, events: Iterable[GraspEvent]) -> None:
         """Record outcomes of grasp commands."""
         self._progress.grasped(events)
+
+    def collided(self, collisions: Iterable[Collision]) -> None:
+        """Record which bodies collide in this period."""
+        self._progress.collided(collisions)
 
     def solved(self, *, converged: bool) -> None:
         """Record whether IK converged for the latest targets."""

@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 
 from sms_handover.configuration.checks import check_number
+from sms_handover.configuration.schedule_fields import HOLD, SCHEDULE_FIELDS, TARGET_KINDS
 from sms_handover.configuration.sections import Section
 from sms_handover.configuration.yaml_reader import Mapping, load_mapping, read_file
 from sms_handover.errors import ScheduleError
-from sms_handover.model.deputy import DeputyDescription
-from sms_handover.model.poses import pose_from_xyz_rpy
+from sms_handover.model.deputy import DeputyDescription, read_deputy
+from sms_handover.model.poses import read_pose
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.trajectory.schedule import (
     ArmTarget,
@@ -27,10 +28,6 @@ from sms_handover.trajectory.validate import check_phases
 from sms_handover.types import Array, GraspAction, GraspCommand, Pose
 from sms_handover.units import ns_to_seconds, seconds_to_ns
 
-MOST_RETRIES = 100  # of one phase; more is a mistake rather than patience
-_TARGET_KINDS = ("joints", "tool_in_world", "grasp_frame")
-_SHORTEST = 1e-9  # [s]
-
 
 def load_schedule(path: Path, robot: RobotModel, reference_period_ns: int) -> Schedule:
     """Return the schedule in a file; raises what :func:`schedule_of` does, or ConfigurationError."""
@@ -43,39 +40,23 @@ def schedule_of(content: Mapping, text: str, robot: RobotModel, reference_period
 
     Raises ScheduleError with line and phase of what is wrong.
     """
-    root = Section(content, Path(), ScheduleError)
-    root.only(("initial", "deputy", "phases"))
+    root = Section(content, Path(), ScheduleError, spec=SCHEDULE_FIELDS)
     initial = root.section("initial")
-    initial.only(("base_in_world", "joints"))
-    deputy = _deputy(root.section("deputy"))
+    deputy = read_deputy(root.section("deputy"))
     arms = initial.section("joints")
     arms.only(robot.arms)
     joints = {arm: _joints(arms, arm, arm, robot) for arm in robot.arms}
     sections, phases = root.sections("phases"), list[Phase]()
     for section in sections:
         phases.append(_phase(section, robot, deputy, phases[-1].end_ns if phases else 0))
-    if not phases:
-        raise root.error("phases has 0 entries, must be >= 1", "phases")
     check_phases(phases, sections, reference_period_ns)
-    return Schedule(joints, _pose(initial.section("base_in_world")), deputy, tuple(phases), text)
-
-
-def _deputy(section: Section) -> DeputyDescription:
-    """Return the deputy of the schedule."""
-    section.only(("mass", "size", "in_world", "grasp_frames"))
-    mass = section.number("mass", "kg", minimum=0.0)
-    if mass != 0.0:
-        raise section.error(f"deputy.mass is {mass:g} kg, must be 0: it can only be massless yet", "mass")
-    size = np.array(section.vector("size", 3, "m", above=0.0))
-    frames = section.section("grasp_frames")
-    grasp_frames = {name: _pose(frames.section(name)) for name in frames.keys}
-    return DeputyDescription(mass, size, _pose(section.section("in_world")), grasp_frames)
+    return Schedule(joints, read_pose(initial.section("base_in_world")), deputy, tuple(phases), text)
 
 
 def _joints(section: Section, key: str, arm: str, robot: RobotModel) -> Array:
     """Return the joint angles of an arm under a key, which must be within their limits."""
     part = robot.arm_joints[arm]
-    values = np.array(section.vector(key, part.stop - part.start, "rad"))
+    values = np.array(section.vector(key, part.stop - part.start))
     limits = zip(robot.joint_names[part], values, robot.lower[part], robot.upper[part], strict=True)
     for name, value, low, high in limits:
         what = f"{section.where(key)}: {name}"
@@ -85,19 +66,23 @@ def _joints(section: Section, key: str, arm: str, robot: RobotModel) -> Array:
 
 def _phase(section: Section, robot: RobotModel, deputy: DeputyDescription, previous_end_ns: int) -> Phase:
     """Return one phase; it starts where the one before ends."""
-    section.only(("name", "duration", "arms"), optional=("start", "motion", "events", "on_miss", "gains"))
     name = section.text("name")
     if "start" in section:
-        start_ns = seconds_to_ns(section.number("start", "s", minimum=0.0))
+        start_ns = seconds_to_ns(section.number("start"))
         if start_ns != previous_end_ns:
             raise section.error(
                 f"phase {name!r} starts at {ns_to_seconds(start_ns):g} s, but the one before it ends at "
                 f"{ns_to_seconds(previous_end_ns):g} s",
                 "start",
             )
-    duration = motion = section.number("duration", "s", minimum=_SHORTEST)
-    if "motion" in section:
-        motion = section.number("motion", "s", minimum=_SHORTEST, maximum=duration)
+    duration = section.number("duration")
+    motion = section.number("motion") if "motion" in section else duration
+    if motion > duration:
+        raise section.error(
+            f"{section.path('motion')} is {motion:g} s, must be <= {duration:g} s, the phase's duration; "
+            "set motion too, or remove it (null) to move for the whole phase",
+            "motion",
+        )
     arms = section.section("arms")
     arms.only(robot.arms)
     targets = {arm: _target(arms, arm, robot, deputy) for arm in robot.arms}
@@ -121,8 +106,7 @@ def _on_miss(section: Section, commands: Sequence[GraspCommand], *, is_first: bo
             raise section.error(f"{key!r} needs the number of retries: write {{retry: 2}}", key)
         return OnMiss(MissAction(word))
     inner = section.section(key)
-    inner.only((retry,))
-    retries = inner.count(retry, minimum=1, maximum=MOST_RETRIES)
+    retries = int(inner.number(retry))
     if is_first:
         raise section.error("a retry repeats the phase before, but this is the first one", key)
     return OnMiss(MissAction.RETRY, retries)
@@ -131,41 +115,31 @@ def _on_miss(section: Section, commands: Sequence[GraspCommand], *, is_first: bo
 def _target(arms: Section, arm: str, robot: RobotModel, deputy: DeputyDescription) -> ArmTarget:
     """Return the target of one arm: the word ``hold`` or a mapping of exactly one kind."""
     value = arms.value(arm)
-    if value == "hold":
+    if value == HOLD:
         return Hold()
-    known = ", ".join(_TARGET_KINDS)
     if not isinstance(value, dict):
+        known = ", ".join(TARGET_KINDS)
         raise arms.error(f"{arms.path(arm)} is {value!r}, must be hold or a mapping with one of {known}", arm)
     section = arms.section(arm)
-    section.only((), (*_TARGET_KINDS, "tool_in_grasp_frame"))
-    kinds = [kind for kind in _TARGET_KINDS if kind in section]
-    if len(kinds) != 1:
-        raise section.error(f"{arms.path(arm)} must have exactly one of {known}")
-    if kinds[0] == "joints":
-        return JointTarget(_joints(section, "joints", arm, robot))
-    if kinds[0] == "tool_in_world":
-        return ToolTarget(_pose(section.section("tool_in_world")))
+    kind = section.one_of(arms.path(arm))
+    if kind == "joints":
+        return JointTarget(_joints(section, kind, arm, robot))
+    if kind == "tool_in_world":
+        return ToolTarget(read_pose(section.section("tool_in_world")))
     offset = Pose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
     if "tool_in_grasp_frame" in section:
-        offset = _pose(section.section("tool_in_grasp_frame"))
+        offset = read_pose(section.section("tool_in_grasp_frame"))
     return GraspFrameTarget(_grasp_frame(section, deputy), offset)
 
 
 def _command(event: Section, robot: RobotModel, deputy: DeputyDescription) -> GraspCommand:
     """Return one event of a phase: ``grasp``, ``release`` or ``transfer`` and its details."""
-    kinds = [action.value for action in GraspAction]
-    event.only((), kinds)
-    if len(event.keys) != 1:
-        raise event.error(f"an event must have exactly one of {', '.join(kinds)}")
-    action = GraspAction(event.keys[0])
+    action = GraspAction(event.one_of("an event"))
     details = event.section(action.value)
     if action is GraspAction.RELEASE:
-        details.only(("arm",))
         return GraspCommand(action, details.name("arm", "arm", robot.arms))
     if action is GraspAction.GRASP:
-        details.only(("arm", "grasp_frame"))
         return GraspCommand(action, details.name("arm", "arm", robot.arms), _grasp_frame(details, deputy))
-    details.only(("from", "to", "grasp_frame"))
     giver, taker = (details.name(key, "arm", robot.arms) for key in ("from", "to"))
     return GraspCommand(action, taker, _grasp_frame(details, deputy), giver)
 
@@ -179,11 +153,3 @@ def _gains(section: Section) -> dict[str, dict[str, object]]:
     """Return the gains per control law; the controller checks names and values."""
     laws = {law: section.section(law) for law in section.keys}
     return {law: {name: gains.value(name) for name in gains.keys} for law, gains in laws.items()}
-
-
-def _pose(section: Section) -> Pose:
-    """Return the pose given by ``xyz`` in m and ``rpy`` in rad (fixed axes, as in URDF)."""
-    section.only(("xyz", "rpy"))
-    return pose_from_xyz_rpy(
-        np.array(section.vector("xyz", 3, "m")), np.array(section.vector("rpy", 3, "rad"))
-    )

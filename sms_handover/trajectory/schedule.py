@@ -102,6 +102,14 @@ class Schedule:
         """When the last phase ends, in ns of simulation time."""
         return self.phases[-1].end_ns
 
+    @property
+    def grasping_arms(self) -> tuple[frozenset[str], ...]:
+        """Phase by phase, the arms that go to a grasp frame."""
+        return tuple(
+            frozenset(arm for arm, target in phase.targets.items() if isinstance(target, GraspFrameTarget))
+            for phase in self.phases
+        )
+
     def phase_index(self, stamp_ns: int) -> int:
         """Return the index of the phase at a time; after the end it is the last one."""
         started = [index for index, phase in enumerate(self.phases) if phase.start_ns <= stamp_ns]

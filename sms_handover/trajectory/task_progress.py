@@ -5,11 +5,19 @@ from dataclasses import dataclass, field
 from math import nan
 
 from sms_handover.errors import ConfigurationError
-from sms_handover.graph.events import GRASP_FAILED, GRASP_MISSED, IK_FAILED, PHASE_RETRIED, RunEvent, Severity
+from sms_handover.graph.events import (
+    COLLISION,
+    GRASP_FAILED,
+    GRASP_MISSED,
+    IK_FAILED,
+    PHASE_RETRIED,
+    RunEvent,
+    Severity,
+)
 from sms_handover.graph.topics import TRAJECTORY
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.schedule import ArmTarget, Hold, MissAction, Phase, Schedule
-from sms_handover.types import GraspCommand, GraspEvent, GraspStatus, PhaseState, TaskPhase
+from sms_handover.types import Collision, GraspCommand, GraspEvent, GraspStatus, PhaseState, TaskPhase
 from sms_handover.units import seconds_to_ns
 
 Figures = tuple[float, float, str]  # value, limit, unit
@@ -50,7 +58,8 @@ class ProgressState:
     """Everything that the later progress of a task depends on, once its decisions have been taken.
 
     Per phase: the commands ``due``, how often it has ``begun``, its ``retries``. ``issues`` has the phase
-    index, the commands and the answers of every issue.
+    index, the commands and the answers of every issue; ``colliding`` the groups of bodies that collided in
+    the period before that of ``collisions``.
     """
 
     shift_ns: int
@@ -62,6 +71,8 @@ class ProgressState:
     retries: tuple[int, ...]
     issues: tuple[tuple[int, tuple[GraspCommand, ...], tuple[GraspEvent, ...]], ...]
     ik_failures: int
+    collisions: tuple[Collision, ...]
+    colliding: tuple[str, ...]
 
 
 class TaskProgress:
@@ -69,12 +80,15 @@ class TaskProgress:
 
     A miss is handled as ``on_miss`` of its phase says. A retry repeats the phase before, from where the
     robot is, then the phase itself with those of its commands that have not succeeded; everything later
-    shifts by that time. A phase that fails holds the joints, and the task ends ``failure_hold`` later.
+    shifts by that time. A collision is reported when it begins, or fails the phase. A phase that fails holds
+    the joints, and the task ends ``failure_hold`` later.
     Decisions are made on reference periods, so that a run depends on nothing else.
     """
 
-    def __init__(self, schedule: Schedule, parameters: TrajectoryParameters) -> None:
-        self._schedule = schedule
+    def __init__(
+        self, schedule: Schedule, parameters: TrajectoryParameters, *, abort_on_collision: bool = False
+    ) -> None:
+        self._schedule, self._abort_on_collision = schedule, abort_on_collision
         self._most_ik_failures = parameters.ik_failures
         self._failure_hold_ns = seconds_to_ns(parameters.failure_hold)
         self.reset()
@@ -91,6 +105,8 @@ class TaskProgress:
         self._retries = [0 for _ in phases]
         self._issues: list[_Issue] = []
         self._ik_failures = 0
+        self._collisions: tuple[Collision, ...] = ()
+        self._colliding: tuple[str, ...] = ()
         self._decisions: list[RunEvent] = []
 
     def snapshot(self) -> ProgressState:
@@ -105,6 +121,8 @@ class TaskProgress:
             tuple(self._retries),
             tuple((issue.index, issue.commands, tuple(issue.answers.values())) for issue in self._issues),
             self._ik_failures,
+            self._collisions,
+            self._colliding,
         )
 
     def restore(self, state: ProgressState) -> None:
@@ -115,6 +133,7 @@ class TaskProgress:
             )
         self._shift_ns, self._end_ns, self._failed = state.shift_ns, state.end_ns, state.failed
         self._now, self._ik_failures = state.now, state.ik_failures
+        self._collisions, self._colliding = state.collisions, state.colliding
         self._due, self._begun, self._retries = list(state.due), list(state.begun), list(state.retries)
         self._issues = [
             _Issue(index, commands, {event.command: event for event in answers})
@@ -137,6 +156,10 @@ class TaskProgress:
     def solved(self, *, converged: bool) -> None:
         """Record whether IK converged for the latest targets."""
         self._ik_failures = 0 if converged else self._ik_failures + 1
+
+    def collided(self, collisions: Iterable[Collision]) -> None:
+        """Record which bodies collide, once each period in which clearance is measured."""
+        self._collisions = tuple(collisions)
 
     def take_decisions(self) -> tuple[RunEvent, ...]:
         """Return the decisions since the last call."""
@@ -174,6 +197,7 @@ class TaskProgress:
         if self._now is None:
             return
         index = self._now[0]
+        self._on_collisions(stamp_ns, index)
         for issue in [issue for issue in self._issues if issue.answered]:
             if issue in self._issues and not self._failed:
                 self._issues.remove(issue)
@@ -182,6 +206,18 @@ class TaskProgress:
             detail = "inverse kinematics has not converged so many times in a row; the joints are held"
             figures = (self._ik_failures, self._most_ik_failures, "reference periods")
             self._fail(stamp_ns, index, IK_FAILED, detail, figures)
+
+    def _on_collisions(self, stamp_ns: int, index: int) -> None:
+        """Report collisions that have begun, or give the task up at the first."""
+        for collision in self._collisions:
+            if self._failed or collision.group in self._colliding:
+                continue
+            figures = (collision.distance, collision.allowed, "m")
+            if self._abort_on_collision:
+                self._fail(stamp_ns, index, COLLISION, f"{collision}; the joints are held", figures)
+            else:
+                self._report(stamp_ns, index, COLLISION, Severity.WARNING, str(collision), figures)
+        self._colliding = tuple(collision.group for collision in self._collisions)
 
     def _on_answers(self, stamp_ns: int, issue: "_Issue") -> None:
         """Apply the policy of a phase if any of its commands did not succeed."""

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page
 
+from sms_handover.analysis.clearance import TaskTexts, run_clearance
 from sms_handover.scene.page import animation_html
-from sms_handover.scene.scene import Scene, make_scene
+from sms_handover.scene.scene import FRAME_RATE, Scene, make_scene
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.types import Array
@@ -20,7 +21,7 @@ from .conftest import Browsing, Visit
 pytestmark = pytest.mark.browser
 
 SINGLE = 1e-6  # m; the page has single precision
-CONTROLS = ("play", "time", "speed", "view", "runs", "traces", "targets", "clock")
+CONTROLS = ("play", "time", "speed", "view", "runs", "traces", "targets", "nearest", "clock")
 
 Open = Callable[..., Visit]
 
@@ -33,9 +34,11 @@ def scenes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Scene]:
     made = {}
     for law in ("nmpc", "pid"):
         scenario = load_scenario(values={"common": {"schedule": str(schedule)}, "controller": {"law": law}})
-        made[law] = make_scene(
-            simulate(scenario), scenario.truth.robot.urdf, scenario.truth.schedule.deputy.size
-        )
+        run, truth = simulate(scenario), scenario.truth
+        series = run_clearance(run, TaskTexts(truth.robot.urdf, truth.schedule.text)).series
+        assert series is not None
+        size, rate = truth.schedule.deputy.size, FRAME_RATE
+        made[law] = make_scene(run, truth.robot.urdf, size, rate, series.worst_pair)
     return made
 
 
@@ -247,3 +250,34 @@ def test_what_was_not_recorded_is_not_drawn(browsing: Browsing, scenes: dict[str
     picture(visit.page)
     assert not visit.page.evaluate(visible)
     assert visit.errors == []
+
+
+def test_the_nearest_bodies_are_marked_and_red_where_they_are_in_each_other(
+    browsing: Browsing, scenes: dict[str, Scene]
+) -> None:
+    """Two instants of a made-up course: 12.3 mm apart, then 6.8 mm in each other."""
+    scene = scenes["pid"]
+    assert scene.worst_pair is not None
+    distance = scene.worst_pair.distance.copy()
+    distance[0], distance[1:] = 0.0123, -0.0068
+    marked = replace(scene, worst_pair=replace(scene.worst_pair, distance=distance))
+    visit = browsing.open(animation_html({"pid": marked}), size=NARROW)
+    page, label = visit.page, visit.page.locator("#labels .distance")
+    red = "player.runs[0].nearest.line.material.color.r > 2 * player.runs[0].nearest.line.material.color.b"
+    for row, text in ((0, "12.3 mm"), (len(distance) - 1, "\u22126.8 mm")):
+        seek(page, scene.stamp_ns[row] / 1e9)
+        without = picture(page)
+        ends = np.array(page.evaluate("player.runs[0].nearest.ends.map((end) => end.position.toArray())"))
+        assert np.abs(ends - scene.worst_pair.points_in_world[row]).max() < SINGLE
+        names = " - ".join(scene.worst_pair.bodies[scene.worst_pair.pair[row]])
+        assert label.inner_text() == f"{names}: {text}"
+        assert text in page.locator("#readout").inner_text()
+        assert page.evaluate(red) is (row > 0)
+        box = label.bounding_box()
+        assert box is not None and box["x"] >= 0 and box["x"] + box["width"] <= NARROW[0]
+        page.locator("#nearest").uncheck()
+        assert picture(page) != without and not label.is_visible()
+        page.locator("#nearest").check()
+    assert visit.errors == []
+    plain = browsing.open(animation_html({"pid": replace(scene, worst_pair=None)}))
+    assert not plain.page.locator("#nearest").is_visible() and plain.errors == []

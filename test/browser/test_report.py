@@ -97,12 +97,12 @@ def test_it_opens_whole_and_without_a_network(
     page = visit.page
     assert visit.errors == [] and visit.requests == []
     assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
-    assert page.locator(".plot .frame").count() == page.evaluate("report.plots.length") == 16
+    assert page.locator(".plot .frame").count() == page.evaluate("report.plots.length") == 17
     traces = page.evaluate(
         "plots.plots.map((plot) => plot.frame.querySelectorAll('.scatterlayer .trace').length)"
     )
-    # position and orientation error of two arms, torques and errors of their joints, base, conservation
-    per_run = [1, 1, 1, 1, 7, 7, 7, 7, 3, 3, 1, 1, 1, 1, 2, 1]
+    # position and orientation error of two arms, torques, errors of joints, base, conservation, clearance
+    per_run = [1, 1, 1, 1, 7, 7, 7, 7, 3, 3, 1, 1, 1, 1, 2, 1, 5]
     assert traces == [len(runs) * count for count in per_run]
 
 
@@ -265,6 +265,20 @@ def test_the_animation_moves_and_shares_its_time_with_the_plots(opened: Open) ->
     time = page.evaluate("plots.plots.find((plot) => plot.plot.key === 'base_speed').timeAt(300)")
     page.evaluate("() => new Promise((done) => setTimeout(done))")  # the message is on its way
     assert inside.evaluate("player.t") == pytest.approx(time, abs=0.01)
+    assert visit.errors == []
+
+
+def test_clearance_is_drawn_with_the_lines_that_it_must_stay_above(opened: Open) -> None:
+    visit = opened()
+    frame_of(visit.page, "clearance")
+    plot = "plots.plots.find((plot) => plot.plot.key === 'clearance')"
+    shapes = visit.page.evaluate(
+        f"{plot}.frame.layout.shapes.filter((s) => s.type === 'line').map((s) => s.y0)"
+    )
+    assert shapes == [0, -1]  # mm
+    low, high = visit.page.evaluate(f"{plot}.frame.layout.yaxis.range")
+    least = visit.page.evaluate(f"Math.min(...{plot}.lines.flatMap((line) => [...line.values]))")
+    assert low < min(least, -1.0) and 0.0 < high < 250.0
     assert visit.errors == []
 
 

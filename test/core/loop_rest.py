@@ -2,19 +2,22 @@
 
 import hashlib
 import json
+import subprocess
 import sys
+from collections.abc import Collection
 from pathlib import Path
 
 from sms_handover.simulation.loop import Loop, Observation
-from sms_handover.simulation.scenario import load_scenario
-from sms_handover.simulation.snapshot import load_snapshot, plain
+from sms_handover.simulation.scenario import Overrides, load_scenario
+from sms_handover.simulation.snapshot import load_snapshot, plain, save_snapshot
 
 
 def bytes_of(tick: Observation) -> bytes:
     """Return all that a tick shows, to the last bit."""
     arrays = (tick.q, tick.v, tick.joint_effort, tick.effort)
     period = json.dumps(plain((tick.guidance, tick.period))) if tick.period else ""
-    return b"".join([str(tick.stamp_ns).encode(), *(array.tobytes() for array in arrays), period.encode()])
+    told = f"{tick.stamp_ns} {tick.excesses} {period}"
+    return b"".join([told.encode(), *(array.tobytes() for array in arrays)])
 
 
 def digest_of_rest(loop: Loop) -> str:
@@ -23,6 +26,24 @@ def digest_of_rest(loop: Loop) -> str:
     while not loop.finished:
         digest.update(bytes_of(loop.advance()))
     return digest.hexdigest()
+
+
+def digests_of_rests(overrides: Overrides, ticks: Collection[int], folder: Path) -> list[tuple[str, str]]:
+    """Return the digests of the rest of a run from each of these ticks on: uninterrupted, and restored.
+
+    The snapshots go through files in ``folder`` to one process that does nothing else.
+    """
+    loop, shown = Loop(load_scenario(values=overrides)), list[bytes]()
+    files: dict[int, Path] = {}
+    while not loop.finished:
+        if len(shown) in ticks:
+            files[len(shown)] = folder / f"{len(shown)}.json"
+            save_snapshot(loop.snapshot(), files[len(shown)])
+        shown.append(bytes_of(loop.advance()))
+    expected = [hashlib.sha256(b"".join(shown[tick:])).hexdigest() for tick in files]
+    command = [sys.executable, __file__, json.dumps(overrides), *map(str, files.values())]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return list(zip(expected, done.stdout.split(), strict=True))
 
 
 def main(overrides: str, files: list[str]) -> None:

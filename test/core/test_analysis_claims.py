@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 
 from sms_handover.analysis.claims import Claim, judge
-from sms_handover.analysis.metrics import measure
+from sms_handover.analysis.clearance import GroupClearance, RunClearance
+from sms_handover.analysis.comparison import compare
+from sms_handover.analysis.completion import completion
+from sms_handover.analysis.metrics import RunMetrics, measure
+from sms_handover.analysis.summary import summary
+from sms_handover.analysis.table import render
 from sms_handover.run_data import RunData
-from sms_handover.types import Array, GraspAction, GraspEvent, GraspStatus
+from sms_handover.types import Array, GraspAction, GraspEvent, GraspStatus, PhaseState
 
 from .test_analysis_runs import (
     JOINTS,
@@ -241,3 +246,71 @@ def test_runs_without_phases_or_with_one_arm_get_verdicts_too() -> None:
     run = run_of(GOOD)
     one = changed(run, arms=run.arms[:1], tool_pose={"arm_a": run.tool_pose["arm_a"]})
     assert not judge(measure(one), measure(one))[0].holds
+
+
+def apart(least: float, allowed: float = 0.0) -> GroupClearance:
+    return GroupClearance(
+        "gripper arm_a - deputy", least, allowed, 21_770_000_000, ("arm_a_gripper", "deputy")
+    )
+
+
+def bodies(run: RunMetrics, *groups: GroupClearance) -> RunMetrics:
+    """Return a run of which it is known how near these bodies came."""
+    return replace(run, clearance=RunClearance(groups))
+
+
+@pytest.mark.parametrize(
+    ("group", "holds"),
+    [
+        (apart(0.001), True),
+        (apart(-1e-6), False),
+        (apart(-0.0009, allowed=-0.001), True),
+        (apart(-0.0011, allowed=-0.001), False),
+    ],
+)
+@pytest.mark.parametrize("which", [0, 1])
+def test_a_handover_is_complete_only_if_nothing_passes_through_anything(
+    group: GroupClearance, holds: bool, which: int
+) -> None:
+    laws = [bodies(measure(run_of(law)), apart(0.02)) for law in (GOOD, BAD)]
+    laws[which] = bodies(laws[which], apart(0.02), group)
+    claim = judge(*laws)[0]
+    assert claim.holds is holds
+    assert figures(claim)["collisions"][which] == float(not holds)
+    assert figures(claim)["least clearance beyond what is allowed"][which] == pytest.approx(
+        1000.0 * group.margin
+    )
+    assert [note.partition(":")[0] for note in claim.notes] == ([] if holds else [("NMPC", "PID")[which]])
+
+
+def test_a_collision_is_named_wherever_a_run_is_called_complete_or_not() -> None:
+    """Bodies, time and depth: in the table, in the note of the claim and in the summary for JSON."""
+    runs = {"first": run_of(GOOD), "second": run_of(BAD), "third": run_of(GOOD)}
+    found = compare(runs, laws={"first": "nmpc", "second": "pid", "third": "task_space_pd"})
+    measured = dict(found.runs)
+    for name, groups in {"first": (apart(0.1),), "second": (apart(-0.06),)}.items():
+        measured[name] = bodies(measured[name], *groups)
+    claims = judge(measured["first"], measured["second"])
+    found = replace(found, runs=measured, claims=claims)
+    words = "arm_a_gripper and deputy 60.00 mm in each other at 21.77 s"
+    assert claims[0].notes == (f"PID: {words}",) and len(found.claims) == 6
+    lines = render(found).splitlines()
+    complete = [cell for line in lines if line.startswith("complete") for cell in line.split()[1:]]
+    assert complete == ["yes", "no", "yes"]
+    assert {f"  second: {words}", f"  PID: {words}", "  third: clearance unknown"} <= {*lines}
+    made = summary(found)["runs"]
+    assert [made[name]["completion"]["complete"] for name in made] == [True, False, True]
+    assert made["second"]["completion"]["shortfalls"] == [words]
+    assert [made[name]["completion"]["clearance_known"] for name in made] == [True, True, False]
+
+
+def test_a_task_that_was_not_done_says_what_it_lacks() -> None:
+    missed = grasp(20.0, status=GraspStatus.MISSED)
+    run = run_of(replace(GOOD, events=(missed,), end=30.0))
+    expected = tuple(replace(phase, end_ns=60 * NS) for phase in run.phases)
+    failed = (*expected[:-1], replace(expected[-1], state=PhaseState.FAILED))
+    lacking = ("20 s: arm_a takes end: missed", "ended at 30 s, the task ends at 60 s")
+    assert completion(changed(run, phases=expected), None).shortfalls == lacking
+    assert "phase carry failed at 30 s" in completion(changed(run, phases=failed), None).shortfalls
+    assert completion(changed(run, phases=()), None).shortfalls == ("no phase of a task was recorded",)
+    assert completion(run_of(GOOD), None).complete

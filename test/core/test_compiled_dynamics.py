@@ -20,7 +20,7 @@ from sms_handover.model.reduced import reduced_dynamics, reduced_inverse_dynamic
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.integrators import TABLEAUS
 from sms_handover.plant.stepper import PinocchioStepper
-from sms_handover.simulation.scenario import load_scenario
+from sms_handover.simulation.scenario import Overrides, load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.types import Array
 
@@ -164,15 +164,18 @@ def test_a_whole_run_differs_by_rounding_alone() -> None:
 
 
 def test_pid_is_compiled_too() -> None:
+    """With limits that are enforced, too: a wrist that is slowed down by its motor's torque-speed line."""
+    given: Overrides = {
+        "controller": {"law": "pid"},
+        "plant": {"joint_limits": "enforce"},
+        "robot": {"arms.arm_a.limits": {"joint_7": {"velocity": 0.05}}},
+    }
     found, theirs = (
-        simulate(
-            load_scenario(
-                values={"common": {"dynamics": name, "duration": 0.1}, "controller": {"law": "pid"}}
-            )
-        )
+        simulate(load_scenario(values={**given, "common": {"dynamics": name, "duration": 0.1}}))
         for name in ("compiled", "pinocchio")
     )
     assert np.abs(found.joint_position - theirs.joint_position).max() < 1e-13
+    assert np.count_nonzero(found.joint_effort[1:] != found.joint_command[:-1])
 
 
 def test_a_library_is_made_once(

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 from mcap.writer import Writer
@@ -20,7 +21,8 @@ from scipy.io import loadmat
 from sms_handover.bag.recording import Recording
 from sms_handover.bag.topic_choice import TopicChoice
 from sms_handover.cli.main import main
-from sms_handover.errors import BagError, ConfigurationError
+from sms_handover.errors import BagError, ConfigurationError, MissingDependencyError
+from sms_handover.export.data_frames import data_frames
 from sms_handover.export.export import CSV, MATLAB, PARQUET, export
 from sms_handover.export.selection import Selection
 from sms_handover.run_data import RunData
@@ -137,6 +139,24 @@ def test_a_run_goes_to_matlab_bit_for_bit(tmp_path: Path) -> None:
     assert dict(zip(ticks["columns"], ticks["units"], strict=True))["arm_a_joint_1.effort"] == "N m"
     events = loadmat(tmp_path / "out" / "grasp_events.mat", simplify_cells=True)
     assert events["status"].tolist() == ["succeeded", "missed"] and np.isnan(events["relative_speed"][1])
+
+
+def test_data_frames_are_the_tables_of_an_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read back by pandas itself; without it one line names the extra."""
+    run = made_up_run()
+    export(write_run(tmp_path / "bag", run), tmp_path / "out", PARQUET, EVERYTHING)
+    frames = data_frames(run)
+    assert {file.stem for file in (tmp_path / "out").glob("*.parquet")} == frames.keys()
+    for name, frame in frames.items():
+        written = pd.read_parquet(tmp_path / "out" / f"{name}.parquet")
+        pd.testing.assert_frame_equal(frame, written, check_exact=True)
+    assert frames["ticks"].attrs["units"]["arm_a_joint_1.effort"] == "N m"
+    assert bits(frames["ticks"]["arm_a_joint_1.position"]) == run.joint_position[:, 0].tobytes()
+    frames["ticks"].loc[0, "arm_a_joint_1.position"] = 7.0
+    assert run.joint_position[0, 0] != 7.0
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(MissingDependencyError, match=r"data frames need pandas.*'sms_handover\[pandas\]'"):
+        data_frames(run)
 
 
 def test_units_are_told(tmp_path: Path) -> None:

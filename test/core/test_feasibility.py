@@ -7,6 +7,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from sms_handover.clearance.bodies import BodyKind
+from sms_handover.clearance.distances import ClearanceModel
 from sms_handover.errors import ScheduleError
 from sms_handover.ik.levenberg_marquardt import solve_ik
 from sms_handover.model.poses import pose_distance, pose_row, se3_of
@@ -335,3 +337,23 @@ def test_a_target_that_needs_another_start_is_found_and_told(make_scenario: Make
     assert max(pose_distance(found, tool)) <= 1e-6 + _ROUNDING
     again = predicted(make_scenario(text))[0]
     assert again.joint_position.tobytes() == prediction.joint_position.tobytes()
+
+
+def test_restarts_begin_where_no_bodies_overlap(scenario: Scenario) -> None:
+    """A third of all random configurations do not qualify; the arms that do not miss stay where they are."""
+    world, ik = scenario.model, scenario.parameters.ik
+    robot, base = world.robot, world.schedule.base_in_world
+    walk = feasibility._Walk(robot, world.schedule, ik, feasibility.ANY_GRASP)
+    start = initial_joints(robot, world.schedule)
+    distances = ClearanceModel(robot.pin, robot.urdf, robot.arms, world.schedule.deputy.size)
+    of_robot = [k for k, (_, other) in enumerate(distances.pairs) if other.kind is not BodyKind.DEPUTY]
+    random = np.random.default_rng(16)
+    for missed in (["arm_a"], ["arm_b"], ["arm_a", "arm_b"]) * 10:
+        rest = feasibility._Rest(base, start, {}, dict.fromkeys(missed, (1.0, 1.0)))
+        seed = walk._restart(rest, random)
+        q = robot.configuration(base, seed)
+        assert distances.distances(q, world.schedule.deputy.deputy_in_world)[of_robot].min() >= 0.0
+        for arm in robot.arms:
+            part = robot.arm_joints[arm]
+            assert np.array_equal(seed[part], start[part]) is (arm not in missed)
+            assert (seed[part] >= robot.lower[part]).all() and (seed[part] <= robot.upper[part]).all()

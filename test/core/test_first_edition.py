@@ -50,6 +50,9 @@ def test_figures_of_recorded_runs_are_those_of_then(tmp_path: Path) -> None:
     file = tmp_path / "compared.json"
     assert main(["compare", *(str(FOLDER / law) for law in LAWS), "--json", str(file)]) == 0
     now, then = (json.loads(path.read_text(encoding="utf-8")) for path in (file, FOLDER / "compared.json"))
+    completions = [claims[0] for claims in (now["claims"], then["claims"])]
+    for completion in completions:  # since then it is judged by clearance too, in two more rows
+        del completion["holds"], completion["text"], completion["findings"][4:]
     assert list(different(now, then)) == []
 
 

@@ -1,16 +1,16 @@
 """A controller from outside the package takes the place of ours in one process; the examples do the task."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-import in_process_controller
+import my_law
 import numpy as np
 import pytest
-from in_process_controller import JointPd
 from my_controller.task_space_pd import TaskSpaceGains, TaskSpacePd
 
 from sms_handover.analysis.equality import compare_runs
 from sms_handover.configuration.parameters import build
-from sms_handover.control.protocol import Guidance
+from sms_handover.control.law import LawSetup
+from sms_handover.control.protocol import Controller, Guidance
 from sms_handover.errors import ConfigurationError, ControllerError
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import RobotModel
@@ -20,6 +20,7 @@ from sms_handover.simulation.wiring import make_controller
 from sms_handover.types import Array, GraspStatus
 
 _BOTH_GRASPS_S = 40.1  # s, the second one is at 40 s
+_TICK_NS = 1_000_000  # [ns]
 _ROUNDING = 1e-12  # [-] of momenta that stay at zero, in SI units
 
 
@@ -102,9 +103,14 @@ def test_efforts_that_are_none_are_refused(answer: Array, said: str) -> None:
 # --- the examples ---------------------------------------------------------------------------------
 
 
+def joint_pd(robot: RobotModel, frequency: float = 1.0) -> my_law.JointPd:
+    """Return the law with the same gains in the four phases of a handover."""
+    return my_law.JointPd(LawSetup(robot, (my_law.Gains(frequency),) * 4, _TICK_NS))
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("law", [TaskSpacePd, JointPd])
-def test_an_example_hands_the_deputy_over(law: type[TaskSpacePd | JointPd]) -> None:
+@pytest.mark.parametrize("law", [TaskSpacePd, joint_pd])
+def test_an_example_hands_the_deputy_over(law: Callable[[RobotModel], Controller]) -> None:
     """Both grasps succeed on the shipped schedule; docs/own_controller.md tells how near."""
     scenario = of_duration(_BOTH_GRASPS_S)
     run = simulate(scenario, controller=law(scenario.truth.robot))
@@ -140,21 +146,12 @@ def test_joint_pd_brings_a_joint_back_without_overshoot(scenario: Scenario) -> N
     """For one joint alone m e'' = u with m its reduced inertia: u / m = -(w^2 e + 2 w e')."""
     robot = scenario.truth.robot
     q, v = _state(robot, 2)
-    law = JointPd(robot, frequency=0.5)
+    law = joint_pd(robot, frequency=0.5)
     guidance = _guidance(scenario)
     law.guide(guidance)
     acceleration = law.effort(0, q, v) / np.diag(reduced_dynamics(robot, q, v).inertia)
     wanted = -(0.25 * (q[7:] - guidance.reference.position) + 1.0 * v[6:])
     np.testing.assert_allclose(acceleration, wanted, rtol=1e-12)
-
-
-def test_the_script_in_one_process_prints_both_laws(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(in_process_controller, "load_scenario", lambda: of_duration(0.2))
-    in_process_controller.main()
-    heading = capsys.readouterr().out.splitlines()[0]
-    assert heading.split()[-2:] == ["joint_pd", "nmpc"]
 
 
 def test_gains_of_an_example_are_checked_as_ours_are() -> None:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import pi
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from .conftest import Draw, row_distance, slope
 
 _EPS = np.finfo(float).eps
 _MS = 1_000_000  # [ns]
-_TOLERANCES = {
+_TOLERANCES: dict[str, Any] = {
     "grasp_position_tolerance": 0.01,  # m
     "grasp_angle_tolerance": 0.03,  # rad
     "grasp_speed_tolerance": 0.02,  # m/s

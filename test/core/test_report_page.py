@@ -17,7 +17,7 @@ from sms_handover.bag.recording import Recording
 from sms_handover.cli.main import main
 from sms_handover.report import engine
 from sms_handover.report.page import report_page
-from sms_handover.report.recorded_run import RecordedRun, read_recorded
+from sms_handover.report.recorded_run import RecordedRun, compare_recorded, read_recorded
 from sms_handover.run_data import RunData
 from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus, TaskPhase
 
@@ -31,7 +31,7 @@ from .bag_messages import (
     open_topics,
     record_run,
 )
-from .report_bags import Parameters, write_bag
+from .report_bags import Parameters, parameters, write_bag
 from .test_analysis_runs import changed
 
 EVIL = "</script><script>broken()</script><img src=x onerror=broken()>\"'&amp;{{ 7 * 7 }}<b>"
@@ -137,6 +137,34 @@ def test_there_may_be_one_run_or_several(runs: tuple[RecordedRun, ...], count: i
     assert "Claims of the paper" not in page.texts["h2"]
     heads = [row for row in page.texts["tr"] if row.startswith("Worst value of the run")]
     assert heads[0].split()[5:] == [word for run in several for word in run.name.split()]
+
+
+def test_a_law_of_another_package_stands_beside_ours(runs: tuple[RecordedRun, ...], tmp_path: Path) -> None:
+    """Three laws: a card, a column and lines for each by its name, and still the claims about our two."""
+    urdf, schedule = runs[0].info.urdf_text, runs[0].info.schedule_text
+    values = parameters("task_space_pd")
+    bag = write_bag(tmp_path / "own", runs[0].data, urdf=urdf, schedule=schedule, values=values)
+    page = Page(report_page([read_recorded("own", bag), *runs]))
+    assert page.texts["h1"] == ["own, nmpc and pid, side by side"]
+    laws = [text.split()[1] for text in page.texts["p"] if text.startswith("law ")]
+    assert laws == ["task_space_pd", "nmpc", "pid"]
+    heads = [row.split() for row in page.texts["tr"] if row.split()[:1] == ["Task"]]
+    assert heads == [["Task", "own", "nmpc", "pid"]]
+    assert len(page.texts["blockquote"]) == 6
+    plots = data_in(page)["plots"]
+    assert isinstance(plots, list)
+    drawn = {plot["key"]: {line["run"] for line in plot["lines"]} for plot in plots}
+    assert drawn["clearance"] == drawn["arm_a/position_error"] == {0, 1, 2}
+
+
+def test_the_card_of_a_run_says_whether_its_task_was_done(html: str, runs: tuple[RecordedRun, ...]) -> None:
+    comparison = compare_recorded(runs)
+    cards = [text for text in Page(html).texts["li"] if text.startswith("task ")]
+    for run, card in zip(runs, cards, strict=True):
+        found = comparison.runs[run.name].completion
+        assert card.startswith(
+            "task complete" if found.complete else f"task not complete: {found.shortfalls[0]}"
+        )
 
 
 def evil_run() -> RunData:

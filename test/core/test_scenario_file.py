@@ -122,6 +122,10 @@ REFUSED = {
         "extends: paper\nmodel: {schedule: {}}\n",
         "mine.yaml:2: model: unknown key 'schedule'",
     ),
+    "name": (
+        "extends: paper\nrobot: {arms: [{name: [1]}]}\n",
+        r"mine.yaml:2: arms\[0\].description is missing",
+    ),
     "phase": (
         "extends: paper\nschedule: {phases: {carry: 3}}\n",
         "mine.yaml:2: carry is 3, must be a mapping or null",

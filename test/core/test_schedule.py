@@ -337,7 +337,7 @@ REFUSED: dict[str, tuple[str, str, str, str]] = {
     "motion longer than the phase": (
         "motion: 0.3",
         "motion: 0.5",
-        "phases.approach.motion is 0.5 s, must be >= 1e-09 and <= 0.4 s",
+        "phases.approach.motion is 0.5 s, must be <= 0.4 s, the phase's duration; set motion too, or",
         "motion: 0.5",
     ),
     "no motion": (

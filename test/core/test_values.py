@@ -54,11 +54,25 @@ def test_values_are_those_of_the_scenario(tmp_path: Path, scenario: Scenario) ->
 REFUSED: dict[str, tuple[Overrides, str]] = {
     "slip": (
         {"robot": {"base.mas": 3}},
-        r"robot.base.mas:=3: base: unknown key 'mas' \(did you mean 'mass'\?\)",
+        r"unknown path 'robot.base.mas' \(did you mean 'robot.base.mass'\?\)",
     ),
     "slip above": (
         {"robot": {"bas.mass": 3}},
-        r"robot.bas.mass:=3: unknown key 'bas' \(did you mean 'base'\?\)",
+        r"unknown path 'robot.bas.mass' \(did you mean 'robot.base.mass'\?\)",
+    ),
+    "slips in a path that is not set yet": (
+        {"truth": {"robot.arms.arm_b.limit.joint_2.efort": 3}},
+        r"unknown path 'truth.robot.arms.arm_b.limit.joint_2.efort' "
+        r"\(did you mean 'truth.robot.arms.arm_b.limits.joint_2.effort'\?\): known are those of "
+        "'sms-handover list paths'",
+    ),
+    "steps left out": (
+        {"robot": {"gripper.mass": 3}},
+        r"unknown path 'robot.gripper.mass' \(did you mean 'robot.arms.arm_.\.gripper.mass'\?\)",
+    ),
+    "slip in what is removed": (
+        {"deputy": {"grasp_frame": None}},
+        r"unknown path 'deputy.grasp_frame' \(did you mean 'deputy.grasp_frames'\?\)",
     ),
     "name": (
         {"schedule": {"phases.cary.duration": 3}},

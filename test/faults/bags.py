@@ -24,9 +24,9 @@ _READERS = (  # commands that need a whole bag: they read it, or refuse in one l
     ("bag", "info", "run"),
     ("bag", "export", "run", "-o", "tables"),
     ("compare", "run"),
-    ("reproduce", "run"),
+    ("verify", "run"),
     ("report", "run", "-o", "report"),
-    ("play", "run", "--rate", "100", "--disable-keyboard-controls"),
+    ("bag", "play", "run", "--rate", "100", "--disable-keyboard-controls"),
 )
 
 Damage = Callable[[Trial, Path], None]
@@ -182,7 +182,7 @@ FAULTS = tuple(
     Fault(
         name=name,
         injected=injected,
-        promise="`bag check` notices; info, export, compare, reproduce, report, play work or refuse in one "
+        promise="`bag check` notices; info, export, compare, verify, report, play work or refuse in one "
         "line; `bag recover` invents no message and says what is lost",
         inject=partial(damaged, damage),
         check=told_and_recovered,

@@ -59,7 +59,7 @@ def short_run(trial: Trial) -> list[object]:
 def same_as_ever(trial: Trial, ended: Ended) -> Kept:
     """Require a whole bag with the bits of a run in one process; it may tell of events besides."""
     kept = whole(bag_of(trial), ended)
-    again = trial.sms_handover("reproduce", "run")
+    again = trial.sms_handover("verify", "run")
     differences = [line for line in again.out.splitlines() if not line.startswith("run_events:")]
     require(again.code in (0, 1) and not again.errors, f"it cannot be reproduced: {again.errors}")
     require(again.code == 0 or not differences, f"the run is not reproduced: {differences[:3]}")

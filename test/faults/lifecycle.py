@@ -132,7 +132,7 @@ def two_runs(trial: Trial, seen: tuple[Ended, list[bool]]) -> Kept:
     bags = sorted(bag.name for bag in bag_of(trial).parent.glob("bag*"))
     require(bags == ["bag", "bag_2"], f"bags {bags}")
     whole(bag_of(trial).with_name("bag_2"), ended)
-    again = trial.sms_handover("reproduce", "run")
+    again = trial.sms_handover("verify", "run")
     require(again.code == 0, f"a run is not reproduced: {(again.err or again.out)[-300:]}")
     return kept
 

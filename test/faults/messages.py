@@ -90,7 +90,7 @@ def _said(trial: Trial) -> str:
 def nothing_changed(topic: str, trial: Trial, ended: Ended) -> Kept:
     """Require a whole run, what was refused named, and states that the commands in the bag lead to."""
     kept = refused_and_whole(topic, trial, ended)
-    again = trial.sms_handover("reproduce", trial.folder / "run" / "bag")
+    again = trial.sms_handover("verify", trial.folder / "run" / "bag")
     require(again.code == 0, f"the commands do not lead to the states: {again.out[-300:]} {again.err}")
     return kept
 

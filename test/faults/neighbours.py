@@ -43,7 +43,7 @@ def both_are_whole(trial: Trial, seen: tuple[Ended, Ended]) -> Kept:
     require(len(folders) == 2, f"output folders {folders}")
     for ended, folder in zip(seen, folders, strict=True):
         kept = whole(folder / "bag", ended)
-        again = trial.sms_handover("reproduce", folder)
+        again = trial.sms_handover("verify", folder)
         require(again.code == 0, f"{folder.name} is not reproduced: {(again.err or again.out)[-300:]}")
     return kept
 

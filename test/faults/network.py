@@ -82,7 +82,7 @@ def same_bits(trial: Trial, seen: Sequence[Ended]) -> Kept:
     folder = f"host{len(seen)}"
     for ended in seen:
         exit_code(ended, 0)
-    again = trial.sms_handover("reproduce", folder)
+    again = trial.sms_handover("verify", folder)
     require(again.code == 0, f"not the same bits: {(again.out + again.err).splitlines()[:2]}")
     return whole(trial.folder / folder / "bag", seen[-1])
 

@@ -33,7 +33,7 @@ def run(trial: Trial, *arguments: object, prefix: Sequence[object] = ()) -> Ende
 def same_bits(trial: Trial, ended: Ended) -> Kept:
     """Require a whole bag whose every bit is what one process computes without any of it."""
     kept = whole(trial.folder / "run" / "bag", ended)
-    again = trial.sms_handover("reproduce", "run")
+    again = trial.sms_handover("verify", "run")
     require(again.code == 0, f"the run is not reproduced: {(again.err or again.out)[-300:]}")
     return kept
 

@@ -55,6 +55,7 @@ _ENVIRONMENT: Mapping[str, tuple[str | None, ...]] = {  # None: not set
     "AMENT_PREFIX_PATH": ("/proc/none", ""),
     "TZ": ("nonsense",),
 }
+_FILES = ("schedule", "robot", "parameters")  # that a user writes
 _SHADOWS = ("yaml", "numpy", "rclpy", "mcap", "sms_handover_interfaces")  # modules of a stranger
 
 
@@ -171,13 +172,17 @@ _VERBS: Mapping[str, Callable[[Random, Path], list[str]]] = {
     "csv": _bag_verb("bag", "export", output=True),
     "parquet": _bag_verb("bag", "export", "--format", "parquet", output=True),
     "compare": _bag_verb("compare"),
-    "figures": _bag_verb("figures", "--format", "png", output=True),
+    "figures": _bag_verb("report", "--figures", "out", "--format", "png"),
     "report": _bag_verb("report", output=True),
     "view": _bag_verb("view", "--no-browser", output=True),
-    "reproduce": _bag_verb("reproduce"),
-    "play": _bag_verb("play", "--rate", "100", "--duration", "0.2", "--ack-timeout", "0.2"),
-    "closed loop": _bag_verb("play", "--closed-loop"),
-    "record": lambda random, folder: ["record", "--all", "--duration", "0.3", "-o", _output(random)],
+    "list": lambda random, folder: ["list", *random.choice(([], ["metrics"], ["laws", "--json"], ["law"]))],
+    "show": lambda random, folder: ["show", random.choice(("paper", "pid", "", _bag(random, folder)))],
+    "check a file": lambda random, folder: ["check", _text(random, folder, random.choice(_FILES))],
+    "old name": _bag_verb("reproduce"),
+    "verify": _bag_verb("verify"),
+    "play": _bag_verb("bag", "play", "--rate", "100", "--duration", "0.2", "--ack-timeout", "0.2"),
+    "verify with plant": _bag_verb("verify", "--with", "plant"),
+    "record": lambda random, folder: ["bag", "record", "--all", "--duration", "0.3", "-o", _output(random)],
     "simulate": lambda random, folder: ["simulate", *_scenario(random, folder), "-o", _output(random)],
     "run": lambda random, folder: ["run", *_scenario(random, folder), "-o", _output(random)],
 }

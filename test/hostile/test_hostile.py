@@ -4,7 +4,7 @@ import pytest
 
 from .command import tried
 
-SAMPLE = 20  # attempts, more than there are commands
+SAMPLE = 20  # attempts, as many as there are commands
 
 
 @pytest.mark.system

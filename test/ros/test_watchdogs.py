@@ -16,6 +16,8 @@ from sms_handover.graph.events import (
     IK_FAILED,
     NO_ANSWER,
     PHASE_RETRIED,
+    POSITION_EXCEEDED,
+    RATE_EXCEEDED,
     REFERENCE_BACK,
     REFERENCE_LOST,
     TORQUE_ZERO,
@@ -27,6 +29,7 @@ from sms_handover.graph.topics import (
     JOINT_COMMAND,
     JOINT_REFERENCE,
     JOINT_STATES,
+    PLANT,
     RUN_EVENTS,
     RUN_STATE,
     TASK_PHASE,
@@ -86,6 +89,24 @@ def simulated(bench: Bench, **trajectory: object) -> RunData:
     return simulate(load_scenario(values={"common": common, TRAJECTORY: trajectory}))
 
 
+def test_enforced_limits_lead_to_the_same_over_dds(bench: Bench) -> None:
+    """In bits and in events: one joint runs up its torque-speed line, another is dragged into a stop."""
+    limits = "{joint_5: {position: [-1.459, -1.458]}, joint_7: {position: [-6.0, -1.53]}}"  # [rad]
+    given: dict[str, dict[str, Any]] = {"controller": {"law": "pid"}, PLANT: {"joint_limits": "enforce"}}
+    common: dict[str, Any] = {"values": (f"robot.arms.arm_b.limits:={limits}",)}
+    graph = Graph(bench, {**given, "common": common})
+    graph.run()
+    common["schedule"] = str(bench.folder / "schedule.yaml")
+    expected = simulate(load_scenario(values={**given, "common": common}))
+    assert {event.kind for event in expected.run_events} == {POSITION_EXCEEDED, RATE_EXCEEDED}
+    assert repr(events(graph)) == repr(list(expected.run_events))
+    assert np.max(np.abs(expected.joint_effort[1:] - expected.joint_command[:-1])) > 0.01  # [N m] by the line
+    states = list(Messages().of(graph, JOINT_STATES))
+    for name in ("position", "velocity", "effort"):
+        rows = np.array([getattr(state, name) for state in states])
+        assert rows.tobytes() == getattr(expected, f"joint_{name}").tobytes()
+
+
 def test_a_second_run_decides_the_same(bench: Bench) -> None:
     """Retries that were used up before a reset are there again after it."""
     schedule = missing_grasp({"retry": 1})
@@ -131,7 +152,7 @@ def test_in_real_time_the_torque_is_held_and_then_ramped_to_zero(bench: Bench, f
     """One command, for the first state, and then none: what is applied is the closed form, bit for bit."""
     limits = {"command_hold": 0.05, "command_ramp": 0.1, "catch_up": 3600.0}  # s; the fast clock lags
     graph = plant_with(bench, common=REALTIME, plant=limits, duration=0.2, silent=True)
-    push = np.linspace(-0.01, 0.02, 14)  # N m
+    push = np.linspace(-0.001, 0.002, 14)  # N m, by which no joint gets too fast
     command = JointState(name=list(graph.plant.robot.joint_names), effort=push.tolist())
     graph.fakes[CONTROLLER]._command.publish(command)
     bench.until(lambda: np.any(graph.plant._command.effort), "the command")

@@ -35,16 +35,18 @@ class Ended:
         return [line for line in self.err.splitlines() if "error:" in line]
 
 
-def command_of(arguments: Sequence[object]) -> list[str]:
-    """Return the command line of ``sms-handover`` with arguments."""
-    return [sys.executable, "-m", "sms_handover.cli.main", *map(str, arguments)]
+def command_of(arguments: Sequence[object], *, dry_run: bool = False) -> list[str]:
+    """Return the command line of ``sms-handover`` with arguments, by default without a dry run."""
+    words = [str(word) for word in arguments]
+    if words[:1] == ["run"] and not dry_run:
+        words.insert(1, "--no-dry-run")
+    return [sys.executable, "-m", "sms_handover.cli.main", *words]
 
 
-def sms_handover(*arguments: object, cwd: Path) -> Ended:
+def sms_handover(*arguments: object, cwd: Path, dry_run: bool = False) -> Ended:
     """Carry out a command to its end."""
-    done = subprocess.run(
-        command_of(arguments), cwd=cwd, capture_output=True, text=True, timeout=DEADLINE_S, check=False
-    )
+    command = command_of(arguments, dry_run=dry_run)
+    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=DEADLINE_S, check=False)
     return Ended(done.returncode, done.stdout, done.stderr)
 
 

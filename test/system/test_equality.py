@@ -5,12 +5,14 @@ from pathlib import Path
 import pytest
 
 from sms_handover.analysis.equality import compare_runs
+from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import read_info
 from sms_handover.bag.run.reader import read_run
-from sms_handover.graph.topics import CONTAINER, RECORDER
+from sms_handover.graph.topics import CLEARANCE, CONTAINER, RECORDER
 from sms_handover.launcher.recorded_scenario import scenario_in
 from sms_handover.run_data import RunData
-from sms_handover.simulation.scenario import load_scenario
+from sms_handover.simulation.loop import Loop
+from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.types import GraspStatus
 
@@ -82,6 +84,47 @@ def test_compiled_dynamics(schedule: Path, simulated: dict[str, RunData], tmp_pa
         simulate(load_scenario(values={"common": {"schedule": str(schedule), "dynamics": "compiled"}})),
     )
     assert run.joint_velocity.tobytes() != simulated["nmpc"].joint_velocity.tobytes()
+
+
+def test_a_collision_ends_the_run_in_the_same_tick(schedule: Path, tmp_path: Path) -> None:
+    """The plant measures, the trajectory gives up a period later; the bag is whole, and names the bodies.
+
+    The gripper that has let go is more than 1 mm in the deputy at 0.86 s.
+    """
+    abort = ("-p", "common.on_collision:=abort", "-p", "trajectory.failure_hold:=0.05")
+    arguments = ("run", "--compose", "--schedule", schedule, *abort, "-o", "out")
+    ended = sms_handover(*arguments, cwd=tmp_path, dry_run=True)
+    assert "warning: in a dry run bodies collide from 0.86 s on, at worst arm_a_gripper" in ended.err
+    assert ended.code == 1 and "phase 'withdraw' has failed at 0.93 s" in ended.out, ended
+    assert "arm_a_gripper and deputy overlap by 1.00 mm at 0.86 s; the joints are held" in ended.err
+    bag = tmp_path / "out" / "bag"
+    assert sms_handover("bag", "check", bag, cwd=tmp_path).code == 0
+    common = {"schedule": str(schedule), "on_collision": "abort"}
+    scenario = load_scenario(values={"common": common, "trajectory": {"failure_hold": 0.05}})
+    assert_same_bits(read_run(bag), simulate(scenario))
+    assert measured_in(bag) == measured_by(scenario)
+
+
+def measured_in(bag: Path) -> list[list[tuple[float, list[float]]]]:
+    """Return the distance and the nearest points of every group of bodies, by period, as recorded."""
+    types = read_info(bag).topics[f"/{CLEARANCE}"].types
+    messages = [types.decode(message.data) for message in read_messages(bag, [f"/{CLEARANCE}"])]
+    points = [
+        [(item.distance, [item.first_point, item.second_point]) for item in message.groups]
+        for message in messages
+    ]
+    return [[(d, [c for p in pair for c in (p.x, p.y, p.z)]) for d, pair in groups] for groups in points]
+
+
+def measured_by(scenario: Scenario) -> list[list[tuple[float, list[float]]]]:
+    """Return the same of a run in one process."""
+    loop, found = Loop(scenario), []
+    while not loop.finished:
+        period = loop.advance().period
+        if period and period.clearance:
+            groups = period.clearance.groups
+            found.append([(g.distance, g.nearest.points_in_world.ravel().tolist()) for g in groups])
+    return found
 
 
 def test_every_node_has_the_robot_that_is_its(

@@ -51,12 +51,12 @@ def test_a_full_disk_ends_the_run_in_one_line_and_what_is_there_is_recovered(
     assert "the run was not finished when the recording ended" in checked.out
 
 
-def test_compare_and_reproduce_name_the_way_out_of_a_damaged_bag(
+def test_compare_and_verify_name_the_way_out_of_a_damaged_bag(
     recorded: dict[str, tuple[Path, object]], tmp_path: Path, called: Command
 ) -> None:
     content = (recorded["nmpc"][0] / "bag" / "bag_0.mcap").read_bytes()
     (tmp_path / "cut.mcap").write_bytes(content[: len(content) // 2])
-    for command, code in (("compare", 2), ("reproduce", 2), ("bag info", 1), ("bag export -o out", 1)):
+    for command, code in (("compare", 2), ("verify", 2), ("bag info", 1), ("bag export -o out", 1)):
         done = called(*command.split(), "cut.mcap", cwd=tmp_path)
         assert done.code == code, done
         assert done.err.count("\n") == 1

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import my_law
 import numpy as np
 import pytest
 from my_controller import task_space_pd
@@ -13,6 +14,7 @@ from my_controller import task_space_pd
 from sms_handover.analysis.equality import compare_runs
 from sms_handover.bag.info import read_info
 from sms_handover.bag.run.reader import read_run
+from sms_handover.control.law import LawSetup
 from sms_handover.run_data import RunData
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
@@ -31,12 +33,10 @@ _ROUNDING = 1e-9  # [rad, N m] of the same law in other operations, within a sec
 
 @pytest.fixture(scope="module", autouse=True)
 def example_on_path(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Let processes import the example and find its law, as if it were installed."""
-    example = str(Path(task_space_pd.__file__).parent.parent)
-    entry_points = offer(
-        tmp_path_factory.mktemp("site"), "my_controller", task_space_pd="my_controller.law:LAW"
-    )
-    os.environ["PYTHONPATH"] = os.pathsep.join([example, str(entry_points), os.environ.get("PYTHONPATH", "")])
+    """Let processes import the examples and find the law of one, as if both were installed."""
+    examples = [str(Path(task_space_pd.__file__).parent.parent), str(Path(my_law.__file__).parent)]
+    entry_points = str(offer(tmp_path_factory.mktemp("site"), "my_law", joint_pd="my_law:LAW"))
+    os.environ["PYTHONPATH"] = os.pathsep.join([*examples, entry_points, os.environ.get("PYTHONPATH", "")])
 
 
 @pytest.fixture(scope="module")
@@ -71,16 +71,26 @@ def test_the_same_object_gives_the_same_bits_over_dds(
     assert compare_runs(recorded, in_one_process) == ()
 
 
-def test_by_its_name_it_runs_in_our_node_and_is_reproduced(
-    schedule: Path, in_one_process: RunData, tmp_path: Path
+def test_a_law_of_a_small_package_is_as_one_of_ours(
+    schedule: Path, recorded: dict[str, tuple[Path, Ended]], tmp_path: Path, called: Command
 ) -> None:
-    """As any law of ours: found, run, recorded, made again from the bag."""
-    law = ("--controller", "task_space_pd")
-    ended = sms_handover("run", *law, "--schedule", schedule, "-o", "named", cwd=tmp_path)
+    """Found by its name, run over DDS in our node, recorded, made again, scored in one table, reported."""
+    law = ("--controller", "joint_pd", "-p", "controller.frequency:=1.2")
+    ended = sms_handover("run", *law, "--schedule", schedule, "-o", "mine", cwd=tmp_path)
     assert ended.code == 0, ended
-    assert compare_runs(read_run(tmp_path / "named" / "bag"), in_one_process) == ()
-    assert read_info(tmp_path / "named" / "bag").parameters["controller"]["stiffness"] == 5.0
-    assert sms_handover("reproduce", "named", cwd=tmp_path).code == 0
+    scenario = load_scenario(values={"common": {"schedule": str(schedule)}})
+    gains = (my_law.Gains(frequency=1.2),) * len(scenario.model.schedule.phases)
+    setup = LawSetup(scenario.model.robot, gains, scenario.parameters.common.tick_ns)
+    by_hand = simulate(scenario, controller=my_law.JointPd(setup))
+    assert compare_runs(read_run(tmp_path / "mine" / "bag"), by_hand) == ()
+    assert read_info(tmp_path / "mine" / "bag").parameters["controller"]["frequency"] == 1.2
+    assert sms_handover("verify", "mine", cwd=tmp_path).code == 0
+    ours = (recorded["nmpc"][0], recorded["pid"][0])
+    assert called("compare", "mine", *ours, "--csv", "all.csv", cwd=tmp_path).code == 0
+    runs = [line.partition(",")[0] for line in (tmp_path / "all.csv").read_text().splitlines()[1:]]
+    assert list(dict.fromkeys(runs)) == ["mine", "nmpc", "pid"]
+    assert called("report", "mine", recorded["nmpc"][0], "-o", "page", cwd=tmp_path).code == 0
+    assert "law joint_pd" in (tmp_path / "page" / "index.html").read_text(encoding="utf-8")
 
 
 def test_a_bare_node_does_the_same(own: dict[str, tuple[Path, Ended]], in_one_process: RunData) -> None:
@@ -130,10 +140,10 @@ def test_its_commands_can_be_played_into_a_plant_but_not_made_again(
     own: dict[str, tuple[Path, Ended]], tmp_path: Path, called: Command
 ) -> None:
     folder, _ = own["helped"]
-    again = called("reproduce", folder, cwd=tmp_path)
+    again = called("verify", folder, cwd=tmp_path)
     assert again.code == 2
-    assert again.errors[0].endswith("check a recording with 'sms-handover play --closed-loop'")
-    played = sms_handover("play", folder, "--closed-loop", cwd=tmp_path)
+    assert again.errors[0].endswith("check a recording with 'sms-handover verify --with plant'")
+    played = sms_handover("verify", folder, "--with", "plant", cwd=tmp_path)
     assert played.code == 0, played
     assert f"the same bit for bit as recorded: {TICKS} states" in played.out
 

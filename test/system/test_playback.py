@@ -50,9 +50,9 @@ def by_topic(bag: Path) -> dict[str, list[bytes]]:
 
 def record_while_playing(bag: Path, cwd: Path, *options: object) -> tuple[dict[str, list[bytes]], str]:
     """Play a bag into a fresh recorder; return what was recorded, and what the player printed."""
-    with running("record", "--all", "-o", "again", cwd=cwd) as recorder:
+    with running("bag", "record", "--all", "-o", "again", cwd=cwd) as recorder:
         recorder.until((cwd / "again").is_dir, "the recorder")
-        done = sms_handover("play", bag, "--wait", "60", *options, cwd=cwd)
+        done = sms_handover("bag", "play", bag, "--wait", "60", *options, cwd=cwd)
         assert done.code == 3, done  # of what is not installed here nothing is played
         recorder.send(signal.SIGINT)
         assert recorder.end() == 0, recorder.text
@@ -112,7 +112,7 @@ def test_a_bag_of_another_robot_is_played(tmp_path: Path) -> None:
 
 def test_if_nothing_can_be_played_the_exit_code_says_so(tmp_path: Path) -> None:
     foreign_bag(tmp_path / "robot")
-    done = sms_handover("play", "robot", "--topics", "/tanks", cwd=tmp_path)
+    done = sms_handover("bag", "play", "robot", "--topics", "/tanks", cwd=tmp_path)
     assert done.code == 2
     assert done.errors == [f"player: error: no topic of {Path('robot')} can be played"]
 
@@ -125,13 +125,12 @@ def test_if_nothing_can_be_played_the_exit_code_says_so(tmp_path: Path) -> None:
         (["robot", "-m", "imu"], "'imu' is not of the form OLD:=NEW"),
         (["robot", "-e", "("], "regular expression '(' is not readable"),
         (["robot", "--domain-id", "500"], "domain id is 500, must be 0 to 101"),
-        (["robot", "--closed-loop", "--rate", "2"], "--closed-loop takes no other option, but rate is given"),
-        (["robot", "--closed-loop"], "does not say what it was made with"),
+        (["robot", "--storage", "sqlite3"], "invalid choice: 'sqlite3'"),
     ],
 )
 def test_wrong_input_is_one_line(tmp_path: Path, arguments: list[str], told: str, called: Command) -> None:
     foreign_bag(tmp_path / "robot")
-    done = called("play", *arguments, cwd=tmp_path)
+    done = called("bag", "play", *arguments, cwd=tmp_path)
     assert (done.code, len(done.errors)) == (2, 1), done
     assert told in done.errors[0]
     assert "Traceback" not in done.err
@@ -139,25 +138,28 @@ def test_wrong_input_is_one_line(tmp_path: Path, arguments: list[str], told: str
 
 def test_record_asks_what_to_record(tmp_path: Path, called: Command) -> None:
     for arguments in ([], ["--all", "--topics", "/a"]):
-        done = called("record", *arguments, cwd=tmp_path)
+        done = called("bag", "record", *arguments, cwd=tmp_path)
         assert (done.code, len(done.errors)) == (2, 1), done
 
 
 def test_record_ends_by_itself_and_takes_what_was_asked_for(tmp_path: Path) -> None:
     foreign_bag(tmp_path / "robot")
-    with running("play", "robot", "--loop", cwd=tmp_path) as player:
+    with running("bag", "play", "robot", "--loop", cwd=tmp_path) as player:
         player.until(lambda: "rate 1.00" in player.text, "the player")
-        done = sms_handover("record", "--topics", "imu", "-o", "again", "--duration", "8", cwd=tmp_path)
+        words = ("--topics", "imu", "-o", "again", "--duration", "8", "--max-bag-duration", "3")
+        done = sms_handover("bag", "record", *words, cwd=tmp_path)
         assert done.code == 0, done
         assert player.process.poll() is None
     assert list(by_topic(tmp_path / "again")) == ["/imu"]
-    done = sms_handover("record", "--regex", "^/nothing", "-o", "none", "--duration", "1", cwd=tmp_path)
+    assert len([*(tmp_path / "again").glob("*.mcap")]) in (2, 3), "a new file every 3 s"
+    nothing = ("--regex", "^/nothing", "-o", "none", "--duration", "1")
+    done = sms_handover("bag", "record", *nothing, cwd=tmp_path)
     assert done.code == 1
 
 
 def test_an_interrupt_ends_the_player_at_once(tmp_path: Path) -> None:
     foreign_bag(tmp_path / "robot")
-    with running("play", "robot", "--start-paused", cwd=tmp_path) as player:
+    with running("bag", "play", "robot", "--start-paused", cwd=tmp_path) as player:
         player.until(lambda: "paused" in player.text, "the player")
         player.send(signal.SIGINT)
         assert player.end() == 130
@@ -165,7 +167,7 @@ def test_an_interrupt_ends_the_player_at_once(tmp_path: Path) -> None:
 
 def test_keys_control_the_player_and_the_terminal_is_put_back(tmp_path: Path) -> None:
     foreign_bag(tmp_path / "robot")
-    arguments = ["play", str(tmp_path / "robot"), "--start-paused", "--topics", "/imu"]
+    arguments = ["bag", "play", str(tmp_path / "robot"), "--start-paused", "--topics", "/imu"]
     program = f"import sys\nfrom sms_handover.cli.main import main\nsys.exit(main({arguments!r}))"
     with Terminal(program, TERM="xterm") as terminal:
         terminal.until_text("space: pause, resume")
@@ -189,10 +191,14 @@ def test_keys_control_the_player_and_the_terminal_is_put_back(tmp_path: Path) ->
 
 
 def test_the_plant_does_again_what_it_did(recorded: Recorded, tmp_path: Path) -> None:
-    """Under one law, as the plant takes commands and knows of none."""
-    done = sms_handover("play", "--closed-loop", recorded["nmpc"][0], cwd=tmp_path)
+    """Under either law, one run after the other."""
+    runs = [recorded[law][0] for law in ("nmpc", "pid")]
+    done = sms_handover("verify", *runs, "--with", "plant", cwd=tmp_path)
     assert done.code == 0, done
-    assert f"the same bit for bit as recorded: {TICKS} states" in done.out
+    told = [line for line in done.out.splitlines() if "wall time" not in line]
+    assert told == [
+        part for run in runs for part in (f"{run}:", f"the same bit for bit as recorded: {TICKS} states")
+    ]
 
 
 def with_other_commands(bag: Path, folder: Path, changes: Mapping[int, Callable[[float], float]]) -> None:
@@ -228,7 +234,7 @@ def test_other_commands_are_found_to_a_bit_and_seen_in_joints_and_base(
     """
     changes = {700: lambda effort: float(np.nextafter(effort, np.inf)), 710: lambda effort: effort + 1e-6}
     with_other_commands(recorded["pid"][0] / "bag", tmp_path / "other", changes)
-    done = sms_handover("play", "--closed-loop", "other", cwd=tmp_path)
+    done = sms_handover("verify", "--with", "plant", "other", cwd=tmp_path)
     assert done.code == 1, done
     assert "first different bit at 0.701 s" in done.out
     lines = [line.split() for line in done.out.splitlines() if line.startswith("  ")]
@@ -239,7 +245,7 @@ def test_other_commands_are_found_to_a_bit_and_seen_in_joints_and_base(
 
 
 def test_a_dead_plant_is_told(recorded: Recorded, tmp_path: Path) -> None:
-    with running("play", "--closed-loop", recorded["nmpc"][0], cwd=tmp_path) as run:
+    with running("verify", "--with", "plant", recorded["nmpc"][0], cwd=tmp_path) as run:
         run.until_all_nodes(("plant",))
         os.kill(run.nodes["plant"], signal.SIGKILL)
         assert run.end() == 1

@@ -154,16 +154,16 @@ def test_a_bag_reproduces_itself(recorded: Recorded, tmp_path: Path, called: Com
     """From a bag alone: the schedule and the output folder of then need not be there."""
     for law, (folder, _) in recorded.items():
         shutil.copytree(folder / "bag", tmp_path / law)
-        again = called("reproduce", law, cwd=tmp_path)
+        again = called("verify", law, cwd=tmp_path)
         assert (again.code, again.err) == (0, "")
         assert f"the same bit for bit: {TICKS} states, {PERIODS} references" in again.out
 
 
-def test_reproduce_tells_what_it_cannot_use(tmp_path: Path, called: Command) -> None:
+def test_verify_tells_what_it_cannot_use(tmp_path: Path, called: Command) -> None:
     (tmp_path / "empty").mkdir()
     BagWriter(tmp_path / "foreign").close()
     for folder, told in (("nowhere", "no bag"), ("empty", "not a bag"), ("foreign", "no run")):
-        done = called("reproduce", folder, cwd=tmp_path)
+        done = called("verify", folder, cwd=tmp_path)
         assert (done.code, len(done.errors)) == (2, 1), done
         assert told in done.errors[0]
         assert done.err.count("\n") == 1

@@ -76,7 +76,7 @@ def test_a_second_run_has_the_same_bits_and_a_bag_of_its_own(
     checked = called("bag", "check", "mine", cwd=tmp_path)
     assert checked.code == 0, checked
     assert checked.out.count(" is complete: ") == 2
-    again = called("reproduce", "mine", cwd=tmp_path)
+    again = called("verify", "mine", cwd=tmp_path)
     assert again.code == 0, again
     assert "where the run was ended" in again.out.splitlines()[0]
     assert again.out.splitlines()[1].startswith(f"the same bit for bit: {TICKS} states")

@@ -37,7 +37,7 @@ def test_a_run_with_retries_is_the_one_in_one_process(tmp_path: Path, called: Co
         "phase_retried",
         "grasp_failed",
     ]
-    for command in (("reproduce", "out"), ("bag", "check", "out")):
+    for command in (("verify", "out"), ("bag", "check", "out")):
         again = called(*command, cwd=tmp_path)
         assert again.code == 0, again
     alone = called("simulate", "--schedule", path, *hold, cwd=tmp_path)

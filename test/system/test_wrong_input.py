@@ -1,5 +1,7 @@
 """Wrong input ends in one line and exit code 2 before any node is started."""
 
+from argparse import ArgumentParser
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -140,6 +142,17 @@ def test_simulate_refuses_the_same(folder: Path, called: Command) -> None:
         assert len(done.errors) == 1 and told in done.errors[0], done
 
 
+def test_run_simulate_and_check_describe_a_scenario_alike() -> None:
+    """Each takes what the others take, and has options of its own for what it does with it."""
+    taken = {}
+    for verb in ("run", "simulate", "check"):
+        parser = ArgumentParser()
+        import_module(f"sms_handover.cli.{verb}").add_parser(parser)
+        (group,) = [group for group in parser._action_groups if group.title == "scenario"]
+        taken[verb] = [(action.dest, *action.option_strings) for action in group._group_actions]
+    assert taken["run"] == taken["simulate"] == taken["check"]
+
+
 def test_numbers_are_read_as_ros_reads_them(schedule: Path, tmp_path: Path, called: Command) -> None:
     """An exponent without a decimal point makes a number too."""
     arguments = ("-p", "common.tick:=1e-3", "--duration", "0.02", "--schedule", schedule)
@@ -147,7 +160,7 @@ def test_numbers_are_read_as_ros_reads_them(schedule: Path, tmp_path: Path, call
     assert done.code == 0, done
 
 
-@pytest.mark.parametrize("command", [[], ["run"], ["simulate"], ["compare"], ["reproduce"]])
+@pytest.mark.parametrize("command", [[], ["run"], ["simulate"], ["compare"], ["verify"]])
 def test_help_teaches(command: list[str], tmp_path: Path, called: Command) -> None:
     """Every command tells what it does and exits with 0."""
     done = called(*command, "--help", cwd=tmp_path)
@@ -156,7 +169,20 @@ def test_help_teaches(command: list[str], tmp_path: Path, called: Command) -> No
     assert done.err == ""
 
 
-@pytest.mark.parametrize("arguments", [[], ["fly"], ["compare"], ["reproduce"]])
+@pytest.mark.parametrize("arguments", [[], ["fly"], ["compare"], ["verify"]])
 def test_a_command_must_be_whole(arguments: list[str], tmp_path: Path, called: Command) -> None:
     done = called(*arguments, cwd=tmp_path)
     assert (done.code, len(done.errors)) == (2, 1)
+
+
+def test_collisions_are_told_before_a_run_and_may_be_rejected(
+    schedule: Path, tmp_path: Path, called: Command
+) -> None:
+    """The gripper that has let go of the deputy comes back into it; nothing is started or made."""
+    worst = "at worst arm_a_gripper and deputy overlap by 1.72 mm at 1.02 s"
+    done = called("run", "--reject-collisions", "--schedule", schedule, "-o", "out", cwd=tmp_path)
+    assert done.code == 2 and f"error: bodies collide from 0.86 s on, {worst}" in done.err
+    assert tree(tmp_path) == {}
+    for options, code in (((), 0), (("--reject-collisions",), 1)):
+        done = called("simulate", *options, "--schedule", schedule, cwd=tmp_path)
+        assert done.code == code and f"warning: bodies collide, {worst}" in done.err

@@ -11,7 +11,7 @@ import mink
 import mujoco
 import numpy as np
 
-from benchmarks.mujoco_model import rotation_matrix, to_mjcf
+from benchmarks.mujoco_model import mjcf_of, rotation_matrix
 from sms_handover.frames import tool_frame
 from sms_handover.model.assembly import RobotDescription
 from sms_handover.types import Array, Pose
@@ -34,7 +34,7 @@ class FixedBase:
 
     def __init__(self, description: RobotDescription) -> None:
         """Compile the model."""
-        self.model = mujoco.MjModel.from_xml_string(to_mjcf(description, floating=False))
+        self.model = mujoco.MjModel.from_xml_string(mjcf_of(description, floating=False))
         self._configuration = mink.Configuration(self.model)
         self._limits = [mink.ConfigurationLimit(self.model, gain=1.0)]
 

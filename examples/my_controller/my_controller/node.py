@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 
+import sms_handover as sms
 from my_controller.task_space_pd import TaskSpaceGains, TaskSpacePd
-from sms_handover.external.controller import run_controller
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_controller("task_space_pd", TaskSpacePd, TaskSpaceGains, args)
+    return sms.run_controller("task_space_pd", TaskSpacePd, TaskSpaceGains, args)
 
 
 if __name__ == "__main__":

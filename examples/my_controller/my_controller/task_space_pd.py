@@ -8,25 +8,22 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from sms_handover.configuration.parameters import parameter
-from sms_handover.control.protocol import Guidance
-from sms_handover.model.poses import se3_of
-from sms_handover.model.reduced import generalized_jacobian
-from sms_handover.model.robot_model import RobotModel
-from sms_handover.types import BASE_NV, Array
+import sms_handover as sms
 
 
 @dataclass(frozen=True)
 class TaskSpaceGains:
     """Springs and dampers between each tool and its target, and a damper in every joint."""
 
-    stiffness: float = parameter("spring on the tool's position", unit="N/m", minimum=0.0, default=5.0)
-    damping: float = parameter("damper on its velocity", unit="N s/m", minimum=0.0, default=7.0)
-    angular_stiffness: float = parameter(
+    stiffness: float = sms.parameter("spring on the tool's position", unit="N/m", minimum=0.0, default=5.0)
+    damping: float = sms.parameter("damper on its velocity", unit="N s/m", minimum=0.0, default=7.0)
+    angular_stiffness: float = sms.parameter(
         "spring on its orientation", unit="N m/rad", minimum=0.0, default=0.5
     )
-    angular_damping: float = parameter("damper on its turn rate", unit="N m s/rad", minimum=0.0, default=0.4)
-    joint_damping: float = parameter("damper in every joint", unit="N m s/rad", minimum=0.0, default=0.1)
+    angular_damping: float = sms.parameter(
+        "damper on its turn rate", unit="N m s/rad", minimum=0.0, default=0.4
+    )
+    joint_damping: float = sms.parameter("damper in every joint", unit="N m s/rad", minimum=0.0, default=0.1)
 
 
 class TaskSpacePd:
@@ -37,7 +34,7 @@ class TaskSpacePd:
     springs and dampers connect each tool to ``world``, whatever the base does.
     """
 
-    def __init__(self, robot: RobotModel, gains: TaskSpaceGains | None = None) -> None:
+    def __init__(self, robot: sms.RobotModel, gains: TaskSpaceGains | None = None) -> None:
         self._robot = robot
         self.use(gains or TaskSpaceGains())
 
@@ -50,18 +47,18 @@ class TaskSpacePd:
     def reset(self) -> None:
         """Do nothing: the law has no state but its last targets."""
 
-    def guide(self, guidance: Guidance) -> None:
+    def guide(self, guidance: sms.Guidance) -> None:
         """Set the targets of the tools."""
-        self._targets = {arm: se3_of(pose) for arm, pose in guidance.tool_in_world.items()}
+        self._targets = {arm: sms.se3_of(pose) for arm, pose in guidance.tool_in_world.items()}
 
-    def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
+    def effort(self, stamp_ns: int, q: sms.Array, v: sms.Array) -> sms.Array:
         """Return the joint efforts (n,) N m."""
-        rates = v[BASE_NV:]
+        rates = v[sms.BASE_NV :]
         tools = self._robot.tools_at(q)
         effort = -self._joint_damping * rates
         for arm, target in self._targets.items():
-            jacobian = generalized_jacobian(self._robot, q, arm)  # (6, n), twist in world axes
-            tool = se3_of(tools[arm])
+            jacobian = sms.generalized_jacobian(self._robot, q, arm)  # (6, n), twist in world axes
+            tool = sms.se3_of(tools[arm])
             turn = pin.log3(tool.rotation @ target.rotation.T)  # from the target to the tool, in world axes
             error = np.concatenate([tool.translation - target.translation, turn])
             wrench = -(self._stiffness * error + self._damping * (jacobian @ rates))

@@ -39,9 +39,9 @@ _PER_RUN: dict[str, Callable[[DrawnRun], Figure]] = {"snapshots": draw_snapshots
 
 # the writers would otherwise add dates and versions, and the same figure would not give the same bytes
 _METADATA: dict[str, dict[str, str | None]] = {
-    "pdf": {"CreationDate": None, "Producer": None, "Creator": "sms-handover figures"},
+    "pdf": {"CreationDate": None, "Producer": None, "Creator": "sms-handover"},
     "png": {"Software": None},
-    "svg": {"Date": None, "Creator": "sms-handover figures"},
+    "svg": {"Date": None, "Creator": "sms-handover"},
 }
 
 

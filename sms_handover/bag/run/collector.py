@@ -92,7 +92,7 @@ class RunCollector:
         return f"{self._prefix}/{name}"
 
     def _check_types(self) -> None:
-        for topic in topics.graph_topics(self.arms):
+        for topic in topics.graph_topics(self.arms, clearance=True):
             recorded = self._info.topics.get(self.full_name(topic.name))
             if recorded is not None and (recorded.type, recorded.encoding) != (topic.type, "cdr"):
                 raise BagError(

@@ -73,7 +73,7 @@ class PlantOutputs:
             conserved = plant.conserved
             for arm, pose in plant.tools_in_world.items():
                 publish[tool_pose(arm)](self._pose_codec.pack(now_ns, pose_row(pose)))
-            energy = np.array([conserved.kinetic_energy, plant.work])
+            energy = np.array([conserved.kinetic_energy, plant.net_work])
             publish[LINEAR_MOMENTUM](self._vector_codec.pack(now_ns, conserved.linear_momentum))
             publish[ANGULAR_MOMENTUM](self._vector_codec.pack(now_ns, conserved.angular_momentum))
             publish[ENERGY](self._energy_codec.pack(now_ns, energy))

@@ -60,7 +60,7 @@ class TimePlot {
       dragmode: coarse ? false : "zoom",
       xaxis: { ...axisColours(), range: [...this.view.range], zeroline: false, ticksuffix: " s", hoverformat: ".3f", fixedrange: coarse },
       yaxis: { ...axisColours(), ...this.valueAxis(), fixedrange: true, exponentformat: "power", nticks: 6 },
-      shapes: phaseShapes(),
+      shapes: [...phaseShapes(), ...this.levelShapes()],
       annotations: this.marks(),
     };
   }
@@ -88,6 +88,20 @@ class TimePlot {
 
   marks() {
     return [...phaseNames(this.view.range), ...eventMarks()];
+  }
+
+  // Lines across the plot, such as the distance at which bodies touch.
+  levelShapes() {
+    return this.plot.levels.map(({ value, text }, place) => ({
+      type: "line",
+      xref: "paper",
+      x0: 0,
+      x1: 1,
+      y0: value,
+      y1: value,
+      line: { width: 1, dash: place ? "dot" : "solid", color: colour("bad") },
+      label: { text: plain(text), textposition: "end", yanchor: place ? "top" : "bottom", font: { size: 10, color: colour("bad") } },
+    }));
   }
 
   // Show the values at a time, as if the pointer were there; null for none.
@@ -119,6 +133,8 @@ class TimePlot {
       return { type: "log", range: [bottom - 0.1, top + 0.2], tickfont: { color: colour("muted"), size: 9 } };
     }
     if (!(high >= low)) return { type: "linear", range: [0, 1] };
+    for (const { value } of this.plot.levels) low = Math.min(low, value);
+    high = Math.max(Math.min(high, this.plot.ceiling ?? high), low);
     const room = 0.06 * (high - low) || Math.abs(high) || 1;
     return { type: "linear", range: [this.plot.magnitude ? -room / 2 : low - room, high + room] };
   }

@@ -8,8 +8,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Point
 from geometry_msgs.msg import Pose as PoseMessage
 from sensor_msgs.msg import JointState
+from sms_handover_interfaces.msg import BodyClearance
+from sms_handover_interfaces.msg import Clearance as ClearanceMessage
 from sms_handover_interfaces.msg import GraspCommand as GraspCommandMessage
 from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
 from sms_handover_interfaces.msg import IkStatus as IkStatusMessage
@@ -17,6 +20,7 @@ from sms_handover_interfaces.msg import RunEvent as RunEventMessage
 from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
 from std_msgs.msg import Header
 
+from sms_handover.clearance.monitor import GroupDistance, PeriodClearance
 from sms_handover.errors import MessageError, Reason
 from sms_handover.frames import WORLD
 from sms_handover.graph.events import RunEvent
@@ -99,6 +103,25 @@ def event_message(event: GraspEvent) -> GraspEventMessage:
         angle_error=event.angle_error,
         relative_speed=event.relative_speed,
         detail=event.detail,
+    )
+
+
+def clearance_message(clearance: PeriodClearance) -> ClearanceMessage:
+    """Return the clearance of a period as a message."""
+    groups = [_group_message(item) for item in clearance.groups]
+    return ClearanceMessage(header=header(clearance.stamp_ns), groups=groups)
+
+
+def _group_message(item: GroupDistance) -> BodyClearance:
+    first, second = (Point(x=x, y=y, z=z) for x, y, z in item.nearest.points_in_world.tolist())
+    return BodyClearance(
+        group=item.group,
+        first_body=item.bodies[0],
+        second_body=item.bodies[1],
+        distance=item.distance,
+        allowed=item.allowed,
+        first_point=first,
+        second_point=second,
     )
 
 

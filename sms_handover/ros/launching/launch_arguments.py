@@ -4,10 +4,10 @@ An argument that is not given leaves its parameter to the parameter file of the 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import get_type_hints
+from dataclasses import dataclass
 
-from sms_handover.configuration.parameters import ParameterSpec, spec_of
+from sms_handover.configuration.field_specification import ValueSpec
+from sms_handover.configuration.parameters import specs_of
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.topics import CONTROLLER, RECORDER, TRAJECTORY
 from sms_handover.ros.launching.composition import ProcessArguments, nodes_together, placed, process_arguments
@@ -32,9 +32,9 @@ class LaunchArgument:
         return COMMON_GROUP if self.node == _EVERY_NODE else OWN_GROUPS[self.node]
 
     @property
-    def spec(self) -> ParameterSpec:
+    def spec(self) -> ValueSpec:
         """Unit, range and description of the parameter."""
-        return next(spec_of(item) for item in fields(self.group.cls) if item.name == self.parameter)
+        return specs_of(self.group.cls)[self.parameter]
 
     @property
     def text(self) -> str:
@@ -45,7 +45,7 @@ class LaunchArgument:
     @property
     def choices(self) -> list[str] | None:
         """The values allowed, with '' for not given; None if there is no such list."""
-        if get_type_hints(self.group.cls)[self.parameter] is bool:
+        if self.spec.kind is bool:
             return ["", _TRUE, "false"]
         return ["", *self.spec.choices] if self.spec.choices else None
 
@@ -79,7 +79,7 @@ def launch_processes(given: Mapping[str, str], *, record: bool, compose: bool) -
 
 def _typed(argument: LaunchArgument, name: str, text: str) -> object:
     """Return the text of an argument as its parameter is typed."""
-    hint = get_type_hints(argument.group.cls)[argument.parameter]
+    hint = argument.spec.kind
     if hint == tuple[str, ...]:
         return (text,)
     if hint is bool:

@@ -117,7 +117,7 @@ class GraphNode(LifecycleNode, Generic[P]):
         world = load_world(self.common, role)
         self.robot: RobotModel = world.robot
         self.schedule: Schedule = world.schedule
-        topics = graph_topics(self.robot.arms)
+        topics = graph_topics(self.robot.arms, clearance=self.common.measures_clearance)
         self.endpoints = Endpoints(self, topics, self.common.peers, self.common.external)
         self.message_filter = MessageFilter(self.get_logger().warning, self._on_first_rejected)
         self.inputs.connect(self.endpoints, self.message_filter)

@@ -3,14 +3,14 @@
 ``--help`` of a node and the pages docs/parameters.md and docs/topics.md are written from this.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any, get_type_hints
+from dataclasses import dataclass
+from typing import Any
 
 from sms_handover.bag.parameters import RecorderParameters, TopicRecorderParameters
 from sms_handover.bag.qos import History
 from sms_handover.configuration.package_files import config_file
-from sms_handover.configuration.parameters import EVERY_NODE, ParameterSpec, read_parameter_files, spec_of
+from sms_handover.configuration.parameter_rows import ParameterRow, rows_of
+from sms_handover.configuration.parameters import EVERY_NODE, read_parameter_files
 from sms_handover.control.parameters import ControllerParameters
 from sms_handover.graph.services import SERVICES, Service
 from sms_handover.graph.topics import (
@@ -38,15 +38,6 @@ ANY_ARM = "ARM"  # stands for the name of an arm
 
 _EVERY_OTHER = set(NODES) - {PLANT, RECORDER}
 
-_TYPES = {
-    bool: "bool",
-    int: "integer",
-    float: "double",
-    str: "string",
-    tuple[float, ...]: "double_array",
-    tuple[str, ...]: "string_array",
-}  # as `ros2 param describe` names them
-
 
 @dataclass(frozen=True)
 class ParameterGroup:
@@ -55,18 +46,6 @@ class ParameterGroup:
     cls: type[Any]
     file: str
     section: str
-
-
-@dataclass(frozen=True)
-class ParameterRow:
-    """One parameter for readers: everything as text, '' where there is none."""
-
-    name: str
-    type: str
-    default: str
-    unit: str
-    allowed: str
-    description: str
 
 
 COMMON_GROUP = ParameterGroup(CommonParameters, "common.yaml", EVERY_NODE)
@@ -95,22 +74,6 @@ def parameter_rows(group: ParameterGroup) -> tuple[ParameterRow, ...]:
     return rows_of(group.cls, read_parameter_files([config_file(group.file)], group.section))
 
 
-def rows_of(cls: type[Any], defaults: Mapping[str, object]) -> tuple[ParameterRow, ...]:
-    """Return the parameters of a dataclass, with their defaults by name."""
-    hints = get_type_hints(cls)
-    return tuple(
-        ParameterRow(
-            name=item.name,
-            type=_TYPES[hints[item.name]],
-            default=_value(defaults[item.name]),
-            unit=spec_of(item).unit.replace("-", ""),
-            allowed=_allowed(spec_of(item)),
-            description=spec_of(item).description,
-        )
-        for item in fields(cls)
-    )
-
-
 def publishers_of(topic: Topic) -> tuple[str, ...]:
     """Return the nodes that publish a topic, with the recorder, which the table leaves out."""
     by_all = set(topic.publishers) >= _EVERY_OTHER
@@ -124,7 +87,7 @@ def subscribers_of(topic: Topic) -> tuple[str, ...]:
 
 def topics_of(node: str) -> tuple[tuple[Topic, ...], tuple[Topic, ...]]:
     """Return the topics of the graph that a node publishes, and those that it subscribes to."""
-    table = graph_topics([ANY_ARM])
+    table = graph_topics([ANY_ARM], clearance=True)
     published = tuple(topic for topic in table if node in publishers_of(topic))
     return published, tuple(topic for topic in table if node in subscribers_of(topic))
 
@@ -140,24 +103,3 @@ def qos_text(topic: Topic) -> str:
     profile = stored(profile_of(topic))
     history = "keep all" if profile.history is History.KEEP_ALL else f"keep last {profile.depth}"
     return ", ".join((profile.reliability.value, profile.durability.value, history)).replace("_", " ")
-
-
-def _value(value: object) -> str:
-    """Return a default as it is written on a command line."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, list):
-        return "[" + ", ".join(map(str, value)) + "]"
-    return "''" if value == "" else str(value)
-
-
-def _allowed(spec: ParameterSpec) -> str:
-    """Return the values allowed in words; '' if every value of the type is."""
-    if spec.choices:
-        return " | ".join(spec.choices)
-    bounds = []
-    if spec.minimum is not None:
-        bounds.append(f"at least {spec.minimum:.15g}")
-    if spec.maximum is not None:
-        bounds.append(f"at most {spec.maximum:.15g}")
-    return ", ".join(bounds)

@@ -2,8 +2,8 @@
 /* One run in the 3D view: its solids, frames and traces, placed at any time from the recorded poses. */
 
 const COLOURS = { // of arms in order, of the deputy, of edges; distinguishable by colour-blind viewers
-  light: { arms: [0x1c74b8, 0xd2601a, 0x8a5a9e, 0x4b8b3b], deputy: 0x0f9d6b, edge: 0x1d2530, start: 0x69788c },
-  dark: { arms: [0x58b4ff, 0xff9a4d, 0xc79be0, 0x93d07f], deputy: 0x2fe0a0, edge: 0x05080f, start: 0x8ea2bd },
+  light: { arms: [0x1c74b8, 0xd2601a, 0x8a5a9e, 0x4b8b3b], deputy: 0x0f9d6b, edge: 0x1d2530, start: 0x69788c, apart: 0x18202b, inside: 0xd00000 },
+  dark: { arms: [0x58b4ff, 0xff9a4d, 0xc79be0, 0x93d07f], deputy: 0x2fe0a0, edge: 0x05080f, start: 0x8ea2bd, apart: 0xe8edf4, inside: 0xff4a4a },
 };
 const GHOST_OPACITY = 0.3;
 const EDGE_ANGLE = 30; // degrees, smallest angle between two faces whose common edge is drawn
@@ -138,6 +138,58 @@ class Trace {
   }
 }
 
+/** The two bodies that are nearest to each other: a line between their nearest points, red where they are in each other. */
+class Nearest {
+  constructor(data, motion, group) {
+    this.motion = motion; // its instants are those of the distances
+    this.pairs = data.pairs;
+    this.pair = numbers(data.pair, Uint16Array);
+    this.distances = numbers(data.distances, Float32Array); // m
+    this.points = numbers(data.points, Float32Array); // m, per instant a point of the first and of the second body
+    this.middle = new THREE.Vector3();
+    this.colours = COLOURS.light;
+    const above = { depthTest: false, transparent: true }; // seen through the bodies it lies in
+    this.line = new THREE.Line2(new THREE.LineGeometry(), new THREE.LineMaterial({ linewidth: 3, ...above }));
+    this.line.frustumCulled = false;
+    this.ball = new THREE.MeshStandardMaterial({ color: 0x000000, ...above });
+    this.ends = [0, 1].map(() => new THREE.Mesh(new THREE.SphereGeometry(0.008, 16, 12), this.ball));
+    [this.line, ...this.ends].forEach((part) => { part.renderOrder = 1; group.add(part); });
+  }
+
+  /** Move to time t; between two instants the points go straight on if the pair is the same. */
+  place(t) {
+    const index = this.motion.index(t);
+    const { times } = this.motion;
+    const between = index + 1 < this.motion.count && t > times[index] && this.pair[index] === this.pair[index + 1];
+    const part = between ? (t - times[index]) / (times[index + 1] - times[index]) : 0;
+    const mixed = (values, width, place) => {
+      const value = values[index * width + place];
+      return part ? value + part * (values[(index + 1) * width + place] - value) : value;
+    };
+    const ends = [0, 1, 2, 3, 4, 5].map((place) => mixed(this.points, 6, place));
+    this.distance = mixed(this.distances, 1, 0);
+    this.known = !ends.some(Number.isNaN);
+    [this.line, ...this.ends].forEach((each) => { each.visible = this.known; });
+    if (!this.known) return;
+    this.name = this.pairs[this.pair[index]];
+    this.line.geometry.setPositions(ends);
+    this.ends.forEach((end, place) => end.position.fromArray(ends, 3 * place));
+    this.middle.addVectors(this.ends[0].position, this.ends[1].position).multiplyScalar(0.5);
+    this.paint(this.colours);
+  }
+
+  get colour() { return this.distance < 0 ? this.colours.inside : this.colours.apart; }
+
+  paint(colours) {
+    this.colours = colours;
+    this.line.material.color.set(this.colour);
+    this.ball.emissive.set(this.colour); // no shading: a mark, not a body
+  }
+
+  /** The signed distance in mm as text. */
+  get text() { return this.known ? `${(1000 * this.distance).toFixed(1).replace("-", "\u2212")} mm` : "\u2013"; }
+}
+
 /** Everything drawn of one run, as a group that moves with time. */
 class RunBody {
   constructor(data) {
@@ -148,7 +200,8 @@ class RunBody {
     this.traceGroup = new THREE.Group();
     this.targetGroup = new THREE.Group();
     this.startGroup = new THREE.Group();
-    this.group.add(this.traceGroup, this.targetGroup, this.startGroup);
+    this.nearestGroup = new THREE.Group();
+    this.group.add(this.traceGroup, this.targetGroup, this.startGroup, this.nearestGroup);
     this.painted = []; // { material, role, arm } to recolour when the theme changes
     this.bodies = this.motion.bodies.map(() => new THREE.Group());
     this.bodies.forEach((body) => this.group.add(body));
@@ -156,6 +209,7 @@ class RunBody {
     this.addDeputy(data.deputy_size);
     this.traces = data.arms.map((arm, index) => this.addArm(arm, index));
     this.basePath = new Trace(this.motion, 0, this.traceGroup);
+    this.nearest = data.clearance ? new Nearest(data.clearance, this.motion, this.nearestGroup) : null;
     this.drawStart();
   }
 
@@ -255,6 +309,7 @@ class RunBody {
     this.basePath.colour(colours.start);
     this.startLines.color.set(colours.start);
     this.startGroup.visible = !ghost;
+    this.nearest?.paint(colours);
     [...this.traces, this.basePath].forEach((trace) => {
       trace.past.material.linewidth = ghost ? TRACE_WIDTH * 0.6 : TRACE_WIDTH;
     });
@@ -275,6 +330,7 @@ class RunBody {
     });
     const index = this.motion.index(t);
     [...this.traces, this.basePath].forEach((trace) => trace.show(index));
+    this.nearest?.place(t);
   }
 
   /** The current position of a body, in m. */

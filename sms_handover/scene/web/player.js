@@ -55,7 +55,8 @@ class Player {
     this.arrangements.forEach(({ name }, index) => element("runs").add(new Option(name, index)));
     element("arrange").hidden = this.runs.length === 1;
     element("runs").addEventListener("change", (event) => this.arrange(Number(event.target.value)));
-    ["traces", "targets"].forEach((id) => element(id).addEventListener("change", () => this.showParts()));
+    element("nearest").parentElement.hidden = !this.runs.some((run) => run.nearest);
+    ["traces", "targets", "nearest"].forEach((id) => element(id).addEventListener("change", () => this.showParts()));
     document.addEventListener("keydown", (event) => {
       if (event.key === " " && !["BUTTON", "SELECT"].includes(event.target.tagName)) { event.preventDefault(); this.toggle(); }
     });
@@ -99,6 +100,7 @@ class Player {
     this.runs.forEach((run) => {
       run.traceGroup.visible = element("traces").checked;
       run.targetGroup.visible = element("targets").checked;
+      run.nearestGroup.visible = element("nearest").checked;
     });
     this.picture.ask();
   }
@@ -193,6 +195,10 @@ class Player {
       { colour: start, text: "Base moved by", values: runs.map((run) => mm(run.bodies[0].position, run.startGroup.position)) },
       { colour: start, text: "Base turned by", values: runs.map((run) => degrees(run.bodies[0].quaternion, run.startGroup.quaternion)) },
     );
+    if (runs.some((run) => run.nearest)) {
+      const colour = runs[0].nearest?.known ? runs[0].nearest.colour : start;
+      rows.push({ colour, text: "Least clearance", values: runs.map((run) => run.nearest?.text ?? "\u2013") });
+    }
     const table = document.createElement("table");
     if (runs.length > 1) {
       const head = table.createTHead().insertRow();
@@ -236,6 +242,7 @@ class Player {
     this.labels = this.tiles.flatMap(([run], place) => [
       ...run.data.arms.map((arm, index) => ({ run, place, body: `${arm}_gripper`, text: label(arm), colour: COLOURS.light.arms[index % 4] })),
       { run, place, body: "deputy", text: "Deputy", colour: 0x0b7a53, below: true },
+      ...(run.nearest ? [{ run, place, nearest: true, text: "", colour: 0 }] : []),
       ...(this.tiles.length > 1 ? [{ run, place, body: null, text: run.name, colour: 0x4a5666 }] : []),
     ]);
     element("labels").replaceChildren(...this.labels.map((item) => {
@@ -246,7 +253,8 @@ class Player {
   }
 
   placeLabels() {
-    this.labels.forEach(({ run, place, body, node, below }) => {
+    this.labels.forEach(({ run, place, body, node, below, nearest }) => {
+      if (nearest) { this.placeDistance(run, place, node); return; }
       if (body === null) { // the name of the run, at the foot of its tile
         const { width, height, right, down } = this.picture.tile();
         node.style.transform = `translate(${(right * place + width / 2).toFixed(1)}px, ${(down * place + height - 28).toFixed(1)}px)`;
@@ -257,6 +265,20 @@ class Player {
       node.hidden = !seen;
       if (seen) node.style.transform = `translate(${(seen.x + 14).toFixed(1)}px, ${(seen.y + (below ? 30 : -34)).toFixed(1)}px)`;
     });
+  }
+
+  /** The distance of the nearest bodies beside the line between them. */
+  placeDistance(run, place, node) {
+    const shown = run.nearest.known && element("nearest").checked;
+    const seen = shown ? this.picture.project(run.nearest.middle, place) : null;
+    node.hidden = !seen;
+    if (!seen) return;
+    node.textContent = `${run.nearest.name}: ${run.nearest.text}`;
+    const inside = run.nearest.distance < 0;
+    node.className = inside ? "distance inside" : "distance";
+    node.style.background = "";
+    const latest = this.picture.canvas.clientWidth - node.offsetWidth - 4; // px, so that the text is whole
+    node.style.transform = `translate(${Math.max(0, Math.min(seen.x + 12, latest)).toFixed(1)}px, ${(seen.y + 10).toFixed(1)}px)`;
   }
 }
 

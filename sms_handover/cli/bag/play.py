@@ -1,19 +1,23 @@
-"""``sms-handover play``: publish the messages of a bag."""
+"""``sms-handover bag play``: publish the messages of a bag, with the options of ``ros2 bag play``."""
 
 import re
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from dataclasses import fields
 from pathlib import Path
 
-from sms_handover.cli.node_options import add_graph_options, add_topic_options, given, run_in_process
+from sms_handover.cli.node_options import (
+    add_graph_options,
+    add_storage_option,
+    add_topic_options,
+    given,
+    run_in_process,
+)
 from sms_handover.errors import ConfigurationError
-from sms_handover.launcher.closed_loop import closed_loop
 from sms_handover.launcher.run_folder import bag_of
 from sms_handover.nodes.player import KEYS
 from sms_handover.nodes.player import main as run_player
 from sms_handover.playback.parameters import PlayerParameters
 
-_OF_CLOSED_LOOP = {"bag", "closed_loop", "domain_id"}
 _CLOCK_HZ = 40.0  # [Hz] default of --clock, as of ros2 bag play
 _WAIT_S = 60.0  # [s] of wall time, default of --wait
 
@@ -30,11 +34,11 @@ def add_parser(parser: ArgumentParser) -> None:
     parser.epilog = (
         "services of the node /player: pause resume toggle_paused play_next stop set_rate seek\n"
         "exit codes: 0 complete; 1 damaged bag, or no subscriber in time; 2 wrong input, nothing played;\n"
-        "3 messages were not acknowledged or not played; 130 interrupted. With --closed-loop: 0\n"
-        "bit-identical; 1 the states differ, or the plant exited"
+        "3 messages were not acknowledged or not played; 130 interrupted"
     )
     parser.set_defaults(loop=None, start_paused=None, keyboard=None)  # not given: as the parameter files say
     parser.add_argument("bag", type=Path, metavar="BAG", help="bag folder, .mcap file or run folder")
+    add_storage_option(parser)
     group = parser.add_argument_group("time")
     group.add_argument("-r", "--rate", type=float, metavar="R", help="bag time per wall time (default: 1)")
     group.add_argument("--start-offset", type=float, metavar="S", help="skip S s at the start")
@@ -84,12 +88,6 @@ def add_parser(parser: ArgumentParser) -> None:
         help="messages held in memory (default: 1000)",
     )
     parser.add_argument(
-        "--closed-loop",
-        action="store_true",
-        help="for a run of sms-handover: feed the recorded commands and phases to a live plant in lock step "
-        "and compare its states with the recorded ones",
-    )
-    parser.add_argument(
         "--disable-keyboard-controls", action="store_false", dest="keyboard", help="read no keys"
     )
     add_graph_options(parser)
@@ -98,11 +96,6 @@ def add_parser(parser: ArgumentParser) -> None:
 def command(options: Namespace) -> int:
     """Run the command; return the exit code."""
     options.bag = bag_of(options.bag)
-    if options.closed_loop:
-        of_player = given(options, vars(options)).keys() - _OF_CLOSED_LOOP
-        if of_player:
-            raise ConfigurationError(f"--closed-loop takes no other option, but {min(of_player)} is given")
-        return closed_loop(options.bag, options.domain_id)
     for rule in options.remap:
         if rule.count(":=") != 1 or not all(rule.split(":=")):
             raise ConfigurationError(f"remapping {rule!r} is not of the form OLD:=NEW")
