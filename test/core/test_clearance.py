@@ -289,7 +289,7 @@ clearance:
 )
 def test_what_a_robot_file_may_not_say_of_clearance(path: str, value: object, words: str) -> None:
     with pytest.raises(RobotDescriptionError, match=words) as told:
-        load_scenario(values={f"robot.clearance.{path}": value})
+        load_scenario("colliding", {f"robot.clearance.{path}": value})
     assert "\n" not in str(told.value)
 
 

@@ -99,7 +99,7 @@ def test_what_can_be_run_is_told_with_where_each_phase_ends(
     file: str | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A name or a file of any kind: its keys say what it is."""
-    assert main(["check", str(config_file(file)) if file else "paper"]) == 0
+    assert main(["check", str(config_file(file)) if file else "paper", "-p", "common.scenario:=paper"]) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert lines[0] == ["phase", "ends", "[s]", "base", "rotation", "[deg]", "IK", "restarts"]
     assert [line[:2] for line in lines[1:4]] == [["approach", "20"], ["carry", "40"], ["withdraw", "60"]]

@@ -22,7 +22,7 @@ def parameters(node: str, **values: object) -> str:
 
 def files() -> dict[str, str]:
     """Return the texts of the files that the cases use, by name."""
-    shipped = config_file("handover.yaml").read_text(encoding="utf-8")
+    shipped = config_file("schedules/colliding.yaml").read_text(encoding="utf-8")
     target = yaml.safe_load(shipped)["phases"][1]["arms"]["arm_a"]["tool_in_world"]["xyz"]
     far = [target[0] + 1.0, *target[1:]]
     return {

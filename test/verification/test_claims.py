@@ -20,7 +20,7 @@ _COMMAND = (
 @cache
 def handover(law: str) -> RunData:
     """Return the whole shipped handover under a law, simulated once per session."""
-    return simulate(load_scenario(values={"controller": {"law": law}}))
+    return simulate(load_scenario("colliding", {"controller": {"law": law}}))
 
 
 @pytest.fixture(scope="module")
