@@ -66,8 +66,9 @@ def command(options: Namespace) -> int:
     elif file and kind is _Kind.PARAMETERS:
         options.params_file = [*options.params_file, file]
     scenario = scenario_of(options, recorded=True)
-    print(_ends(scenario, check_scenario(scenario)))
+    predictions = check_scenario(scenario)
     check_collisions(scenario, options)
+    print(_ends(scenario, predictions))
     print(f"\n{_of_whom(scenario, kind, name)} can be run")
     return 0
 

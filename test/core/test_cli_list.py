@@ -67,7 +67,7 @@ def test_every_path_can_be_set_to_the_value_that_is_listed(capsys: pytest.Captur
     again = load_scenario("paper", values)
     assert again.truth.robot.urdf == paper.truth.robot.urdf
     assert again.parameters.ik == paper.parameters.ik
-    assert main(["list", "paths"]) == 0
+    assert main(["list", "paths", "paper"]) == 0
     assert len(capsys.readouterr().out.splitlines()) == len(rows) + 1
     assert main(["list", "laws", "paper"]) == 2
 
@@ -136,6 +136,7 @@ def test_a_robot_is_checked_alone(capsys: pytest.CaptureFixture[str]) -> None:
         (["papr"], "unknown scenario 'papr' (did you mean 'paper'?)"),
         (["folder"], "'sms-handover bag check folder' checks a recording"),
         (["paper", "-p", "schedule.phases.carry.duration:=-1"], "must be"),
+        (["colliding", "--duration", "2", "--reject-collisions"], "bodies collide from 1.80 s on"),
         (["robot.yaml"], "robot.yaml:1: "),
         (["robot.yaml", "-p", "plant.integrator:=euler"], "is a robot, checked alone"),
         (["parameters.yaml"], "parameters.yaml:1: parameter 'integrator'"),
