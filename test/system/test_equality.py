@@ -147,7 +147,7 @@ def test_every_node_has_the_robot_that_is_its(
     assert (found.truth.robot.urdf, found.model.robot.urdf) == (same.truth.robot.urdf, same.model.robot.urdf)
     assert found.truth.robot.mass - found.model.robot.mass == pytest.approx(24.0 - (0.7 - 0.6451))
     scenario.unlink()  # the bag alone says what it was made with
-    assert sms_handover("reproduce", bag, cwd=tmp_path).code == 0
+    assert sms_handover("verify", bag, cwd=tmp_path).code == 0
 
 
 def test_the_laws_differ(simulated: dict[str, RunData]) -> None:
