@@ -92,7 +92,7 @@ def test_a_collision_ends_the_run_in_the_same_tick(schedule: Path, tmp_path: Pat
     The gripper that has let go is more than 1 mm in the deputy at 0.86 s.
     """
     abort = ("-p", "common.on_collision:=abort", "-p", "trajectory.failure_hold:=0.05")
-    arguments = ("run", "--compose", "--schedule", schedule, *abort, "-o", "out")
+    arguments = ("run", "--compose", "--time-law", "step", "--schedule", schedule, *abort, "-o", "out")
     ended = sms_handover(*arguments, cwd=tmp_path, dry_run=True)
     assert "warning: in a dry run bodies collide from 0.86 s on, at worst arm_a_gripper" in ended.err
     assert ended.code == 1 and "phase 'withdraw' has failed at 0.93 s" in ended.out, ended
@@ -100,7 +100,9 @@ def test_a_collision_ends_the_run_in_the_same_tick(schedule: Path, tmp_path: Pat
     bag = tmp_path / "out" / "bag"
     assert sms_handover("bag", "check", bag, cwd=tmp_path).code == 0
     common = {"schedule": str(schedule), "on_collision": "abort"}
-    scenario = load_scenario(values={"common": common, "trajectory": {"failure_hold": 0.05}})
+    scenario = load_scenario(
+        values={"common": common, "trajectory": {"failure_hold": 0.05, "time_law": "step"}}
+    )
     assert_same_bits(read_run(bag), simulate(scenario))
     assert measured_in(bag) == measured_by(scenario)
 
