@@ -134,7 +134,7 @@ geometries, each of which is possible, none of which was chosen for what the cla
 ## Which geometries
 
 Drawn at random (`docs/geometry_candidates.py`): the deputy 1.0 to 1.2 m in front of the spacecraft's centre,
-on A's side, its long edge within 30 degrees of level or upright; where the arms meet; where B takes the deputy,
+on A's side, its long edge within 30 degrees of level or upright; where the arms meet; where B takes it,
 always away from A's gripper; how the tools are turned in the grasp frames; the joints of both arms at the
 start. The arms come along the face of the deputy, by a sweep about their joints 1: the paper's targets jump,
 PID overshoots them by tenths of a metre, and an arm that came straight at the deputy would go through it.
