@@ -14,7 +14,8 @@ from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
 _WHEN = [
     (
         "before",
-        "`run` simulates the run in one process with the law, dynamics and model of the scenario: seconds. "
+        "`check` and `run` simulate the run in one process with the law, dynamics and model of the "
+        "scenario: seconds. "
         "`--no-dry-run` leaves it out; a controller of your own has none",
         "a warning with bodies, time and depth; with `--reject-collisions` exit code 2, nothing is started",
     ),
@@ -97,7 +98,8 @@ checked begin at configurations without overlaps; about a third of random ones h
 ## Least distances in the shipped scenarios
 
 Signed distance in mm and when it was; **bold** is a collision: less than zero, or less than -1 mm where
-contact of gripper and deputy is declared: "contact". The columns are [scenario](scenarios.md) and control law.
+contact of gripper and deputy is declared: "contact". The columns are [scenario](scenarios.md) and control
+law.
 
 {table(["Bodies", *runs], distances)}
 

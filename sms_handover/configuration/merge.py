@@ -17,8 +17,8 @@ def merged(base: Mapping, changes: Mapping, file: Path, *, complete: bool = True
 
     Mappings merge by key and lists of named things by name, also where the changes are a mapping from name
     to change; ``null`` removes; anything else replaces what was there. Unless the base is ``complete``, as
-    where it is itself a change, ``null`` stays. Raises ConfigurationError on a change of a named thing that is
-    no mapping, and UnknownNameError where there is nothing to remove. Neither of the two is changed.
+    where it is itself a change, ``null`` stays. Neither of the two is changed. Raises ConfigurationError on a
+    change of a named thing that is no mapping, and UnknownNameError where there is nothing to remove.
     """
     result, file = copy(base), changes.file or file
     result.origins = dict(base.origins)
