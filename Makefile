@@ -27,8 +27,8 @@ help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 
 handover: install  ## hand the deputy over under NMPC, then PID, over DDS in lock step; record both; compare
-	$(BIN)/sms-handover run --controller nmpc --output $(RUNS)/nmpc --overwrite
-	$(BIN)/sms-handover run --controller pid --output $(RUNS)/pid --overwrite
+	$(BIN)/sms-handover run paper --controller nmpc --output $(RUNS)/nmpc --overwrite
+	$(BIN)/sms-handover run paper --controller pid --output $(RUNS)/pid --overwrite
 	$(BIN)/sms-handover compare $(RUNS)/nmpc $(RUNS)/pid
 
 figures: install  ## draw the paper's figures from the runs of `make handover`

@@ -24,7 +24,7 @@ BUDGET_US = 120.0  # us, the median over the configurations
 
 def main() -> None:
     """Measure and publish."""
-    scenario = load_scenario()
+    scenario = load_scenario("paper")
     robot, schedule = scenario.truth.robot, scenario.truth.schedule
     poses, loop = list[Array](), Loop(scenario)
     while len(poses) < COUNT:

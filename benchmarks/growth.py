@@ -96,7 +96,7 @@ def ticks_table() -> Table:
     """Return the cost of a second of the handover for ticks from 4 to 0.25 ms."""
     common = {"duration": SIMULATED_S}
     scenarios = {
-        f"{1e3 * tick:g}": load_scenario(values={"common": {**common, "tick": tick}}) for tick in TICK_S
+        f"{1e3 * tick:g}": load_scenario("paper", {"common": {**common, "tick": tick}}) for tick in TICK_S
     }
     runs = {name: partial(simulate, scenario) for name, scenario in scenarios.items()}
     times = interleaved(runs, ROUNDS // 5)

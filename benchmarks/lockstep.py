@@ -48,7 +48,7 @@ def bare(role: str) -> float:
 
 def alone(dynamics: str) -> float:
     """Return the time in s of a tick in one process."""
-    scenario = load_scenario(values={"common": {"duration": SIMULATED_S, "dynamics": dynamics}})
+    scenario = load_scenario("paper", {"common": {"duration": SIMULATED_S, "dynamics": dynamics}})
     start = perf_counter()
     simulate(scenario)
     return (perf_counter() - start) / TICKS

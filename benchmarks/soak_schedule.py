@@ -17,7 +17,9 @@ _TO = {"arm_a": ("arm_b", "end_a", 1.0), "arm_b": ("arm_a", "end_b", -1.0)}  # f
 
 def long_schedule(end_s: float) -> str:
     """Return the text of a schedule of at least so many seconds, with two handovers a minute."""
-    schedule: dict[str, Any] = yaml.safe_load(config_file("handover.yaml").read_text(encoding="utf-8"))
+    schedule: dict[str, Any] = yaml.safe_load(
+        config_file("schedules/colliding.yaml").read_text(encoding="utf-8")
+    )
     phases, start_s, number = schedule["phases"], _SHIPPED_S, 0
     while start_s < end_s:
         taker = ("arm_a", "arm_b")[number % 2]

@@ -28,8 +28,9 @@ from sms_handover.units import MM_PER_M
 ROOT = Path(__file__).resolve().parent.parent
 PAGE, FIGURE = ROOT / "docs" / "geometries.md", ROOT / "docs" / "images" / "geometries.svg"
 FOLDER = ROOT / "build" / "geometries"
-SEED, COUNT = 16, 100
+SEED, COUNT = 16, 60
 _Z = 1.959963984540054  # [-] the normal deviate of a two-sided 95 % interval
+_FEW = 30  # [-] geometries below which the page says that there are few
 _MOST_CAUSES = 8  # [-] rows of the table of failures
 
 
@@ -118,11 +119,13 @@ def page(rows: Sequence[Row], seed: int) -> str:
         )
     ]
     low_peak, high_peak = PEAK_TORQUE
+    few = "" if number >= _FEW else f" {number} are too few to conclude anything from: mind the intervals."
     return f"""\
 # Geometries
 
-This page is written by `make geometries`, that is `python -m docs.geometries --seed {seed} --count {number}`.
-It goes on where it was stopped.
+This page is written by `make geometries` ({COUNT} of them), this time by
+`python -m docs.geometries --seed {seed} --count {number}`.
+It goes on where it was stopped.{few}
 
 The paper gives no pose: not where the deputy floats, not how the arms begin, not where they meet. Its claims
 are judged on one geometry of ours, the scenario `paper`. This page asks how far they carry: {number} random
@@ -131,7 +134,7 @@ geometries, each of which is possible, none of which was chosen for what the cla
 ## Which geometries
 
 Drawn at random (`docs/geometry_candidates.py`): the deputy 1.0 to 1.2 m in front of the spacecraft's centre,
-on A's side, its long edge level or rolled by up to 30 degrees; where the arms meet; where B takes the deputy,
+on A's side, its long edge within 30 degrees of level or upright; where the arms meet; where B takes it,
 always away from A's gripper; how the tools are turned in the grasp frames; the joints of both arms at the
 start. The arms come along the face of the deputy, by a sweep about their joints 1: the paper's targets jump,
 PID overshoots them by tenths of a metre, and an arm that came straight at the deputy would go through it.
@@ -166,7 +169,7 @@ All six hold in {all_hold} of {number}, {_percent(all_hold / number)} ({_percent
   NMPC settles anything under T_r = 2 s; it rings where a joint moves much inertia, as in wide sweeps of a
   whole arm.
 
-So what holds in every geometry is a property of the laws; what holds in some says as much about the pose,
+These are reasons, not measurements. A claim that holds in some geometries only says as much about the pose,
 which the paper does not give. The distribution is ours too: other limits of the draws give other shares.
 """
 

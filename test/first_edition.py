@@ -44,7 +44,7 @@ class Stored:
 
 def run_of(law: str) -> RunData:
     """Return the shipped handover under a law, over its whole schedule, with Pinocchio's dynamics."""
-    return simulate(load_scenario(values={"controller": {"law": law}}))
+    return simulate(load_scenario("colliding", {"controller": {"law": law}}))
 
 
 def digests_of(run: RunData) -> dict[str, str]:

@@ -16,7 +16,7 @@ from my_controller.task_space_pd import TaskSpaceGains
 
 from sms_handover.cli import bag
 from sms_handover.cli.verbs import BAG, VERBS, call_of
-from sms_handover.configuration.scenario_file import COMMON
+from sms_handover.configuration.scenario_file import COMMON, SHORT
 from sms_handover.configuration.values import DOCUMENTS as DOCUMENTS_WITH_VALUES
 from sms_handover.configuration.values import ROLES
 from sms_handover.control.parameters import parameters_with
@@ -100,7 +100,8 @@ def check_ours(words: list[str]) -> None:
     parser, arguments = called(words)
     options = parser.parse_args(arguments)
     for text in getattr(options, "param", []):
-        node, _, name = text.partition(":=")[0].partition(".")
+        path = text.partition(":=")[0]
+        node, _, name = (SHORT[path], "", path) if path in SHORT else path.partition(".")
         if node in (*DOCUMENTS_WITH_VALUES, *ROLES):
             load_scenario(values={COMMON: {"values": [text]}})
             continue

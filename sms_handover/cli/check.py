@@ -6,6 +6,7 @@ from enum import Enum
 from math import degrees
 from pathlib import Path
 
+from sms_handover.cli.collisions import add_dry_run_options, check_collisions
 from sms_handover.cli.columns import columns
 from sms_handover.cli.options import add_scenario_options, scenario_of
 from sms_handover.configuration.sections import Section
@@ -33,18 +34,20 @@ def add_parser(parser: ArgumentParser) -> None:
     """Describe the command."""
     parser.formatter_class = RawDescriptionHelpFormatter
     parser.description = (
-        "Check whether a scenario can be run, without running it: every value, every target in reach,\n"
-        "every grasp at its frame, the sampled loop stable where each phase ends. SCENARIO may also be a\n"
-        "file with a schedule or with parameters, checked in the default scenario, or with a robot."
+        "Check whether a scenario can be run: every value, every target in reach, every grasp at its frame,\n"
+        "the sampled loop stable where each phase ends; then by a dry run whether bodies collide. SCENARIO\n"
+        "may also be a file with a schedule or with parameters, checked in the default scenario, or with a\n"
+        "robot."
     )
     parser.epilog = (
         "Where the targets of a phase were found only after restarts, the run may end elsewhere.\n\n"
         "examples:\n"
         "  sms-handover check paper -p robot.base.mass:=120\n"
         "  sms-handover check mine.yaml\n\n"
-        "exit codes: 0 it can be run; 2 it cannot, and one line says why"
+        "exit codes: 0 it can be run; 2 it cannot, or bodies collide and that is to be rejected"
     )
     add_scenario_options(parser)
+    add_dry_run_options(parser)
 
 
 def command(options: Namespace) -> int:
@@ -63,7 +66,9 @@ def command(options: Namespace) -> int:
     elif file and kind is _Kind.PARAMETERS:
         options.params_file = [*options.params_file, file]
     scenario = scenario_of(options, recorded=True)
-    print(_ends(scenario, check_scenario(scenario)))
+    predictions = check_scenario(scenario)
+    check_collisions(scenario, options)
+    print(_ends(scenario, predictions))
     print(f"\n{_of_whom(scenario, kind, name)} can be run")
     return 0
 

@@ -21,7 +21,7 @@ def add_dry_run_options(parser: ArgumentParser) -> None:
     choice.add_argument(
         "--reject-collisions",
         action="store_true",
-        help="start nothing if bodies collide in the dry run (default: warn of it)",
+        help="exit code 2, and nothing is started, if bodies collide in the dry run (default: warn of it)",
     )
     choice.add_argument(
         "--no-dry-run",

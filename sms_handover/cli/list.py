@@ -3,6 +3,7 @@
 import json
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -10,19 +11,28 @@ from sms_handover.analysis.definitions import DEFINITIONS
 from sms_handover.analysis.records import UNITS
 from sms_handover.cli.columns import columns
 from sms_handover.cli.verbs import PROGRAM
-from sms_handover.configuration.scenario_file import load_scenario_file, scenario_names
+from sms_handover.configuration.documents import Replacements, documents_of
+from sms_handover.configuration.scenario_file import COMMON, load_scenario_file, scenario_names
+from sms_handover.configuration.value_paths import parameter_paths, value_paths
+from sms_handover.configuration.values import MODEL, ROBOT, SCHEDULE
 from sms_handover.control.registry import law_named, law_names, package_of
 from sms_handover.errors import ConfigurationError
+from sms_handover.graph.topics import LOOP_NODES
+from sms_handover.simulation.scenario import load_scenario
 
-Row = dict[str, str]
+Row = dict[str, object]
 
 
 class Kind(NamedTuple):
-    """One kind of things, the columns of their table, and how they are found."""
+    """One kind of things, the columns of their table, and how they are found.
+
+    The rows may be those of a scenario, by default the one that ``run`` takes.
+    """
 
     text: str
     head: Sequence[str]
-    rows: Callable[[], list[Row]]
+    rows: Callable[[str], list[Row]]
+    of_scenario: bool = False
 
 
 def add_parser(parser: ArgumentParser) -> None:
@@ -37,35 +47,48 @@ def add_parser(parser: ArgumentParser) -> None:
         metavar="KIND",
         help=f"{kinds} (default: {' and '.join(_DEFAULT)})",
     )
+    parser.add_argument(
+        "scenario", nargs="?", metavar="SCENARIO", help="whose paths, a name or a file (default: that of run)"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
 def command(options: Namespace) -> int:
     """Run the command; return the exit code."""
     chosen = (options.kind,) if options.kind else _DEFAULT
-    found = {name: KINDS[name].rows() for name in chosen}
+    if options.scenario and not KINDS[options.kind].of_scenario:
+        raise ConfigurationError(f"{options.kind} are not those of a scenario: give none")
+    found = {name: KINDS[name].rows(options.scenario or "") for name in chosen}
     if options.json:
         print(json.dumps(found[options.kind] if options.kind else found, indent=2))
         return 0
     print("\n\n".join(_table(KINDS[name].head, rows) for name, rows in found.items()))
     if not options.kind:
-        others = [name for name in KINDS if name not in found]
-        print(f"\nThere are also {' and '.join(others)}: '{PROGRAM} list {others[0]}'.")
+        others = [f"'{PROGRAM} list {name}'" for name in KINDS if name not in found]
+        print(f"\nThere are also {' and '.join(others)}.")
     return 0
 
 
 def _table(head: Sequence[str], rows: Sequence[Row]) -> str:
     """Return things as text."""
-    return columns([head, *([row[column] for column in head] for row in rows)])
+    return columns([head, *([_text(row[column]) for column in head] for row in rows)])
 
 
-def _scenarios() -> list[Row]:
-    return [
-        {"scenario": name, "description": load_scenario_file(name).description} for name in scenario_names()
-    ]
+def _text(value: object) -> str:
+    """Return a cell; what is not given is empty."""
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return str([*value] if isinstance(value, tuple) else value)
 
 
-def _laws() -> list[Row]:
+def _scenarios(_: str) -> list[Row]:
+    names = scenario_names()
+    return [{"scenario": name, "description": load_scenario_file(name).description} for name in names]
+
+
+def _laws(_: str) -> list[Row]:
     return [_law(name) for name in law_names()]
 
 
@@ -79,8 +102,19 @@ def _law(name: str) -> Row:
     return {"law": name, "package": package_of(name), "needs": needs, "description": law.description}
 
 
-def _metrics() -> list[Row]:
+def _metrics(_: str) -> list[Row]:
     return [{"metric": name, "unit": unit, "definition": DEFINITIONS[name]} for name, unit in UNITS.items()]
+
+
+def _paths(scenario: str) -> list[Row]:
+    """Return every value of robot, deputy, schedule and parameters, as a scenario has it."""
+    parameters = load_scenario(scenario).parameters
+    documents = documents_of(load_scenario_file(parameters.common.scenario), Replacements(), MODEL)
+    found = [*value_paths(ROBOT, documents.robot), *value_paths(SCHEDULE, documents.schedule)]
+    for node in (COMMON, *LOOP_NODES):
+        group = getattr(parameters, node)
+        found += parameter_paths(node, type(group), asdict(group))
+    return [asdict(path) for path in found]
 
 
 KINDS: Mapping[str, Kind] = MappingProxyType(
@@ -88,6 +122,12 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         "scenarios": Kind("what can be run", ("scenario", "description"), _scenarios),
         "laws": Kind("control laws and what they need", ("law", "package", "needs", "description"), _laws),
         "metrics": Kind("figures of 'compare --csv'", ("metric", "unit", "definition"), _metrics),
+        "paths": Kind(
+            "what '-p PATH:=VALUE' and scenario files can set",
+            ("path", "value", "unit", "allowed", "description"),
+            _paths,
+            of_scenario=True,
+        ),
     }
 )
 _DEFAULT = ("scenarios", "laws")

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from sms_handover.cli.columns import columns
 from sms_handover.configuration.package_files import config_file
-from sms_handover.configuration.parameter_rows import rows_of
 from sms_handover.configuration.parameters import defaults_of, read_parameter_files
 from sms_handover.configuration.scenario_file import scenario_names
+from sms_handover.configuration.value_paths import parameter_paths
 from sms_handover.control.registry import SHIPPED, law_named, law_names, package_of
 from sms_handover.errors import UnknownNameError
 from sms_handover.graph.topics import CONTROLLER
@@ -47,7 +47,6 @@ def _law(name: str) -> Iterator[str]:
     needs = ", ".join(sorted(need.value for need in law.needs)) or "states, phases and joint references"
     yield from (f"{name}: {law.description}", f"package: {package_of(name)}", f"needs: {needs}", "")
     shipped = read_parameter_files([config_file("controller.yaml")], CONTROLLER) if name in SHIPPED else {}
-    rows = rows_of(law.parameters, {**defaults_of(law.parameters), **shipped})
-    cells = [(row.name, row.unit, row.default, row.allowed, row.description) for row in rows]
-    yield columns([_HEAD, *cells])
-    yield f"\nTo set one: -p {CONTROLLER}.{rows[0].name}:={rows[0].default}" if rows else ""
+    found = parameter_paths(CONTROLLER, law.parameters, {**defaults_of(law.parameters), **shipped})
+    yield columns([_HEAD, *((p.path, p.unit, str(p.value), p.allowed, p.description) for p in found)])
+    yield f"\nTo set one: -p {found[0].path}:={found[0].value}" if found else ""

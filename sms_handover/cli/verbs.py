@@ -15,9 +15,9 @@ BAG = "bag"  # the verb that has verbs of its own
 GROUPS: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
         "choose": {
-            "list": "list what has a name: scenarios, control laws, metrics",
+            "list": "list what has a name: scenarios, control laws, metrics, paths of values",
             "show": "print a scenario in full, to copy from, or the parameters of a law",
-            "check": "check whether a scenario can be run, without running it",
+            "check": "check whether a scenario can be run, and where each phase ends",
         },
         "run": {
             "run": "run the handover as a graph of ROS 2 nodes and record it",

@@ -7,32 +7,33 @@ from reprlib import repr as shortened
 from typing import Any
 
 from sms_handover.configuration.yaml_reader import Mapping
-from sms_handover.errors import ConfigurationError
+from sms_handover.errors import ConfigurationError, UnknownNameError
 
 _NAME = "name"
 
 
-def merged(base: Mapping, changes: Mapping, file: Path) -> Mapping:
+def merged(base: Mapping, changes: Mapping, file: Path, *, complete: bool = True) -> Mapping:
     """Return ``base`` with the changes of a mapping that stands in ``file``.
 
     Mappings merge by key and lists of named things by name, also where the changes are a mapping from name
-    to change; ``null`` removes; anything else replaces what was there. Raises ConfigurationError on a change
-    of a named thing that is no mapping. Neither of the two is changed.
+    to change; ``null`` removes; anything else replaces what was there. Unless the base is ``complete``, as
+    where it is itself a change, ``null`` stays. Neither of the two is changed. Raises ConfigurationError on a
+    change of a named thing that is no mapping, and UnknownNameError where there is nothing to remove.
     """
     result, file = copy(base), changes.file or file
     result.origins = dict(base.origins)
     for key, change in changes.items():
         old = base.get(key)
-        if change is None:
-            result.pop(key, None)
+        place = changes.origins.get(key) or f"{file}:{changes.lines.get(key, changes.line)}"
+        if change is None and complete:
+            _remove(result, key, "key", place)
         elif isinstance(old, Mapping) and isinstance(change, Mapping):
-            result[key] = merged(old, change, file)
+            result[key] = merged(old, change, file, complete=complete)
         elif old and _is_named(old) and (isinstance(change, Mapping) or _is_named(change)):
             result[key] = _merged_by_name(old, change, file)
         else:
             result[key] = standing_in(change, file)
-            place = f"{file}:{changes.lines.get(key, changes.line)}"
-            result.origins[key] = changes.origins.get(key) or place
+            result.origins[key] = place
     return result
 
 
@@ -52,7 +53,7 @@ def _merged_by_name(items: list[Mapping], changes: Any, file: Path) -> list[Mapp
     result = {item[_NAME]: item for item in items}
     for name, change in _by_name(changes, file):
         if change is None:
-            result.pop(name, None)
+            _remove(result, name, "name", f"{file}:{changes.lines.get(name, changes.line)}")
         elif name in result:
             result[name] = merged(result[name], change, file)
         else:
@@ -60,6 +61,13 @@ def _merged_by_name(items: list[Mapping], changes: Any, file: Path) -> list[Mapp
             result[name] = copy(result[name])
             result[name].setdefault(_NAME, name)
     return list(result.values())
+
+
+def _remove(result: dict[Any, Any], key: Any, what: str, place: str) -> None:
+    """Remove what ``null`` says is to go; raises UnknownNameError if it is not there."""
+    if key not in result:
+        raise UnknownNameError(what, str(key), map(str, result), f"{place}: null")
+    del result[key]
 
 
 def _by_name(changes: Any, file: Path) -> Iterator[tuple[Any, Mapping | None]]:

@@ -155,7 +155,7 @@ def _changes(root: Section, role: str, base: Mapping | None, path: Path) -> Mapp
     result = copy(changes)
     for key, value in own.items():
         old = changes.get(key)
-        result[key] = merged(old, value, path) if old else standing_in(value, path)
+        result[key] = merged(old, value, path, complete=False) if old else standing_in(value, path)
     return result
 
 

@@ -1,7 +1,7 @@
 """Plant node: the simulated robot and deputy, and the clock of the loop."""
 
 import gc
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from time import monotonic
 from typing import Any
@@ -12,7 +12,6 @@ from sms_handover_interfaces.msg import RunState
 from std_msgs.msg import String
 
 from sms_handover.errors import MessageError, Reason
-from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import (
     DEPUTY_MARKER,
     GRASP_EVENT,
@@ -218,14 +217,9 @@ class PlantNode(GraphNode[PlantParameters]):
         self._loop_clock.published()
         self._outputs.publish_rest(self._plant, with_reference=with_reference)
         if excesses := self._plant.take_excesses():
-            self._publish_excesses(excesses)
+            self.events.publish_all(excesses)
         if with_reference:
             self._clearance.state_published(self._plant)
-
-    def _publish_excesses(self, excesses: Iterable[RunEvent]) -> None:
-        """Publish limits of joints that have been exceeded."""
-        for event in excesses:
-            self.events.publish(event)
 
     def _resend(self) -> None:
         """Publish the state of this tick again if nothing has answered it for a while (lock step).
@@ -345,7 +339,7 @@ class PlantNode(GraphNode[PlantParameters]):
     def restart(self) -> None:
         """End this run and wait for the next one at time zero."""
         if not self.finished:
-            self._publish_excesses(self._plant.end_excesses())
+            self.events.publish_all(self._plant.end_excesses())
         self.enter(RunState.WAITING, "reset")
         if not self.finished:
             self.membership.end()
@@ -370,7 +364,7 @@ class PlantNode(GraphNode[PlantParameters]):
         """End the run and publish what real time has cost; every node then publishes its counts."""
         if not self.lockstep and self._loop_clock.misses:
             detail = f"{detail}; {self._loop_clock.misses}"
-        self._publish_excesses(self._plant.end_excesses())
+        self.events.publish_all(self._plant.end_excesses())
         self.membership.finished = True
         self.enter(state, detail)
         self.membership.end()

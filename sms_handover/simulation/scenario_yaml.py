@@ -5,7 +5,7 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from sms_handover.configuration.documents import as_yaml
-from sms_handover.configuration.parameter_rows import rows_of
+from sms_handover.configuration.parameters import specs_of
 from sms_handover.configuration.scenario_file import COMMON, SHORT, load_scenario_file
 from sms_handover.configuration.values import roles_of
 from sms_handover.graph.topics import CONTROLLER, IK, PLANT, TRAJECTORY
@@ -49,10 +49,10 @@ def scenario_yaml(name: str) -> str:
 def _lines(parameters: Any, apart: Iterable[str]) -> Iterator[str]:
     """Yield a line for each parameter of a section, with its unit, its range and what it means."""
     values = asdict(parameters)
-    for row in rows_of(type(parameters), values):
-        if row.name not in apart:
-            meaning = "; ".join(filter(None, (row.unit, row.allowed, row.description)))
-            yield f"  {row.name}: {_written(values[row.name])}  # {meaning}"
+    for name, spec in specs_of(type(parameters)).items():
+        if name not in apart:
+            meaning = "; ".join(filter(None, (spec.unit.replace("-", ""), spec.allowed, spec.description)))
+            yield f"  {name}: {_written(values[name])}  # {meaning}"
 
 
 def _written(value: object) -> str:

@@ -33,7 +33,9 @@ def scenes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Scene]:
     schedule.write_text(short_handover(stretch=3.0), encoding="utf-8")
     made = {}
     for law in ("nmpc", "pid"):
-        scenario = load_scenario(values={"common": {"schedule": str(schedule)}, "controller": {"law": law}})
+        scenario = load_scenario(
+            "colliding", {"common": {"schedule": str(schedule)}, "controller": {"law": law}}
+        )
         run, truth = simulate(scenario), scenario.truth
         series = run_clearance(run, TaskTexts(truth.robot.urdf, truth.schedule.text)).series
         assert series is not None

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.browser
 def scenario(tmp_path_factory: pytest.TempPathFactory) -> Scenario:
     schedule = tmp_path_factory.mktemp("schedule") / "short.yaml"
     schedule.write_text(short_handover(stretch=3.0), encoding="utf-8")
-    return load_scenario(values={"common": {"schedule": str(schedule)}})
+    return load_scenario("colliding", {"common": {"schedule": str(schedule)}})
 
 
 @pytest.fixture(scope="module")

@@ -124,7 +124,7 @@ def draw(robot: RobotModel) -> Draw:
 @pytest.fixture(scope="session")
 def scenario() -> Scenario:
     """The shipped scenario."""
-    return load_scenario()
+    return load_scenario("colliding")
 
 
 # One handover in small: every kind of target and event, with poses of its own. All targets are in reach
@@ -195,7 +195,7 @@ def make_scenario(tmp_path: Path) -> MakeScenario:
         path = tmp_path / "schedule.yaml"
         path.write_text(text, encoding="utf-8")
         common = {"schedule": str(path), **overrides.pop("common", {})}
-        return load_scenario(values={"common": common, **overrides})
+        return load_scenario("colliding", {"common": common, **overrides})
 
     return make
 
@@ -203,7 +203,7 @@ def make_scenario(tmp_path: Path) -> MakeScenario:
 def run(**overrides: dict[str, object]) -> RunData:
     """Return a run of the shipped schedule with overrides of parameters."""
     given: Overrides = overrides
-    return simulate(load_scenario(values=given))
+    return simulate(load_scenario("colliding", given))
 
 
 @pytest.fixture(scope="session")

@@ -33,7 +33,7 @@ def digests_of_rests(overrides: Overrides, ticks: Collection[int], folder: Path)
 
     The snapshots go through files in ``folder`` to one process that does nothing else.
     """
-    loop, shown = Loop(load_scenario(values=overrides)), list[bytes]()
+    loop, shown = Loop(load_scenario("colliding", overrides)), list[bytes]()
     files: dict[int, Path] = {}
     while not loop.finished:
         if len(shown) in ticks:
@@ -48,7 +48,7 @@ def digests_of_rests(overrides: Overrides, ticks: Collection[int], folder: Path)
 
 def main(overrides: str, files: list[str]) -> None:
     """Print the digest of the rest from each snapshot, all in one loop."""
-    loop = Loop(load_scenario(values=json.loads(overrides)))
+    loop = Loop(load_scenario("colliding", json.loads(overrides)))
     for file in files:
         loop.restore(load_snapshot(Path(file)))
         print(digest_of_rest(loop))

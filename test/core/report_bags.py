@@ -51,7 +51,9 @@ def write_handovers(folder: Path) -> dict[str, Path]:
     schedule.write_text(text, encoding="utf-8")
     bags = {}
     for law in LAWS:
-        scenario = load_scenario(values={"common": {"schedule": str(schedule)}, "controller": {"law": law}})
+        scenario = load_scenario(
+            "colliding", {"common": {"schedule": str(schedule)}, "controller": {"law": law}}
+        )
         bags[law] = write_bag(
             folder / law,
             simulate(scenario),

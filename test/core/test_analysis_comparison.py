@@ -238,9 +238,7 @@ def test_a_run_cut_short_is_shown_as_far_as_it_went() -> None:
 
 def test_runs_of_the_simulation_can_be_compared() -> None:
     short = {"common": {"duration": 0.1}}
-    runs = {
-        law: simulate(load_scenario(values={**short, "controller": {"law": law}})) for law in ("nmpc", "pid")
-    }
+    runs = {law: simulate(load_scenario("colliding", {**short, "law": law})) for law in ("nmpc", "pid")}
     found = compare(runs)
     for item in found.runs.values():
         assert item.physics.linear_momentum < 1e-9

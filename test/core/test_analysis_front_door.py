@@ -33,7 +33,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     schedule.write_text(SCHEDULE, encoding="utf-8")
     for law in ("nmpc", "pid"):
         run = simulate(
-            load_scenario(values={"common": {"schedule": str(schedule)}, "controller": {"law": law}})
+            load_scenario("colliding", {"common": {"schedule": str(schedule)}, "controller": {"law": law}})
         )
         (home / "runs" / law).mkdir(parents=True)
         write_run(home / "runs" / law / "bag", run)

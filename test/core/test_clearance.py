@@ -15,7 +15,7 @@ from sms_handover.clearance.bodies import BodyKind
 from sms_handover.clearance.distances import ClearanceModel
 from sms_handover.clearance.solids import MissingMeshError
 from sms_handover.configuration.package_files import config_file
-from sms_handover.errors import RobotDescriptionError
+from sms_handover.errors import ConfigurationError, RobotDescriptionError
 from sms_handover.model.assembly import RobotDescription
 from sms_handover.model.description import load_robot
 from sms_handover.model.parts import Origin
@@ -275,7 +275,7 @@ clearance:
     [
         ("shapes.gripper", [], "unknown link 'gripper'"),
         ("shapes.base_link", [{"sphere": {"radius": -1.0}}], r"sphere.radius is -1.0 m, must be > 0 m"),
-        ("shapes.base_link", [{}], "has 0 kinds, must have 1 of box, cylinder, capsule, sphere, mesh"),
+        ("shapes.base_link", [{}], "a shape must have exactly one of box, cylinder, capsule, sphere, mesh"),
         ("shapes.base_link", [{"mesh": {"file": "no.stl"}}], "there is no mesh file .*no.stl"),
         (
             "shapes.base_link",
@@ -284,12 +284,12 @@ clearance:
         ),
         ("allow", [["base_link"]], r"clearance.allow has \['base_link'\], must be pairs of two links"),
         ("count", 3, "clearance.count must be a list of pairs of links"),
-        ("allowed", [], "unknown key 'allowed' .did you mean 'allow'"),
+        ("allowed", [], "unknown path 'robot.clearance.allowed' .did you mean 'robot.clearance.allow'"),
     ],
 )
 def test_what_a_robot_file_may_not_say_of_clearance(path: str, value: object, words: str) -> None:
-    with pytest.raises(RobotDescriptionError, match=words) as told:
-        load_scenario(values={f"robot.clearance.{path}": value})
+    with pytest.raises(ConfigurationError, match=words) as told:
+        load_scenario("colliding", {f"robot.clearance.{path}": value})
     assert "\n" not in str(told.value)
 
 

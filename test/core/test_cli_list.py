@@ -3,6 +3,7 @@
 import json
 from dataclasses import astuple
 from pathlib import Path
+from typing import Any
 
 import pytest
 from my_controller.law import LAW
@@ -21,10 +22,10 @@ from .bag_messages import made_up_run
 from .laws import offer
 
 
-def listed(capsys: pytest.CaptureFixture[str], *words: str) -> list[dict[str, str]]:
+def listed(capsys: pytest.CaptureFixture[str], *words: str) -> list[dict[str, Any]]:
     """Return what ``list`` prints as JSON."""
     assert main(["list", *words, "--json"]) == 0
-    found: list[dict[str, str]] = json.loads(capsys.readouterr().out)
+    found: list[dict[str, Any]] = json.loads(capsys.readouterr().out)
     return found
 
 
@@ -57,10 +58,24 @@ def test_a_law_of_another_package_is_listed_with_where_it_comes_from(
     assert "stiffness" in capsys.readouterr().out
 
 
+def test_every_path_can_be_set_to_the_value_that_is_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    """All at once, which changes nothing; those of the scenario that is named."""
+    rows = {row["path"]: row for row in listed(capsys, "paths", "paper")}
+    assert (rows["robot.base.mass"]["unit"], rows["plant.integrator"]["allowed"]) == ("kg", "midpoint | rk4")
+    paper = load_scenario("paper")
+    values = {path: row["value"] for path, row in rows.items() if row["value"] is not None}
+    again = load_scenario("paper", values)
+    assert again.truth.robot.urdf == paper.truth.robot.urdf
+    assert again.parameters.ik == paper.parameters.ik
+    assert main(["list", "paths", "paper"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == len(rows) + 1
+    assert main(["list", "laws", "paper"]) == 2
+
+
 def test_a_law_is_shown_with_unit_default_and_range(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["show", "nmpc"]) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
-    assert ["rolling_period", "s", "1.0", "at", "least", "0.001"] in [line[:6] for line in lines]
+    assert ["controller.rolling_period", "s", "1.0", "at", "least", "0.001"] in [line[:6] for line in lines]
     assert main(["show", "npmc"]) == 2  # may be a scenario or a law
     assert "(did you mean 'nmpc'?)" in capsys.readouterr().err
 
@@ -99,7 +114,8 @@ def test_what_can_be_run_is_told_with_where_each_phase_ends(
     file: str | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A name or a file of any kind: its keys say what it is."""
-    assert main(["check", str(config_file(file)) if file else "paper"]) == 0
+    options = ("-p", "common.scenario:=paper", "--no-dry-run")
+    assert main(["check", str(config_file(file)) if file else "paper", *options]) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert lines[0] == ["phase", "ends", "[s]", "base", "rotation", "[deg]", "IK", "restarts"]
     assert [line[:2] for line in lines[1:4]] == [["approach", "20"], ["carry", "40"], ["withdraw", "60"]]
@@ -110,7 +126,7 @@ def test_a_robot_is_checked_alone(capsys: pytest.CaptureFixture[str]) -> None:
     robot = str(config_file("robot.yaml"))
     assert main(["check", robot]) == 0
     assert "254 kg; arm_a with 7 joints; arm_b with 7 joints" in capsys.readouterr().out
-    assert main(["check", robot, "--schedule", str(config_file("handover.yaml"))]) == 0
+    assert main(["check", robot, "--schedule", str(config_file("handover.yaml")), "--no-dry-run"]) == 0
     assert " with robot " in capsys.readouterr().out
 
 
@@ -120,6 +136,7 @@ def test_a_robot_is_checked_alone(capsys: pytest.CaptureFixture[str]) -> None:
         (["papr"], "unknown scenario 'papr' (did you mean 'paper'?)"),
         (["folder"], "'sms-handover bag check folder' checks a recording"),
         (["paper", "-p", "schedule.phases.carry.duration:=-1"], "must be"),
+        (["colliding", "--duration", "2", "--reject-collisions"], "bodies collide from 1.80 s on"),
         (["robot.yaml"], "robot.yaml:1: "),
         (["robot.yaml", "-p", "plant.integrator:=euler"], "is a robot, checked alone"),
         (["parameters.yaml"], "parameters.yaml:1: parameter 'integrator'"),

@@ -178,5 +178,5 @@ def test_ros_is_imported_by_the_verbs_alone_that_need_it(run: str, tmp_path: Pat
     codes = dict(re.findall(r"^code of (.*) is (\d+)$", done.stdout, re.MULTILINE))
     assert [line for line in need_none if codes[line] != "0"] == [f"verify {run}"]
     assert done.stderr.count("\n") == len(NEED_ROS) + 1, "one line of each, as of the run that is made up"
-    assert done.stderr.count(": error: ROS cannot be imported: ") == len(NEED_ROS)
+    assert done.stderr.count(": error: this needs ROS, which cannot be imported: ") == len(NEED_ROS)
     assert all(codes[line] == "2" for line in NEED_ROS)

@@ -152,7 +152,7 @@ def test_the_results_of_a_call_are_its_own(robot: RobotModel, draw: Draw) -> Non
 def test_a_whole_run_differs_by_rounding_alone() -> None:
     """The approach and the grasp, in closed loop: positions agree, and what is conserved stays so."""
     runs = [
-        simulate(load_scenario(values={"common": {"dynamics": name, "duration": 2.0}}))
+        simulate(load_scenario("colliding", {"common": {"dynamics": name, "duration": 2.0}}))
         for name in ("pinocchio", "compiled")
     ]
     ours, compiled = runs
@@ -177,7 +177,7 @@ def test_pid_is_compiled_too() -> None:
         "robot": {"arms.arm_a.limits": {"joint_7": {"velocity": 0.05}}},
     }
     found, theirs = (
-        simulate(load_scenario(values={**given, "common": {"dynamics": name, "duration": 0.1}}))
+        simulate(load_scenario("colliding", {**given, "common": {"dynamics": name, "duration": 0.1}}))
         for name in ("compiled", "pinocchio")
     )
     assert np.abs(found.joint_position - theirs.joint_position).max() < 1e-13
@@ -345,4 +345,4 @@ def test_a_folder_that_others_can_write_to_is_not_used(
 
 def test_another_kind_of_dynamics_is_unknown() -> None:
     with pytest.raises(UnknownNameError, match="did you mean 'compiled'"):
-        load_scenario(values={"common": {"dynamics": "compield"}})
+        load_scenario("colliding", {"common": {"dynamics": "compield"}})

@@ -38,7 +38,7 @@ def short(law: str, folder: Path) -> Scenario:
     """Return a handover of 1.4 s under a law."""
     path = folder / f"{law}.yaml"
     path.write_text(SCHEDULE, encoding="utf-8")
-    return load_scenario(values={"common": {"schedule": str(path)}, "controller": {"law": law}})
+    return load_scenario("colliding", {"common": {"schedule": str(path)}, "controller": {"law": law}})
 
 
 @pytest.fixture(scope="module")

@@ -19,8 +19,7 @@ from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.types import GraspStatus, IkRequest
 
-LEAST = {"possible_handover": 0.001, "smooth_handover": 0.02}  # m, outside declared contacts
-TIME_LAW = {"possible_handover": "step", "smooth_handover": "quintic"}
+LEAST = {"paper": 0.001, "smooth": 0.02}  # m, outside declared contacts
 
 
 @pytest.fixture(scope="module")
@@ -41,12 +40,8 @@ def geometry(bench: Bench) -> Geometry:
 
 @pytest.mark.parametrize("law", ["nmpc", "pid"])
 @pytest.mark.parametrize("name", LEAST)
-def test_nothing_touches_in_the_shipped_handovers(name: str, law: str, tmp_path: Path) -> None:
-    file = tmp_path / "scenario.yaml"
-    schedule = config_file(f"{name}.yaml")
-    file.write_text(f"extends: paper\ndescription: {name}\nschedule: {schedule}\n", encoding="utf-8")
-    values = {"common.dynamics": "compiled", "law": law, "trajectory.time_law": TIME_LAW[name]}
-    scenario = load_scenario(file, values)
+def test_nothing_touches_in_the_shipped_handovers(name: str, law: str) -> None:
+    scenario = load_scenario(name, {"common.dynamics": "compiled", "law": law})
     run = simulate(scenario)
     robot = scenario.truth.robot
     found = run_clearance(run, TaskTexts(robot.urdf, scenario.truth.schedule.text))
@@ -59,7 +54,7 @@ def test_nothing_touches_in_the_shipped_handovers(name: str, law: str, tmp_path:
 
 
 def test_a_run_ends_where_the_first_bodies_touch(bench: Bench) -> None:
-    text = config_file("colliding.yaml").read_text(encoding="utf-8")
+    text = config_file("schedules/colliding.yaml").read_text(encoding="utf-8")
     attempt = bench.attempt(bench.schedule(text), "nmpc")
     assert (attempt.phase, attempt.failure) == (APPROACH, "gripper arm_a - deputy")
     assert attempt.least == pytest.approx(0.0, abs=2e-3)  # m in one reference period at 0.1 m/s

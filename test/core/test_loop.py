@@ -51,7 +51,7 @@ def test_a_run_goes_on_from_any_snapshot_in_a_fresh_process(
 
 def test_the_loop_shows_what_simulate_records(overrides: Overrides) -> None:
     """Tick by tick or period by period, and the same again after a reset."""
-    scenario = load_scenario(values={**overrides, "controller": LAWS["nmpc"]})
+    scenario = load_scenario("colliding", {**overrides, "controller": LAWS["nmpc"]})
     run, loop = simulate(scenario), Loop(scenario)
     assert len(run.tick_ns) == TICKS
     for _ in range(2):
@@ -75,12 +75,12 @@ def test_the_loop_shows_what_simulate_records(overrides: Overrides) -> None:
 
 def test_a_branch_departs_where_it_is_taken(overrides: Overrides) -> None:
     """Under other gains or another law the states up to there are shared, and the efforts after it differ."""
-    trunk = Loop(load_scenario(values={**overrides, "controller": LAWS["nmpc"]}))
+    trunk = Loop(load_scenario("colliding", {**overrides, "controller": LAWS["nmpc"]}))
     while trunk.state.stamp_ns < 505_000_000:
         trunk.advance()
     snapshot, answer = trunk.snapshot(), trunk.advance()
     for law in ({"rolling_period": 0.4}, {"law": "pid"}):
-        branch = Loop(load_scenario(values={**overrides, "controller": law}))
+        branch = Loop(load_scenario("colliding", {**overrides, "controller": law}))
         branch.restore(snapshot)
         tick = branch.advance()
         assert (tick.stamp_ns, tick.q.tobytes()) == (answer.stamp_ns, answer.q.tobytes())
@@ -109,7 +109,7 @@ def test_what_a_snapshot_needs_is_asked_for(scenario: Scenario, overrides: Overr
         Loop(scenario, Springs()).snapshot()
     snapshot = Loop(scenario).snapshot()
     with pytest.raises(ConfigurationError, match="the snapshot has 3 phases, must have the 4"):
-        Loop(load_scenario(values=overrides)).restore(snapshot)
+        Loop(load_scenario("colliding", overrides)).restore(snapshot)
     smaller = replace(snapshot.plant, q=np.zeros(14), v=np.zeros(13), joint_effort=np.zeros(7))
     with pytest.raises(ConfigurationError, match="the snapshot has 7 joints, must have 14"):
         Loop(scenario).restore(replace(snapshot, plant=smaller))
@@ -125,7 +125,7 @@ def test_what_a_snapshot_needs_is_asked_for(scenario: Scenario, overrides: Overr
 
 def test_a_snapshot_can_be_pickled(overrides: Overrides) -> None:
     """For a pool of processes; the rest from a copy is the same."""
-    loop = Loop(load_scenario(values={**overrides, "controller": LAWS["pid"]}))
+    loop = Loop(load_scenario("colliding", {**overrides, "controller": LAWS["pid"]}))
     while loop.state.stamp_ns < 1_700_000_000:
         loop.advance()
     snapshot = pickle.loads(pickle.dumps(loop.snapshot()))
@@ -146,7 +146,9 @@ def test_the_seed_is_kept(scenario: Scenario) -> None:
 
 def test_a_state_that_is_restored_is_the_state(overrides: Overrides) -> None:
     """A snapshot of what was restored is the same file, and restoring leaves nothing of the run before."""
-    loop = Loop(load_scenario(values={"common": overrides["common"], "controller": {"rolling_period": 0.02}}))
+    loop = Loop(
+        load_scenario("colliding", {"common": overrides["common"], "controller.rolling_period": 0.02})
+    )
     for _ in range(30):
         loop.advance_period()
     snapshot = loop.snapshot()
@@ -159,5 +161,7 @@ def test_a_state_that_is_restored_is_the_state(overrides: Overrides) -> None:
 def test_a_run_of_an_external_controller_is_not_begun() -> None:
     with pytest.raises(ConfigurationError, match="the controller is external: give simulate"):
         Loop(
-            load_scenario(values={"common": {"external": ("controller",), "peers": ("plant", "controller")}})
+            load_scenario(
+                "colliding", {"common": {"external": ["controller"], "peers": ["plant", "controller"]}}
+            )
         )

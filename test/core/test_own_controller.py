@@ -49,7 +49,7 @@ class Told:
 
 
 def of_duration(seconds: float) -> Scenario:
-    return load_scenario(values={"common": {"duration": seconds}})
+    return load_scenario("colliding", {"common": {"duration": seconds}})
 
 
 def test_our_own_controller_given_from_outside_changes_no_bit() -> None:

@@ -25,11 +25,12 @@ def run_with(folder: Path, carry: str, withdraw: str) -> RunData:
     schedule.write_text(text, encoding="utf-8")
     return simulate(
         load_scenario(
-            values={
+            "colliding",
+            {
                 "common": {"schedule": str(schedule)},
                 "controller": {"rolling_period": 0.3},
                 "trajectory": {"failure_hold": 0.2},
-            }
+            },
         )
     )
 

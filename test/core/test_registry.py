@@ -41,7 +41,7 @@ def scenario_of(folder: Path, **controller: object) -> Scenario:
     gains = "      nmpc: {rolling_period: 2.0}"
     file.write_text(SCHEDULE.replace(gains, f"{gains}\n      {THIRD}: {{stiffness: 2.0}}"), encoding="utf-8")
     return load_scenario(
-        values={"common": {"schedule": str(file)}, "controller": {"law": THIRD, **controller}}
+        "colliding", {"common": {"schedule": str(file)}, "controller": {"law": THIRD, **controller}}
     )
 
 
@@ -61,7 +61,7 @@ def test_a_law_of_another_package_runs_by_its_name(tmp_path: Path) -> None:
     run = simulate(scenario)
     assert compare_runs(run, simulate(scenario, controller=ByHand(scenario.truth.robot))) == ()
     assert np.any(run.joint_command)
-    check_scenario(load_scenario(values={"controller": {"law": THIRD}}))  # not linearised: no verdict
+    check_scenario(load_scenario("colliding", {"controller": {"law": THIRD}}))  # not linearised: no verdict
 
 
 @pytest.mark.usefixtures("third")
@@ -73,7 +73,7 @@ def test_its_parameters_are_checked_as_ours_are(tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match=r"unknown parameter 'stiffness'"):
         load_parameters({"controller": {"stiffness": 1.0}})
     wrong = load_scenario(
-        values={"common": {"schedule": str(_misspelt(tmp_path))}, "controller": {"law": THIRD}}
+        "colliding", {"common": {"schedule": str(_misspelt(tmp_path))}, "controller": {"law": THIRD}}
     )
     with pytest.raises(UnknownNameError, match=rf"phase 'carry': unknown gain of {THIRD} 'stifness'"):
         gains_by_phase(wrong.model.schedule, wrong.parameters.controller)

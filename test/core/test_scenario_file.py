@@ -92,6 +92,16 @@ def test_the_plant_has_the_truth_and_all_others_the_model(tmp_path: Path) -> Non
     assert (believed.truth.schedule.deputy.size[0], believed.model.schedule.deputy.size[0]) == (0.2, 0.1)
 
 
+def test_what_a_role_has_not_stays_away(tmp_path: Path) -> None:
+    """A null of one role reaches the robot through a file that extends the one it stands in."""
+    _file(tmp_path, "extends: paper\ntruth: {robot: {base: {panels: null, mass: 250.0}}}\n", "first.yaml")
+    name = _file(tmp_path, "extends: first.yaml\ntruth: {robot: {base: {mass: 260.0}}}\n")
+    found = load_scenario(name)
+    assert found.truth.robot.description.base.panels == ()
+    assert found.truth.robot.description.base.inertia.mass == 260.0
+    assert found.model.robot.description.base.panels
+
+
 def test_what_is_recorded_tells_truth_and_model(tmp_path: Path) -> None:
     """The record of a scenario with values of all kinds needs only those of one role beside it."""
     source = load_scenario_file(_file(tmp_path, HEAVY))
@@ -129,6 +139,10 @@ REFUSED = {
     "phase": (
         "extends: paper\nschedule: {phases: {carry: 3}}\n",
         "mine.yaml:2: carry is 3, must be a mapping or null",
+    ),
+    "nothing to remove": (
+        "extends: paper\nrobot: {base: {panel: null}}\n",
+        r"mine.yaml:2: null: unknown key 'panel' \(did you mean 'panels'\?\)",
     ),
     "parameter": (
         "extends: paper\nplant: {integratr: rk4}\n",

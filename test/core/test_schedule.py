@@ -191,7 +191,7 @@ def test_a_schedule_cannot_be_changed(files: Files) -> None:
 def test_the_shipped_schedule_is_a_handover(scenario: Scenario) -> None:
     """60 s; B holds during the first third; A grasps, then hands over to B; T_r is 2 s once it is held."""
     schedule = scenario.truth.schedule
-    assert schedule.text == config_file("handover.yaml").read_text(encoding="utf-8")
+    assert schedule.text == config_file("schedules/colliding.yaml").read_text(encoding="utf-8")
     assert schedule.end_ns == 60 * _NS
     holding = [phase for phase in schedule.phases if phase.start_ns < 20 * _NS]
     assert all(isinstance(phase.targets["arm_b"], Hold) for phase in holding)

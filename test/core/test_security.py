@@ -104,7 +104,7 @@ def test_the_loader_of_yaml_is_a_safe_one() -> None:
 
 
 READERS: dict[str, Callable[[Path], object]] = {
-    "schedule": lambda path: load_scenario(values={"common": {"schedule": str(path)}}),
+    "schedule": lambda path: load_scenario("colliding", {"common": {"schedule": str(path)}}),
     "robot": load_robot,
     "parameters": lambda path: read_parameter_files([path], "plant"),
 }

@@ -175,7 +175,7 @@ def test_the_same_scenario_gives_the_same_bits(short: RunData, make_scenario: Ma
     _assert_equal(short, run(common={"duration": 0.3}))
     scenario = make_scenario()
     first = simulate(scenario)
-    other = replace(scenario, parameters=load_scenario(values={"controller": {"law": "pid"}}).parameters)
+    other = replace(scenario, parameters=load_scenario("colliding", {"law": "pid"}).parameters)
     simulate(replace(other, parameters=replace(other.parameters, common=scenario.parameters.common)))
     _assert_equal(first, simulate(scenario))
 

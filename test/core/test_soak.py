@@ -88,10 +88,10 @@ def test_a_sample_of_this_process_sees_what_it_opens() -> None:
 
 def test_the_schedule_is_as_long_as_wanted_and_can_be_carried_out(tmp_path: Path) -> None:
     path = write_schedule(tmp_path / "long.yaml", 60.0 * MINUTES)
-    schedule = load_scenario(values={"common": {"schedule": str(path)}}).truth.schedule
+    schedule = load_scenario("colliding", {"common": {"schedule": str(path)}}).truth.schedule
     assert schedule.end_ns == 60 * MINUTES * NS_PER_S
     assert sum(bool(phase.commands) for phase in schedule.phases) == 2 * MINUTES
     short = write_schedule(tmp_path / "short.yaml", 120.0)  # the phases repeat after that
     check_scenario(
-        load_scenario(values={"common": {"schedule": str(short)}, "trajectory": {"time_law": "quintic"}})
+        load_scenario("colliding", {"common.schedule": str(short), "trajectory.time_law": "quintic"})
     )

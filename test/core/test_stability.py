@@ -170,15 +170,15 @@ def _start(scenario: Scenario) -> None:
 
 def test_pid_at_2_ms_is_refused_because_of_a_joint_7() -> None:
     """The derivative gain on the lightest joint: K_D dt / I is 1.4 at 1 ms, and must stay below 2."""
-    _start(load_scenario(values={"common": {"tick": 0.001}, "controller": {"law": "pid"}}))
-    slower = load_scenario(values={"common": {"tick": 0.002}, "controller": {"law": "pid"}})
+    _start(load_scenario("colliding", {"common": {"tick": 0.001}, "controller": {"law": "pid"}}))
+    slower = load_scenario("colliding", {"common": {"tick": 0.002}, "controller": {"law": "pid"}})
     with pytest.raises(UnstableLoopError, match=r"0\.002 s is unstable.*first at arm_[ab]_joint_7; use a"):
         _start(slower)
 
 
 def test_nmpc_at_10_ms_is_accepted() -> None:
     """Its gains scale with the inertia, so its tick is bound by the horizon alone."""
-    _start(load_scenario(values={"common": {"tick": 0.01}, "controller": {"law": "nmpc"}}))
+    _start(load_scenario("colliding", {"common": {"tick": 0.01}, "controller": {"law": "nmpc"}}))
 
 
 def test_the_shipped_phases_are_all_stable(scenario: Scenario) -> None:

@@ -19,7 +19,7 @@ from .conftest import SCHEDULE as ANOTHER
 
 CONTENTS = {
     "robot": (ROBOT, read_yaml(config_file("robot.yaml"))),
-    "schedule": (SCHEDULE, read_yaml(config_file("handover.yaml"))),
+    "schedule": (SCHEDULE, read_yaml(config_file("schedules/colliding.yaml"))),
     "schedule of every kind": (SCHEDULE, load(ANOTHER)),
 }
 

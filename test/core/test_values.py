@@ -17,7 +17,8 @@ from sms_handover.trajectory.load import load_schedule
 def test_values_are_those_of_the_scenario(tmp_path: Path, scenario: Scenario) -> None:
     """Also where an alias shares them or the file has none; the record has the schedule as it was run."""
     changed = load_scenario(
-        values={
+        "colliding",
+        {
             "robot": {
                 "base.mass": 300,
                 "arms.arm_a.gripper.mass": 0.9,
@@ -27,7 +28,7 @@ def test_values_are_those_of_the_scenario(tmp_path: Path, scenario: Scenario) ->
             "deputy": {"size": [0.2, 0.4, 0.2]},
             "schedule": {"phases.withdraw.duration": 30.0, "phases.carry.gains": None},
             "controller": {"rolling_period": 0.5},
-        }
+        },
     )
     arm_a, arm_b = changed.truth.robot.description.arms
     before = scenario.truth.robot.description
@@ -95,7 +96,7 @@ REFUSED: dict[str, tuple[Overrides, str]] = {
 @pytest.mark.parametrize(("overrides", "words"), REFUSED.values(), ids=list(REFUSED))
 def test_what_is_wrong_is_said_at_its_path(overrides: Overrides, words: str) -> None:
     with pytest.raises(ConfigurationError) as caught:
-        load_scenario(values=overrides)
+        load_scenario("colliding", overrides)
     assert re.search(words, str(caught.value))
     assert "\n" not in str(caught.value)
 

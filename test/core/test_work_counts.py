@@ -75,7 +75,7 @@ class TickBench:
 
 def _loop(overrides: Overrides | None = None) -> TickBench:
     """Return the loop of the shipped scenario with overrides."""
-    return TickBench(load_scenario(values=overrides))
+    return TickBench(load_scenario("colliding", overrides))
 
 
 @pytest.mark.parametrize(
@@ -117,7 +117,9 @@ def test_a_reference_period_adds_little(monkeypatch: pytest.MonkeyPatch) -> None
     With one arm led by its tool and at its target: two forward kinematics for the tools, one each for the
     residual at the seed and after every iteration, one at the start of a phase.
     """
-    scenarios = [load_scenario(values={"common": {"duration": duration}}) for duration in (20e-3, 40e-3)]
+    scenarios = [
+        load_scenario("colliding", {"common": {"duration": duration}}) for duration in (20e-3, 40e-3)
+    ]
     counted = []
     for scenario in scenarios:
         with monkeypatch.context() as patch:

@@ -137,4 +137,4 @@ def test_an_override_is_not_blamed_on_a_file(tmp_path: Path) -> None:
     path = tmp_path / "p.yaml"
     path.write_text("controller:\n  ros__parameters: {law: pid}\n", encoding="utf-8")
     with pytest.raises(UnknownNameError, match=r"^controller: parameter 'law'"):
-        load_scenario(values={"controller": {"law": "pdi"}}, files=[path])
+        load_scenario("colliding", {"controller": {"law": "pdi"}}, files=[path])

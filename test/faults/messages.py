@@ -157,7 +157,7 @@ def is_refused(words: tuple[str, ...], trial: Trial, ended: Ended) -> Kept:
 
 def _schedule(before: str, after: str) -> Callable[[], str]:
     def text() -> str:
-        shipped = config_file("handover.yaml").read_text(encoding="utf-8")
+        shipped = config_file("schedules/colliding.yaml").read_text(encoding="utf-8")
         assert before in shipped
         return shipped.replace(before, after, 1)
 

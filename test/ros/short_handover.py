@@ -41,7 +41,9 @@ def short_handover(*, stretch: float = 1.0, deputy_off: tuple[float, float, floa
 @cache
 def _schedule() -> dict[str, Any]:
     """Return the shipped schedule with its times shortened, robot and deputy placed near their targets."""
-    schedule: dict[str, Any] = yaml.safe_load(config_file("handover.yaml").read_text(encoding="utf-8"))
+    schedule: dict[str, Any] = yaml.safe_load(
+        config_file("schedules/colliding.yaml").read_text(encoding="utf-8")
+    )
     starts_s = (0.0, APPROACH_S, APPROACH_S + CARRY_S)
     for phase, start, length in zip(
         schedule["phases"], starts_s, (APPROACH_S, CARRY_S, WITHDRAW_S), strict=True

@@ -92,7 +92,7 @@ def test_a_collision_ends_the_run_in_the_same_tick(schedule: Path, tmp_path: Pat
     The gripper that has let go is more than 1 mm in the deputy at 0.86 s.
     """
     abort = ("-p", "common.on_collision:=abort", "-p", "trajectory.failure_hold:=0.05")
-    arguments = ("run", "--compose", "--schedule", schedule, *abort, "-o", "out")
+    arguments = ("run", "--compose", "--time-law", "step", "--schedule", schedule, *abort, "-o", "out")
     ended = sms_handover(*arguments, cwd=tmp_path, dry_run=True)
     assert "warning: in a dry run bodies collide from 0.86 s on, at worst arm_a_gripper" in ended.err
     assert ended.code == 1 and "phase 'withdraw' has failed at 0.93 s" in ended.out, ended
@@ -100,7 +100,9 @@ def test_a_collision_ends_the_run_in_the_same_tick(schedule: Path, tmp_path: Pat
     bag = tmp_path / "out" / "bag"
     assert sms_handover("bag", "check", bag, cwd=tmp_path).code == 0
     common = {"schedule": str(schedule), "on_collision": "abort"}
-    scenario = load_scenario(values={"common": common, "trajectory": {"failure_hold": 0.05}})
+    scenario = load_scenario(
+        values={"common": common, "trajectory": {"failure_hold": 0.05, "time_law": "step"}}
+    )
     assert_same_bits(read_run(bag), simulate(scenario))
     assert measured_in(bag) == measured_by(scenario)
 
@@ -145,7 +147,7 @@ def test_every_node_has_the_robot_that_is_its(
     assert (found.truth.robot.urdf, found.model.robot.urdf) == (same.truth.robot.urdf, same.model.robot.urdf)
     assert found.truth.robot.mass - found.model.robot.mass == pytest.approx(24.0 - (0.7 - 0.6451))
     scenario.unlink()  # the bag alone says what it was made with
-    assert sms_handover("reproduce", bag, cwd=tmp_path).code == 0
+    assert sms_handover("verify", bag, cwd=tmp_path).code == 0
 
 
 def test_the_laws_differ(simulated: dict[str, RunData]) -> None:

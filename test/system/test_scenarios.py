@@ -18,7 +18,7 @@ def test_the_planar_scenario_is_run_recorded_reproduced_compared_reported_and_vi
     assert ended.code == 0, ended
     assert "run complete at 0.2 s of simulated time" in ended.out
     for command in (
-        ("reproduce", "planar"),
+        ("verify", "planar"),
         ("compare", "planar"),
         ("report", "planar", "-o", "report"),
         ("view", "planar", "-o", "page.html", "--no-browser"),

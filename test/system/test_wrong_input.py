@@ -22,7 +22,7 @@ def parameters(node: str, **values: object) -> str:
 
 def files() -> dict[str, str]:
     """Return the texts of the files that the cases use, by name."""
-    shipped = config_file("handover.yaml").read_text(encoding="utf-8")
+    shipped = config_file("schedules/colliding.yaml").read_text(encoding="utf-8")
     target = yaml.safe_load(shipped)["phases"][1]["arms"]["arm_a"]["tool_in_world"]["xyz"]
     far = [target[0] + 1.0, *target[1:]]
     return {
@@ -180,9 +180,13 @@ def test_collisions_are_told_before_a_run_and_may_be_rejected(
 ) -> None:
     """The gripper that has let go of the deputy comes back into it; nothing is started or made."""
     worst = "at worst arm_a_gripper and deputy overlap by 1.72 mm at 1.02 s"
-    done = called("run", "--reject-collisions", "--schedule", schedule, "-o", "out", cwd=tmp_path)
+    done = called(
+        "run", "--reject-collisions", "--time-law", "step", "--schedule", schedule, "-o", "out", cwd=tmp_path
+    )
     assert done.code == 2 and f"error: bodies collide from 0.86 s on, {worst}" in done.err
     assert tree(tmp_path) == {}
+    done = called("check", "--reject-collisions", "--time-law", "step", "--schedule", schedule, cwd=tmp_path)
+    assert done.code == 2 and worst in done.err and "can be run" not in done.out
     for options, code in (((), 0), (("--reject-collisions",), 1)):
-        done = called("simulate", *options, "--schedule", schedule, cwd=tmp_path)
+        done = called("simulate", *options, "--time-law", "step", "--schedule", schedule, cwd=tmp_path)
         assert done.code == code and f"warning: bodies collide, {worst}" in done.err

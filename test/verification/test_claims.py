@@ -6,9 +6,10 @@ from math import isnan
 import pytest
 
 from sms_handover.analysis.claims import Claim
+from sms_handover.analysis.clearance import TaskTexts
 from sms_handover.analysis.comparison import compare
 from sms_handover.run_data import RunData
-from sms_handover.simulation.scenario import load_scenario
+from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
 from test.verification.conftest import Record, Table
 
@@ -19,14 +20,20 @@ _COMMAND = (
 
 @cache
 def handover(law: str) -> RunData:
-    """Return the whole shipped handover under a law, simulated once per session."""
-    return simulate(load_scenario(values={"controller": {"law": law}}))
+    """Return the whole handover of the paper under a law, simulated once per session."""
+    return simulate(_scenario(law))
+
+
+def _scenario(law: str) -> Scenario:
+    return load_scenario("paper", {"law": law})
 
 
 @pytest.fixture(scope="module")
 def claims() -> tuple[Claim, ...]:
-    """The verdicts on a run under each law."""
-    return compare({law: handover(law) for law in ("nmpc", "pid")}).claims
+    """The verdicts on a run under each law, with the bodies that must not enter each other."""
+    truth = {law: _scenario(law).truth for law in ("nmpc", "pid")}
+    texts = {law: TaskTexts(true.robot.urdf, true.schedule.text) for law, true in truth.items()}
+    return compare({law: handover(law) for law in truth}, texts=texts).claims
 
 
 def test_every_claim_holds(claims: tuple[Claim, ...], record: Record) -> None:

@@ -98,7 +98,7 @@ def _row(run: RunData, tick: int) -> State:
 @pytest.fixture(scope="module")
 def scenario() -> Scenario:
     """The shipped scenario under NMPC."""
-    return load_scenario(values={"controller": {"law": "nmpc"}})
+    return load_scenario("paper", {"controller": {"law": "nmpc"}})
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,7 @@
 """Event publisher: what a node has decided goes to ``run/events``, hence into the bag, and to its log."""
 
+from collections.abc import Iterable
+
 from rclpy.node import Node
 
 from sms_handover.graph.events import RunEvent, Severity
@@ -18,6 +20,11 @@ class EventPublisher:
         """Speak for a node on a publisher of ``run/events``."""
         self._log = node.get_logger()
         self._publisher = publisher
+
+    def publish_all(self, events: Iterable[RunEvent]) -> None:
+        """Publish and log events, if there are any."""
+        for event in events:
+            self.publish(event)
 
     def publish(self, event: RunEvent) -> None:
         """Publish and log an event."""

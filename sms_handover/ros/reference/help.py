@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from textwrap import wrap
 from typing import Any
 
-from sms_handover.configuration.parameter_rows import ParameterRow, rows_of
 from sms_handover.configuration.parameters import defaults_of
 from sms_handover.graph.services import Service
 from sms_handover.graph.topics import (
@@ -25,8 +24,10 @@ from sms_handover.graph.topics import (
 from sms_handover.ros.reference.interfaces import (
     COMMON_GROUP,
     ParameterGroup,
+    ParameterRow,
     groups_of,
     parameter_rows,
+    rows_of,
     services_of,
     topics_of,
 )

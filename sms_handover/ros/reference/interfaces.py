@@ -3,14 +3,14 @@
 ``--help`` of a node and the pages docs/parameters.md and docs/topics.md are written from this.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from sms_handover.bag.parameters import RecorderParameters, TopicRecorderParameters
 from sms_handover.bag.qos import History
 from sms_handover.configuration.package_files import config_file
-from sms_handover.configuration.parameter_rows import ParameterRow, rows_of
-from sms_handover.configuration.parameters import EVERY_NODE, read_parameter_files
+from sms_handover.configuration.parameters import EVERY_NODE, read_parameter_files, specs_of
 from sms_handover.control.parameters import ControllerParameters
 from sms_handover.graph.services import SERVICES, Service
 from sms_handover.graph.topics import (
@@ -38,6 +38,15 @@ ANY_ARM = "ARM"  # stands for the name of an arm
 
 _EVERY_OTHER = set(NODES) - {PLANT, RECORDER}
 
+_TYPES = {
+    bool: "bool",
+    int: "integer",
+    float: "double",
+    str: "string",
+    tuple[float, ...]: "double_array",
+    tuple[str, ...]: "string_array",
+}  # as `ros2 param describe` names them
+
 
 @dataclass(frozen=True)
 class ParameterGroup:
@@ -46,6 +55,18 @@ class ParameterGroup:
     cls: type[Any]
     file: str
     section: str
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """One parameter for readers: everything as text, '' where there is none."""
+
+    name: str
+    type: str
+    default: str
+    unit: str
+    allowed: str
+    description: str
 
 
 COMMON_GROUP = ParameterGroup(CommonParameters, "common.yaml", EVERY_NODE)
@@ -72,6 +93,21 @@ def groups_of(node: str) -> tuple[ParameterGroup, ...]:
 def parameter_rows(group: ParameterGroup) -> tuple[ParameterRow, ...]:
     """Return the parameters of a group, with the defaults of its file."""
     return rows_of(group.cls, read_parameter_files([config_file(group.file)], group.section))
+
+
+def rows_of(cls: type[Any], defaults: Mapping[str, object]) -> tuple[ParameterRow, ...]:
+    """Return the parameters of a dataclass, with their defaults by name."""
+    return tuple(
+        ParameterRow(
+            name=name,
+            type=_TYPES[spec.kind],
+            default=_value(defaults[name]),
+            unit=spec.unit.replace("-", ""),
+            allowed=spec.allowed,
+            description=spec.description,
+        )
+        for name, spec in specs_of(cls).items()
+    )
 
 
 def publishers_of(topic: Topic) -> tuple[str, ...]:
@@ -103,3 +139,12 @@ def qos_text(topic: Topic) -> str:
     profile = stored(profile_of(topic))
     history = "keep all" if profile.history is History.KEEP_ALL else f"keep last {profile.depth}"
     return ", ".join((profile.reliability.value, profile.durability.value, history)).replace("_", " ")
+
+
+def _value(value: object) -> str:
+    """Return a default as it is written on a command line."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list):
+        return "[" + ", ".join(map(str, value)) + "]"
+    return "''" if value == "" else str(value)
