@@ -618,7 +618,7 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "motion of the other arm left out of the rates",
-        "trajectory/generator",
+        "trajectory/tool_motion",
         "rest = wanted - jacobian @ velocity",
         "rest = wanted - 0.0 * jacobian @ velocity",
         "generator",
