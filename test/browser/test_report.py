@@ -162,7 +162,9 @@ def test_the_buttons_lead_to_phases_and_grasps(opened: Open, runs: list[Recorded
         assert all(shown == pytest.approx(span, abs=NEAR) for shown in ranges(page))
         assert page.locator(".ranges [aria-pressed=true]").all_inner_texts() == [name]
     marks = [text.strip() for text in page.locator(".ranges button").all_inner_texts()]
-    assert len(marks) == 1 + len(spans) + len(runs[0].data.grasp_events)
+    grasps = {ns_to_seconds(event.stamp_ns) for event in runs[0].data.grasp_events}
+    decided = {ns_to_seconds(event.stamp_ns) for run in runs for event in run.data.run_events}
+    assert marks[1 + len(spans) :] == [f"{time:g} s ± 1 s" for time in (*sorted(grasps), *sorted(decided))]
 
 
 def test_the_values_in_sight_fill_the_height(opened: Open) -> None:

@@ -108,6 +108,7 @@ class Graph:
         parameters = dict(parameters or {})
         parameters["common"] = {
             "peers": self.peers,
+            "scenario": "colliding",  # step targets
             "schedule": str(path),
             "transport": EXECUTOR,  # every node has its turn, and a test can act while the graph runs
             **parameters.get("common", {}),

@@ -63,7 +63,7 @@ def _schedule() -> dict[str, Any]:
 
 def _joints_at(tool_in_world: dict[str, Pose]) -> dict[str, list[float]]:
     """Return joint angles per arm that bring the tools to poses, found from the shipped start."""
-    scenario = load_scenario()
+    scenario = load_scenario("colliding")
     robot, seed = scenario.truth.robot, initial_joints(scenario.truth.robot, scenario.truth.schedule)
     request = IkRequest(scenario.truth.schedule.base_in_world, seed, tool_in_world)
     result = solve_ik(robot, request, scenario.parameters.ik)

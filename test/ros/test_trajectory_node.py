@@ -151,7 +151,7 @@ def test_a_request_without_an_answer_is_repeated(
     monkeypatch.setattr(trajectory, "_solver", replace(trajectory._solver, call=ask_badly))
     graph.run()
     schedule = {"common": {"schedule": str(bench.folder / "schedule.yaml")}}
-    expected = simulate(load_scenario(values=schedule))
+    expected = simulate(load_scenario("colliding", schedule))
     heard = Messages().of(graph, JOINT_REFERENCE)
     found = dict(zip(graph.stamps(JOINT_REFERENCE), (message.position for message in heard), strict=True))
     assert list(found) == expected.reference_ns.tolist()

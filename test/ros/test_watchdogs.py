@@ -86,7 +86,7 @@ def test_a_missed_grasp_leads_to_the_same_over_dds(bench: Bench, on_miss: object
 
 def simulated(bench: Bench, **trajectory: object) -> RunData:
     common = {"schedule": str(bench.folder / "schedule.yaml")}
-    return simulate(load_scenario(values={"common": common, TRAJECTORY: trajectory}))
+    return simulate(load_scenario("colliding", {"common": common, TRAJECTORY: trajectory}))
 
 
 def test_enforced_limits_lead_to_the_same_over_dds(bench: Bench) -> None:
@@ -97,7 +97,7 @@ def test_enforced_limits_lead_to_the_same_over_dds(bench: Bench) -> None:
     graph = Graph(bench, {**given, "common": common})
     graph.run()
     common["schedule"] = str(bench.folder / "schedule.yaml")
-    expected = simulate(load_scenario(values={**given, "common": common}))
+    expected = simulate(load_scenario("colliding", {**given, "common": common}))
     assert {event.kind for event in expected.run_events} == {POSITION_EXCEEDED, RATE_EXCEEDED}
     assert repr(events(graph)) == repr(list(expected.run_events))
     assert np.max(np.abs(expected.joint_effort[1:] - expected.joint_command[:-1])) > 0.01  # [N m] by the line

@@ -198,7 +198,9 @@ def test_a_missed_grasp_has_an_exit_code_of_its_own(tmp_path: Path) -> None:
     """
     schedule = tmp_path / "schedule.yaml"
     schedule.write_text(short_handover(stretch=2.0, deputy_off=(0.0, 0.03, 0.04)), encoding="utf-8")
-    done = sms_handover("run", "--no-record", "--compose", "--schedule", schedule, "-o", "run", cwd=tmp_path)
+    step = ("--time-law", "step")
+    graph = ("--no-record", "--compose", "--schedule", schedule, "-o", "run")
+    done = sms_handover("run", *step, *graph, cwd=tmp_path)
     assert done.code == 4, done
     assert "grasp by arm_a: missed" in done.err
     assert "transfer by arm_b: rejected" in done.err

@@ -23,14 +23,14 @@ def test_a_run_with_retries_is_the_one_in_one_process(tmp_path: Path, called: Co
     schedule["phases"][1]["on_miss"] = {"retry": 2}
     path = tmp_path / "schedule.yaml"
     path.write_text(yaml.safe_dump(schedule, sort_keys=False), encoding="utf-8")
-    hold = ("-p", "trajectory.failure_hold:=0.06")
+    hold = ("--time-law", "step", "-p", "trajectory.failure_hold:=0.06")
     ended = sms_handover("run", "--schedule", path, *hold, "-o", "out", cwd=tmp_path)
     assert ended.code == 4, ended
     assert "phase_retried" in ended.err and "grasp_failed" in ended.err
     assert "the nodes reported 1 error, 2 warnings, see above" in ended.out
     assert "phase 'carry' has failed at 0.42 s of simulated time" in ended.out
     recorded = read_run(tmp_path / "out" / "bag")
-    scenario = load_scenario(values={"common": {"schedule": str(path)}, "trajectory": {"failure_hold": 0.06}})
+    scenario = load_scenario("colliding", {"common.schedule": str(path), "trajectory.failure_hold": 0.06})
     assert compare_runs(recorded, simulate(scenario)) == ()
     assert [event.kind for event in recorded.run_events if event.node == "trajectory"] == [
         "phase_retried",
