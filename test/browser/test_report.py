@@ -11,6 +11,7 @@ from playwright.sync_api import Page
 
 from sms_handover.report.page import report_page
 from sms_handover.report.recorded_run import RecordedRun, read_recorded
+from sms_handover.units import ns_to_seconds
 
 from ..core.report_bags import write_handovers
 from ..core.test_report_page import EVIL, evil_bag
