@@ -48,6 +48,7 @@ autodoc_default_options = {"ignore-module-all": True}  # what is imported is tol
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
 add_module_names = False
+viewcode_follow_imported_members = False  # a field whose default is a type is no part of the module of that type
 toc_object_entries_show_parents = "hide"
 nitpicky = True
 nitpick_ignore_regex = [

@@ -49,7 +49,10 @@ class QuietRunner:
         """
         plant, generator, per_period = self._plant, self._generator, self._per_period
         first, stamp_ns = plant.tick, plant.stamp_ns
-        until_ns = generator.quiet_until(stamp_ns, deputy_rests=plant.held_or_resting.rests)
+        deputy = plant.held_or_resting
+        if not (deputy.holder or deputy.rests):
+            return None  # it drifts, and C does not move it
+        until_ns = generator.quiet_until(stamp_ns, deputy_rests=deputy.rests)
         if until_ns is None:
             return None
         before = guidance.reference
@@ -58,7 +61,7 @@ class QuietRunner:
         if count < 1:
             return None
         course = generator.course(stamp_ns, period_ns, count, plant.deputy.deputy_in_world)
-        deputy, failures = plant.held_or_resting, generator.ik_failures
+        failures = generator.ik_failures
         rows, periods, failed = self._periods.run(course, before, stamp_ns, deputy, failures)
         generator.failed_so_far(failed)
         net: PeriodRows = replace(periods, work=periods.work - plant.losses)
