@@ -12,6 +12,7 @@ from benchmarks.results import FOLDER, ROOT, Result, bullets, load
 
 SCRIPTS: tuple[str, ...] = (  # in the order of the document
     "engines",
+    "compiled_loop",
     "inverse_kinematics",
     "growth",
     "clearance",

@@ -1,0 +1,116 @@
+"""Compiled loop: how fast whole handovers run in one process, and which part takes how long."""
+
+from collections.abc import Callable
+from functools import partial
+from unittest.mock import patch
+
+from benchmarks.results import Result, Table, publish, row
+from benchmarks.timing import Timings, interleaved
+from sms_handover.compiled.kinematics import CompiledKinematics
+from sms_handover.simulation import loop as loop_module
+from sms_handover.simulation.loop import Loop
+from sms_handover.simulation.period_runner import PythonRunner
+from sms_handover.simulation.recorder import RunRecorder
+from sms_handover.simulation.scenario import Scenario, load_scenario
+from sms_handover.simulation.simulate import simulate
+from sms_handover.simulation.wiring import make_ik
+from sms_handover.types import IkRequest
+
+SIMULATED_S = 60.0  # s of a handover
+ROUNDS = 5
+RUNS = tuple((scenario, law) for scenario in ("paper", "smooth") for law in ("nmpc", "pid"))
+_TICKS, _CALLS = 20, 50  # ticks of a period, and calls of a part in a row
+
+
+def compiled(name: str, law: str) -> Scenario:
+    """Return a scenario with compiled dynamics."""
+    return load_scenario(name, {"law": law, "common.dynamics": "compiled"})
+
+
+def by_period(scenario: Scenario) -> None:
+    """Run it with its ticks in C and its reference periods in Python."""
+    loop = Loop(scenario)
+    loop._quiet = None
+    _record(loop)
+
+
+def by_tick(scenario: Scenario) -> None:
+    """Run it with ticks and periods in Python, and the equations in C."""
+    with patch.object(
+        loop_module, "make_runner", lambda plant, controller, *_: PythonRunner(plant, controller)
+    ):
+        _record(Loop(scenario))
+
+
+def _record(loop: Loop) -> None:
+    robot = loop.scenario.model.robot
+    recorder = RunRecorder(robot.joint_names, robot.arms)
+    while not loop.finished:
+        recorder.add(loop.advance_quietly())
+    recorder.data()
+
+
+def parts(scenario: Scenario) -> tuple[Timings, dict[str, int]]:
+    """Return the times of parts of a period, and how often each is called in its contestant."""
+    robot, parameters = scenario.model.robot, scenario.parameters
+    loop = Loop(scenario)
+    loop.advance_period()
+    solve = make_ik(robot, parameters.common, parameters.ik)
+    state = loop.state
+    tools = robot.tools_at(state.q)
+    request = IkRequest(state.base_in_world, state.joint_position, tools)
+    kinematics = CompiledKinematics(robot)
+
+    def repeated(part: Callable[[], object]) -> Callable[[], None]:
+        def run() -> None:
+            for _ in range(_CALLS):
+                part()
+
+        return run
+
+    found = interleaved(
+        {
+            "20 ticks: law, limits, step, sums, record": repeated(partial(loop._runner.run, _TICKS, _TICKS)),
+            "inverse kinematics near its solution": repeated(partial(solve, request)),
+            "tools of both arms": repeated(partial(kinematics.tools_at, state.q)),
+            "momenta, energy, centre of mass": repeated(partial(kinematics.conserved, state.q, state.v)),
+        },
+        ROUNDS,
+    )
+    return found, dict.fromkeys(found.seconds, _CALLS)
+
+
+def main() -> None:
+    """Measure and publish."""
+    runs: dict[str, Callable[[], object]] = {}
+    for name, law in RUNS:
+        runs[f"{name}, {law}"] = partial(simulate, compiled(name, law))
+    first = compiled(*RUNS[0])
+    runs["paper, nmpc: periods by Python"] = partial(by_period, first)
+    runs["paper, nmpc: periods and ticks by Python"] = partial(by_tick, first)
+    times = interleaved(runs, ROUNDS)
+    base = next(iter(runs))
+    speed = {name: SIMULATED_S / times.best(name) for name in runs}
+    rows = [row(name, times.best(name), speed[name], times.ratio(name, base)) for name in runs]
+    split, calls = parts(first)
+    cells = [row(name, 1e6 * split.best(name) / calls[name]) for name in split.seconds]
+    publish(
+        Result(
+            name="compiled_loop",
+            question="How fast is a handover in one process with compiled dynamics?",
+            notes=[
+                "60 s of simulated time with everything recorded, one case on one core; loading the scenario "
+                "is not in it. All took turns; the shortest time counts. The second table has parts called "
+                "from Python one by one, so with the cost of a call; in quiet periods C calls them itself."
+            ],
+            tables=[
+                Table(("run", "s", "times real time", "time over the first"), rows),
+                Table(("part of a reference period", "us"), cells),
+            ],
+            values=speed,
+        )
+    )
+
+
+if __name__ == "__main__":
+    main()
