@@ -152,8 +152,8 @@ class FreeFloatingPlant:
         return self._deputy.state
 
     @property
-    def held_or_resting(self) -> MasslessDeputy:
-        """The deputy itself."""
+    def deputy_body(self) -> MasslessDeputy:
+        """The deputy with its motion, which compiled periods take over and give back."""
         return self._deputy
 
     @property

@@ -49,7 +49,7 @@ class QuietRunner:
         """
         plant, generator, per_period = self._plant, self._generator, self._per_period
         first, stamp_ns = plant.tick, plant.stamp_ns
-        deputy = plant.held_or_resting
+        deputy = plant.deputy_body
         if not (deputy.holder or deputy.rests):
             return None  # it drifts, and C does not move it
         until_ns = generator.quiet_until(stamp_ns, deputy_rests=deputy.rests)
