@@ -17,7 +17,11 @@ from typing import Any
 DEADLINE_S = 60.0  # s of wall time after which a test that waits has failed; nothing is measured by it
 
 _CODE = re.compile(r"\x1b\[([0-9;?]*)([A-Za-z])|(.)", re.DOTALL)
-_TAKE_TERMINAL = "import fcntl, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0)\n"
+# A login shell's child has its signals; one of a background job has SIGINT and, under nohup, SIGHUP ignored.
+_TAKE_TERMINAL = (
+    "import fcntl, signal, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0)\n"
+    "signal.signal(signal.SIGINT, signal.default_int_handler); signal.signal(signal.SIGHUP, signal.SIG_DFL)\n"
+)
 
 
 def _inherited() -> dict[str, str]:
