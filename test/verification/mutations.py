@@ -28,7 +28,7 @@ else:
 ROOT = Path(__file__).resolve().parents[2]
 COPIED = (
     *("sms_handover", "benchmarks", "config", "docs", "examples", "launch", "test"),
-    *("pyproject.toml", "package.xml", "setup.py"),
+    *("pyproject.toml", "package.xml", "setup.py", "README.md", "CONTRIBUTING.md"),
 )
 # The fast tests, in the order in which they are asked when the likely one has not noticed.
 FAST = (
