@@ -57,8 +57,7 @@ def _merged_by_name(items: list[Mapping], changes: Any, file: Path) -> list[Mapp
         elif name in result:
             result[name] = merged(result[name], change, file)
         else:
-            result[name] = standing_in(change, file)
-            result[name] = copy(result[name])
+            result[name] = copy(standing_in(change, file))
             result[name].setdefault(_NAME, name)
     return list(result.values())
 

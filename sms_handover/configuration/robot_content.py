@@ -1,6 +1,8 @@
 """Content of a robot file: its YAML with the description files of its arms in their places."""
 
+from collections.abc import Callable
 from copy import copy
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +24,13 @@ def with_arm_descriptions(content: Mapping, folder: Path) -> Mapping:
 
     Anything that is not as a robot has it is left to the reader of robots.
     """
-    arms = content.get(_ARMS)
+    arms, read = content.get(_ARMS), cache(read_yaml)  # arms of one kind name the same file
     result = copy(content)
     if isinstance(arms, list):
-        result[_ARMS] = [_described(arm, folder) for arm in arms]
+        result[_ARMS] = [_described(arm, folder, read) for arm in arms]
     elif isinstance(arms, Mapping):
         named = copy(arms)
-        named.update({name: _described(arm, folder) for name, arm in arms.items()})
+        named.update({name: _described(arm, folder, read) for name, arm in arms.items()})
         result[_ARMS] = named
     if isinstance(content.get(_CLEARANCE), Mapping):
         result[_CLEARANCE] = _placed(content[_CLEARANCE], folder)
@@ -48,11 +50,11 @@ def _placed(value: Any, folder: Path) -> Any:
     return result
 
 
-def _described(arm: Any, folder: Path) -> Any:
+def _described(arm: Any, folder: Path, read: Callable[[Path], Mapping]) -> Any:
     """Return an arm with its description file read, if it names one."""
     name = arm.get(_DESCRIPTION) if isinstance(arm, Mapping) else None
     if not isinstance(name, str) or not name:
         return arm
     result = copy(arm)
-    result[_DESCRIPTION] = read_yaml(folder / name)
+    result[_DESCRIPTION] = read(folder / name)
     return result

@@ -75,7 +75,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
 
     def prepare(self) -> None:
         """Create the bag; raises ConfigurationError if it cannot."""
-        self._scenario_text = scenario_text(self.common)
+        self._scenario_text = scenario_text(self.common, self.scenario)
         folder = self.parameters.folder or datetime.now().strftime("handover_%Y_%m_%d-%H_%M_%S")
         try:
             self._recordings = RunRecordings(Path(folder), self._describe, self.parameters.split)

@@ -51,9 +51,9 @@ def dry_run(scenario: Scenario, progress: Progress | None = None) -> DryRun:
     loop = Loop(known)
     found: list[Collision] = []
     while not loop.finished:
-        tick = loop.advance()
-        if tick.period and tick.period.clearance:
-            found.extend(tick.period.clearance.collisions)
+        period = loop.advance_period().period
+        if period and period.clearance:
+            found.extend(period.clearance.collisions)
             if progress:
-                progress(tick.stamp_ns, tick.phase)
+                progress(period.phase.stamp_ns, period.phase)
     return DryRun(tuple(found))

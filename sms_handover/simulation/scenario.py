@@ -155,21 +155,20 @@ def load_scenario(
     return Scenario(parameters, truth, model, of_nodes)
 
 
-def load_world(common: CommonParameters, role: str, scenario: ScenarioFile | None = None) -> World:
-    """Return robot and schedule that the parameters name, for a role, ``truth`` or ``model``.
+def load_world(common: CommonParameters, role: str, scenario: ScenarioFile) -> World:
+    """Return robot and schedule of a scenario for a role, ``truth`` or ``model``.
 
-    ``scenario`` is the one that they name, if it has been read. Raises ConfigurationError.
+    What the parameters give in place of its files and values lies over it. Raises ConfigurationError.
     """
-    scenario = scenario or load_scenario_file(common.scenario)
     documents = documents_of(scenario, _replacements(common), role)
     robot = RobotModel(robot_of(documents.robot))
     text = documents.schedule_text
     return World(robot, schedule_of(documents.schedule, text, robot, common.reference_ns))
 
 
-def scenario_text(common: CommonParameters) -> str:
-    """Return the scenario that the parameters name as YAML that needs no other file, for the record."""
-    return as_yaml(resolved(load_scenario_file(common.scenario), _replacements(common)))
+def scenario_text(common: CommonParameters, scenario: ScenarioFile) -> str:
+    """Return a scenario, with what the parameters give, as YAML that needs no other file, for the record."""
+    return as_yaml(resolved(scenario, _replacements(common)))
 
 
 def _replacements(common: CommonParameters) -> Replacements:

@@ -32,10 +32,11 @@ def scenario_yaml(name: str) -> str:
     ConfigurationError where the scenario cannot be loaded.
     """
     parameters = load_scenario(name).parameters
-    text = scenario_text(parameters.common).rstrip()
+    scenario = load_scenario_file(name)
+    text = scenario_text(parameters.common, scenario).rstrip()
     of_roles = tuple(value for value in parameters.common.values if any(roles_of([value])))
     parameters = replace(parameters, common=replace(parameters.common, values=of_roles))
-    given = load_scenario_file(name).parameters[COMMON]
+    given = scenario.parameters[COMMON]
     apart = _WRITTEN_OUT | (_HOW - given.keys()) | (set() if of_roles else {"values"})
     short = [
         f"{key}: {_written(getattr(getattr(parameters, section), key))}" for key, section in SHORT.items()

@@ -32,7 +32,7 @@ def test_a_shipped_scenario_can_be_run_and_is_written_out_as_itself(name: str, t
     scenario = load_scenario(name)
     check_scenario(scenario)
     assert load_scenario_file(name).description
-    text = scenario_text(scenario.parameters.common)
+    text = scenario_text(scenario.parameters.common, load_scenario_file(name))
     again = load_scenario(_file(tmp_path, text), {"common": {"duration": 1.0}})
     for one, other in ((scenario.truth, again.truth), (scenario.model, again.model)):
         assert one.robot.urdf == other.robot.urdf

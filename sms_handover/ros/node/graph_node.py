@@ -49,8 +49,9 @@ class GraphNode(LifecycleNode, Generic[P]):
         self._invalid: ConfigurationError | None = None
         transport = EXECUTOR
         try:
-            scenario = named_scenario(self).parameters
-            common, own = scenario[COMMON], scenario.get(name) if shipped else None
+            self.scenario = named_scenario(self)
+            given = self.scenario.parameters
+            common, own = given[COMMON], given.get(name) if shipped else None
             self.common: CommonParameters = declare(self, CommonParameters, "common.yaml", EVERY_NODE, common)
             group = self.parameter_group(group, own or {})
             self.parameters: P = declare(self, group, f"{name}.yaml" if shipped else None, name, own)
@@ -114,7 +115,7 @@ class GraphNode(LifecycleNode, Generic[P]):
         if self._invalid is not None:
             raise self._invalid
         role = TRUTH if self.get_name() in WITH_TRUTH else MODEL
-        world = load_world(self.common, role)
+        world = load_world(self.common, role, self.scenario)
         self.robot: RobotModel = world.robot
         self.schedule: Schedule = world.schedule
         topics = graph_topics(self.robot.arms, clearance=self.common.measures_clearance)
