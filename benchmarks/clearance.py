@@ -9,12 +9,11 @@ import pinocchio as pin
 from benchmarks.results import Result, Table, publish, row
 from benchmarks.timing import interleaved
 from sms_handover.clearance.allowed_pairs import counted_pairs
-from sms_handover.clearance.distances import ClearanceModel
 from sms_handover.clearance.solids import read_solids
 from sms_handover.model.shapes import ContactPairs
 from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.scenario import load_scenario
-from sms_handover.simulation.wiring import make_monitor
+from sms_handover.simulation.wiring import make_clearance, make_monitor
 from sms_handover.types import Array
 
 STEP, COUNT = 10, 60  # ticks between two configurations of the handover, and how many there are
@@ -32,7 +31,7 @@ def main() -> None:
         if tick.stamp_ns % (STEP * scenario.parameters.common.tick_ns) == 0:
             poses.append(tick.q)
     deputy = schedule.deputy.deputy_in_world
-    model = ClearanceModel(robot.pin, robot.urdf, robot.arms, schedule.deputy.size)
+    model = make_clearance(robot, schedule)
     monitor = make_monitor(robot, schedule, scenario.parameters.common)
     geometry = read_solids(robot.pin, robot.urdf)
     pairs = counted_pairs(robot.pin, geometry, ContactPairs())

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-import yaml
 
+from sms_handover.configuration.documents import as_yaml
 from sms_handover.ik.levenberg_marquardt import find_joints
 from sms_handover.ik.parameters import IkParameters
 from sms_handover.model.poses import pose_from_xyz_rpy, pose_of, se3_of
@@ -290,15 +290,7 @@ def schedule_text(geometry: Geometry) -> str:
         },
         "phases": [{**phase, "duration": _DURATION, "motion": _MOTION} for phase in phases],
     }
-    return yaml.dump(content, Dumper=_Plain, sort_keys=False, default_flow_style=None, width=110)
-
-
-class _Plain(yaml.SafeDumper):
-    """Writes what occurs twice twice."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        """Return True: no aliases."""
-        return True
+    return as_yaml(content)
 
 
 def _guess(random: np.random.Generator) -> Array:

@@ -17,7 +17,7 @@ from sms_handover.model.reduced import base_twist_per_joint_rate
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.deputy import GraspTolerance, MasslessDeputy
 from sms_handover.plant.grasping import execute_grasp
-from sms_handover.simulation.wiring import initial_joints
+from sms_handover.simulation.wiring import initial_joints, make_clearance
 from sms_handover.trajectory.generator import goal_in_world
 from sms_handover.trajectory.schedule import GraspFrameTarget, JointTarget, Phase, Schedule, ToolTarget
 from sms_handover.types import Array, GraspStatus, IkRequest, Pose, Twist, freeze
@@ -180,8 +180,7 @@ class _Walk:
     @cached_property
     def _clearance(self) -> ClearanceModel:
         """The distances of the bodies, made where a restart needs them."""
-        robot = self._robot
-        return ClearanceModel(robot.pin, robot.urdf, robot.arms, self._schedule.deputy.size)
+        return make_clearance(self._robot, self._schedule)
 
     @cached_property
     def _of_robot(self) -> list[int]:

@@ -86,9 +86,14 @@ def make_ik(robot: RobotModel, common: CommonParameters, parameters: IkParameter
     return lambda request: find_joints(robot, request, parameters)
 
 
+def make_clearance(robot: RobotModel, schedule: Schedule) -> ClearanceModel:
+    """Return the distances of the bodies of robot and deputy; raises RobotDescriptionError."""
+    return ClearanceModel(robot.pin, robot.urdf, robot.arms, schedule.deputy.size)
+
+
 def make_monitor(robot: RobotModel, schedule: Schedule, common: CommonParameters) -> ClearanceMonitor:
     """Return what measures the clearance of a run as it goes on; raises RobotDescriptionError."""
-    model = ClearanceModel(robot.pin, robot.urdf, robot.arms, schedule.deputy.size)
+    model = make_clearance(robot, schedule)
     return ClearanceMonitor(model, schedule.grasping_arms, common.contact_depth)
 
 
