@@ -44,9 +44,9 @@ _BASE = {
     "drift_attitude_rate": "drift of the attitude: change over duration",
 }
 _PHYSICS = {
-    "largest_linear_momentum": "largest change of the linear momentum of robot and deputy, 0 in exact arithmetic",
-    "largest_angular_momentum": "largest change of their angular momentum about the centre of mass, 0 too",
-    "energy_residual": "largest |energy gained - work + heat| over the largest kinetic energy, 0 too",
+    "largest_linear_momentum": "largest change of the linear momentum of robot and deputy: rounding",
+    "largest_angular_momentum": "largest change of their angular momentum about the centre of mass, likewise",
+    "energy_residual": "largest |energy gained - work + heat| over the largest kinetic energy",
     "peak_kinetic_energy": "largest kinetic energy",
     "external_work": "work of wrenches from outside",
     "energy_lost": "kinetic energy that has become heat, in grips that close and in joints",

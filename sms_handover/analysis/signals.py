@@ -111,7 +111,7 @@ def linear_momentum_change(run: RunData) -> Signal:
 
 
 def angular_momentum_change(run: RunData) -> Signal:
-    """Return L(t) - L(0) in kg m^2/s about the common centre of mass in ``world`` axes; zero up to rounding."""
+    """Return L(t) - L(0) in kg m^2/s about the common centre of mass in ``world`` axes, likewise."""
     change = run.angular_momentum - _first(run.angular_momentum)
     return _signal("change of angular momentum", "kg m^2/s", run.reference_ns, change, AXES)
 

@@ -142,7 +142,7 @@ _PASSED_ON: tuple[tuple[str, Callable[[GraspEvent], float]], ...] = (  # with a 
 def _reached(
     events: Sequence[GraspEvent | None], tolerance: Tolerance | None
 ) -> Iterator[tuple[str, Callable[[GraspEvent], float]]]:
-    """Yield the errors at a grasp with what is allowed; older versions neither recorded nor judged the rate."""
+    """Yield the errors at a grasp with what is allowed; older versions did not record the rate."""
     for what, value, limit in _REACHED:
         if any(event and not isnan(value(event)) for event in events) or what != _REACHED[-1][0]:
             judged = tolerance and not isinf(limit(tolerance))
@@ -243,18 +243,13 @@ def _peak_and_rms(metrics: RunMetrics, joint: str) -> str:
 
 
 def _conservation_rows(runs: Sequence[RunMetrics]) -> tuple[Row, ...]:
+    physics = [item.physics for item in runs]
     return (
-        row("largest change of linear momentum [kg m/s]", runs, lambda item: item.physics.linear_momentum),
-        row(
-            "largest change of angular momentum [kg m^2/s]", runs, lambda item: item.physics.angular_momentum
-        ),
-        row("largest |dE - W| / max E [-]", runs, lambda item: item.physics.energy),
-        row("peak kinetic energy [J]", runs, lambda item: item.physics.peak_kinetic_energy),
-        *(
-            row(label, runs, lambda item, value=value: value(item.physics))
-            for label, value in _ACCOUNT
-            if any(value(item.physics) for item in runs)
-        ),
+        row("largest change of linear momentum [kg m/s]", physics, lambda of: of.linear_momentum),
+        row("largest change of angular momentum [kg m^2/s]", physics, lambda of: of.angular_momentum),
+        row("largest |dE - W| / max E [-]", physics, lambda of: of.energy),
+        row("peak kinetic energy [J]", physics, lambda of: of.peak_kinetic_energy),
+        *(row(label, physics, value) for label, value in _ACCOUNT if any(map(value, physics))),
         row("IK solves", runs, lambda item: float(item.ik.solves)),
         _cost("IK solves that failed", runs, lambda item: float(item.ik.failures)),
     )

@@ -133,8 +133,8 @@ def plot_groups(runs: Sequence[RunData]) -> tuple[PlotGroup, ...]:
         PlotGroup(
             "Conservation",
             "Without forces from outside the momenta of robot and deputy together stay what they were at the "
-            "start, also as the deputy changes hands, and kinetic energy is work less heat; the residuals are "
-            "rounding errors.",
+            "start, also as the deputy changes hands, and kinetic energy is work less heat; the residuals "
+            "are rounding errors.",
             plots((*_MOMENTA, *(_CHANGES if begun else ()), *_ENERGY), [""]),
         ),
     )

@@ -65,8 +65,7 @@ def test_what_changes_hands_is_accounted_for(robot: RobotModel, mass: float) -> 
     """Grasp, transfer and release in random states, with no time passing: a tick of 1 ns.
 
     Momenta of both together stay to 1e-12 of what is exchanged and rounding. The impulse alone says how the
-    deputy moves afterwards, and that is how the hand moves. The kinetic energy that goes is the heat told, and
-    it is that of the equations of motion of both with the bond as a constraint.
+    deputy moves afterwards, and that is how the hand moves. The kinetic energy that goes is the heat told.
     """
     draw = Draw(robot, seed=round(10.0 * mass))
     for _ in range(5):
@@ -136,7 +135,7 @@ def test_nothing_jumps_where_the_deputy_moves_with_the_hand(robot: RobotModel, d
 
 
 def test_the_event_tells_how_deputy_and_hand_moved(robot: RobotModel, draw: Draw) -> None:
-    """The relative twist is V_d - J v in ``world`` axes about the deputy's origin, its second half the rate."""
+    """The relative twist is V_d - J v about the deputy's origin, in ``world`` axes."""
     plant = moving(draw, 4.0, speed=1.0, tick_ns=_MS)
     twist, v, q = twist_of_deputy(plant), plant.v, plant.q
     deputy = se3_of(plant.deputy.deputy_in_world)
@@ -149,7 +148,7 @@ def test_the_event_tells_how_deputy_and_hand_moved(robot: RobotModel, draw: Draw
 
 
 def test_a_captured_deputy_is_carried_with_its_momentum(robot: RobotModel, draw: Draw) -> None:
-    """A tenth of a second in each hand under efforts: momenta stay, energy is work less heat, nothing slips."""
+    """A tenth of a second in each hand: momenta stay, energy is work less heat, nothing slips."""
     plant = moving(draw, 12.0, speed=0.1, tick_ns=_MS)
     start = plant.conserved
     effort = draw.effort(plant.q, 0.5)
@@ -176,8 +175,8 @@ def test_a_captured_deputy_is_carried_with_its_momentum(robot: RobotModel, draw:
 def test_a_free_deputy_turns_as_a_symmetric_top(draw: Draw) -> None:
     """Five seconds at 60 deg/s against the closed form, its centre of mass off its origin and drifting.
 
-    With I_t across and I_a along the axis z of symmetry L stays, the axis goes round L at |L| / I_t, and the
-    body turns about its axis at w_z (1 - I_a / I_t) besides: R(t) = exp(L t / I_t) R0 exp(z w_z (1 - I_a / I_t) t).
+    With I_t across and I_a along the axis z of symmetry, L stays, the axis goes round L at |L| / I_t, and the
+    body turns about its axis besides: R(t) = exp(L t / I_t) R0 exp(z w_z (1 - I_a / I_t) t).
     """
     across, along, com = 0.16, 0.07, np.array([0.02, -0.03, 0.05])  # [kg m^2], [kg m^2], [m]
     inertia = pin.Inertia(12.0, com, np.diag([across, across, along]))

@@ -36,7 +36,11 @@ from .conftest import Draw, MakeScenario, state_of
 from .loop_rest import bytes_of, digest_of_rest
 
 _TICK_NS = 1_000_000  # [ns]
-_TOLERANT: dict[str, object] = {"grasp_speed_tolerance": 0.2, "grasp_rate_tolerance": 0.5}  # [m/s], [rad/s]
+_TOLERANT: dict[str, object] = {
+    "grasp_position_tolerance": 0.05,  # [m]
+    "grasp_speed_tolerance": 0.2,  # [m/s]
+    "grasp_rate_tolerance": 0.5,  # [rad/s]
+}
 _PASSING: dict[str, object] = {
     "mass": 12.0,  # [kg]
     "twist_in_world": {"linear": [0.05, 0.0, 0.0], "angular": [0.0, 0.1, 0.05]},  # [m/s], [rad/s]
@@ -72,6 +76,7 @@ def test_a_payload_is_a_further_link_fixed_to_the_tool(robot: RobotModel, draw: 
       <joint name="grip" type="fixed"><parent link="{arm}_tool"/><child link="cargo"/>
       <origin xyz="{xyz}" rpy="{rpy}"/></joint></robot>"""
     expected = floating_model(robot.urdf.replace("</robot>", cargo))
+    expected.gravity.setZero()
     bare = [inertia.toDynamicParameters() for inertia in robot.pin.inertias]
     loaded = carrying(robot, arm, body, place)
     assert loaded.mass == pytest.approx(robot.mass + 12.0)
@@ -115,7 +120,7 @@ def controller_of(scenario: Scenario, robot: RobotModel | None = None, mass: boo
 
 
 def test_a_law_carries_from_the_first_state_after_the_event(make_scenario: MakeScenario) -> None:
-    """At the state of the event its efforts are those of the bare robot, to the bit; then of the loaded one."""
+    """At the state of the event its efforts are those of the bare robot, to the bit; then of both."""
     scenario = make_scenario(deputy={"mass": 12.0})
     robot, deputy = scenario.truth.robot, scenario.truth.schedule.deputy
     draw = Draw(robot, seed=3)
@@ -144,7 +149,7 @@ def test_a_law_carries_from_the_first_state_after_the_event(make_scenario: MakeS
 
 
 def test_tools_move_as_asked_on_a_robot_with_momentum(make_scenario: MakeScenario) -> None:
-    """With the joint rates of the reference, and a base that moves as its momentum says, targets stay on course.
+    """Tools have the twists asked for at the joint rates of the reference, with the base as momentum says.
 
     The hands shall stand still in the world while the whole spins after a capture. Without the part of the
     momentum they would be carried along at several millimetres per second.
@@ -162,7 +167,7 @@ def test_tools_move_as_asked_on_a_robot_with_momentum(make_scenario: MakeScenari
     tools, still = robot.tools_at(q), Twist(np.zeros(3), np.zeros(3))
     state = state_of(robot, q, v)
     twists = {"arm_a": still, "arm_b": Twist(np.array([0.01, 0.0, -0.02]), np.array([0.0, 0.03, 0.0]))}
-    targets = Targets(joints, np.zeros(14), tools, twists)
+    targets = Targets(0, tools, twists, joints, np.zeros(14))
     reference, _ = generator.reference(state, targets, joints)
     inertia = pin.crba(loaded.pin, loaded.data, q, pin.Convention.LOCAL)
     momentum = inertia[:BASE_NV] @ v
@@ -170,7 +175,7 @@ def test_tools_move_as_asked_on_a_robot_with_momentum(make_scenario: MakeScenari
     base = np.linalg.solve(inertia[:BASE_NV, :BASE_NV], momentum - inertia[:BASE_NV, BASE_NV:] @ rates)
     for arm, twist in twists.items():
         _, moves = robot.tool_motion(q, np.concatenate([base, rates]), arm)
-        np.testing.assert_allclose(moves.row, twist.row, rtol=0.0, atol=1e-7)  # [m/s], [rad/s] of the damping
+        np.testing.assert_allclose(moves.row, twist.row, rtol=0.0, atol=1e-6)  # [m/s], [rad/s] by the damping
     carried = carried_twist(state.base_in_world, drift_of_base(loaded, q, v), tools["arm_a"].position)
     assert np.linalg.norm(carried.linear) > 2e-3  # [m/s] it would be off by that
     whole = generalized_jacobian(loaded, q, "arm_a") @ v[BASE_NV:] + carried.row
@@ -225,7 +230,11 @@ def test_a_run_with_a_payload_conserves_and_says_what_it_lost(tmp_path: Path) ->
 
 
 def test_a_deputy_of_almost_no_mass_is_as_good_as_massless(tmp_path: Path) -> None:
-    """The limit is that of a deputy without mass, whose twist does not matter to the robot."""
-    light, none = (simulate(load_scenario("colliding", passing(tmp_path, mass=mass))) for mass in (1e-9, 0.0))
+    """Also where it passes by and is caught; tumbling it would turn otherwise than without mass."""
+    drifts = {"linear": [0.05, 0.0, 0.0], "angular": [0.0, 0.0, 0.0]}  # [m/s], [rad/s]
+    light, none = (
+        simulate(load_scenario("colliding", passing(tmp_path, mass=mass, twist_in_world=drifts)))
+        for mass in (1e-9, 0.0)
+    )
     np.testing.assert_allclose(light.joint_position, none.joint_position, rtol=0.0, atol=1e-8)  # [rad]
     assert np.any(light.joint_position != none.joint_position)
