@@ -384,8 +384,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "lever arm of the held deputy with the wrong sign",
         "plant/deputy",
-        "_cross(tool_twist_in_world.angular, lever)",
-        "_cross(lever, tool_twist_in_world.angular)",
+        "linear = tool_twist_in_world.linear + _cross(tool_twist_in_world.angular, lever)",
+        "linear = tool_twist_in_world.linear + _cross(lever, tool_twist_in_world.angular)",
         "deputy",
     ),
     _core(
