@@ -1,6 +1,7 @@
 """Reference periods in C: as many as there are while nothing has to be decided, in one call."""
 
 import ctypes
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -16,10 +17,11 @@ from sms_handover.model.poses import pose_row
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.deputy import MasslessDeputy
 from sms_handover.trajectory.generator import Course
-from sms_handover.types import JointReference, PeriodRows, Pose, TickRows, Twist, read_only
+from sms_handover.types import Array, JointReference, PeriodRows, Pose, TickRows, Twist, read_only
 from sms_handover.units import ns_to_seconds
 
 Failures = tuple[int, int]
+Room = Callable[[int], Array]  # where the rows (13 + 4 n,) of so many ticks are to be written
 _HOLD, _JOINTS, _TOOL = range(3)  # how an arm is led, as in native/periods.c
 
 
@@ -41,20 +43,26 @@ class CompiledPeriods:
         self._call = NativeFunction(dynamics_library(known), PERIODS, kinds)
 
     def run(
-        self, course: Course, before: JointReference, first_ns: int, deputy: MasslessDeputy, failed: Failures
+        self,
+        course: Course,
+        before: JointReference,
+        first_ns: int,
+        deputy: MasslessDeputy,
+        failed: Failures,
+        room: Room | None = None,
     ) -> tuple[TickRows, PeriodRows, int]:
         """Carry out at most the periods of a course, all of them integrated, from a time on.
 
         ``before`` is the reference of the period before; ``failed`` the failures of inverse kinematics in a
-        row so far, and the number at which the periods end, 0 for never. Returns ticks, periods, and the
-        failures then.
+        row so far, and the number at which the periods end, 0 for never. Ticks are written to ``room``, by
+        default to a new array. Returns ticks, periods, and the failures then.
         """
         quiet, count = self._quiet, len(course.progress)
         self._set(course, before, deputy, failed)
         quiet["period_s"] = ns_to_seconds(first_ns - before.stamp_ns)
         periods, progress = np.zeros(count, self._layout), np.ascontiguousarray(course.progress)
         ticks = self._ticks
-        rows = ticks.room(count * self._per_period)
+        rows = (room or ticks.room)(count * self._per_period)
         ticks.take_over()
         given = tuple(array.ctypes.data for array in (self._settings, quiet, progress, periods, rows))
         done = self._call(*ticks.address, *given, count, self._per_period)
