@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from sms_handover.compiled.c_function import CFunction, NativeFunction
+from sms_handover.control.controller import JointController
+from sms_handover.control.nmpc import NmpcLaw
 from sms_handover.control.protocol import Guidance
 from sms_handover.run_data import RunData
 from sms_handover.simulation import loop as loop_module
@@ -61,9 +63,9 @@ def runner_of(scenario: Scenario) -> PeriodRunner:
 def rest_of(loop: Loop) -> tuple[RunData, int]:
     """Return the rest of a run, and in how many calls it was carried out."""
     robot = loop.scenario.model.robot
-    recorder, calls = RunRecorder(robot.joint_names, robot.arms), 0
+    recorder, calls = RunRecorder(robot.joint_names, robot.arms, 100), 0  # ticks, of which there are more
     while not loop.finished:
-        recorder.add(loop.advance_quietly())
+        recorder.add(loop.advance_quietly(recorder.room))
         calls += 1
     return recorder.data(), calls
 
@@ -171,6 +173,29 @@ def test_what_is_no_number_stays_none(tmp_path: Path) -> None:
     for name in ("q", "v", "effort", "joint_effort"):
         found, expected = (getattr(run[0].rows, name)[:_PERIOD] for run in (ours, theirs))
         assert np.array_equal(found, expected, equal_nan=True), name
+
+
+@pytest.mark.parametrize("odd", [np.nan, np.inf])
+@pytest.mark.parametrize("law", LAWS)
+def test_a_law_that_gives_no_number(law: str, odd: float, tmp_path: Path) -> None:
+    """From a gain or a memory that is none, or infinite: the same efforts, states and events to the end."""
+    values = {"controller": LAWS[law], "trajectory": {"time_law": "step", "ik_failures": 3}}
+    scenario = load_scenario(values=merged(retried_handover(tmp_path), COMPILED, values))
+    runs = []
+    for loop in (Loop(scenario), python_loop(scenario)):
+        for _ in range(3):
+            loop.advance_period()
+        assert isinstance(loop._controller, JointController)
+        inner = loop._controller.law
+        if isinstance(inner, NmpcLaw):
+            inner.feedback[0] = odd
+        else:
+            inner.restore(np.full(scenario.model.robot.n_joints, odd))
+        runs.append((*rest_of(loop), loop.last_tick))
+    (found, fewer, last), (expected, calls, theirs) = runs
+    require_same(found, expected)
+    assert last == theirs and fewer < calls
+    assert np.isnan(found.joint_command).any()
 
 
 @pytest.mark.parametrize("time_law", ["step", "quintic"])
