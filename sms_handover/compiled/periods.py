@@ -8,7 +8,15 @@ import numpy as np
 
 from sms_handover.compiled.c_function import NativeFunction
 from sms_handover.compiled.inverse_kinematics import STATUSES, ik_settings
-from sms_handover.compiled.kinematics import CONSERVED_SIZE, POSE, POSE_ROW, TWIST, numbers_of
+from sms_handover.compiled.kinematics import (
+    CONSERVED_SIZE,
+    POSE,
+    POSE_ROW,
+    TWIST,
+    numbers_of,
+    quantities_of,
+    sums_of,
+)
 from sms_handover.compiled.library import dynamics_library
 from sms_handover.compiled.names import PERIODS
 from sms_handover.compiled.ticks import CompiledTicks
@@ -16,6 +24,7 @@ from sms_handover.ik.parameters import IkParameters
 from sms_handover.model.poses import pose_row, twist_in_deputy
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.deputy import MasslessDeputy
+from sms_handover.plant.rigid_deputy import RigidDeputy
 from sms_handover.trajectory.generator import Course
 from sms_handover.types import Array, JointReference, PeriodRows, Pose, TickRows, Twist, read_only
 from sms_handover.units import ns_to_seconds
@@ -85,7 +94,7 @@ class CompiledPeriods:
                 quiet["starts"][index] = pose_row(course.starts[arm])
                 quiet["goals"][index] = pose_row(course.goals[arm])
         quiet["joints"], quiet["ends"], quiet["rates"] = course.joints, course.ends, before.velocity
-        quiet["damping"] = course.damping
+        quiet["damping"], quiet["has_momentum"] = course.damping, course.has_momentum
         quiet["holder"] = self._arms.index(deputy.holder) if deputy.holder else -1
         quiet["in_tool"] = numbers_of(deputy)
         quiet["deputy"] = pose_row(deputy.state.deputy_in_world)
@@ -94,7 +103,10 @@ class CompiledPeriods:
 
     def _rows(self, periods: Any, ticks: TickRows) -> PeriodRows:
         """Return periods by name."""
-        conserved = periods["conserved"]
+        plant, conserved = self._ticks.plant, periods["conserved"]
+        if isinstance(plant.deputy_body, RigidDeputy) and not plant.deputy_body.holder:
+            for sums in conserved:
+                sums[:] = sums_of(plant.with_deputy(quantities_of(np.array(sums))))
         return PeriodRows(
             stamp_ns=ticks.stamp_ns[:: self._per_period],
             reference_position=periods["reference"],
@@ -107,8 +119,8 @@ class CompiledPeriods:
             angular_momentum=conserved[:, 3:6],
             kinetic_energy=conserved[:, 9],
             work=periods["work"],
-            external_work=np.full(len(periods), self._ticks.plant.external_work),
-            lost=np.full(len(periods), self._ticks.plant.losses),
+            external_work=np.full(len(periods), plant.external_work),
+            lost=np.full(len(periods), plant.losses),
             ik_status=tuple(None if k < 0 else STATUSES[k] for k in periods["status"].astype(int).tolist()),
         )
 
@@ -119,6 +131,7 @@ def _quiet(joints: int, arms: int) -> Any:
     reals |= {"joints": joints, "ends": joints, "rates": joints}
     reals |= {"in_tool": POSE, "deputy": POSE_ROW, "deputy_twist": TWIST, "damping": (), "period_s": ()}
     counts: dict[str, Any] = {"kind": arms, "holder": (), "failures": (), "most_failures": ()}
+    counts |= {"has_momentum": ()}
     fields = [(name, "f8", shape) for name, shape in reals.items()]
     return np.dtype([*fields, *((name, "i8", shape) for name, shape in counts.items())])
 

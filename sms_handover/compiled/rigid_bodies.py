@@ -138,6 +138,10 @@ class RigidBodies:
         columns = zip(*(row[BASE_NV:] for row in matrix[:BASE_NV]), strict=True)
         return [substituted(factors, -ca.vertcat(*column)) for column in columns]
 
+    def drift(self) -> Expression:
+        """Return H_b^-1 h_b: the twist (6,) of the base that its momentum h_b leaves with joints at rest."""
+        return substituted(factored(self._base_inertia()), ca.vertcat(*self.momentum()))
+
     def _velocity_wrenches(self) -> list[tuple[Expression, Expression]]:
         """Return the wrench that keeps the twist of each body, by Newton and Euler."""
         wrenches = []

@@ -64,7 +64,7 @@ def inertial_parameters(bodies: Sequence[Body]) -> Array:
     return read_only(np.array(rows).ravel())
 
 
-@lru_cache(maxsize=4)  # a loop asks a dozen times for the same one or two robots
+@lru_cache(maxsize=8)  # a loop asks a dozen times for the same robots, in truth and model, bare and loaded
 def body_tree(robot: RobotModel) -> tuple[Body, ...]:
     """Return the bodies, base first, then one for each joint in the order of ``robot.joint_names``."""
     model = robot.pin
