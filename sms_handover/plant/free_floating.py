@@ -219,7 +219,10 @@ class FreeFloatingPlant:
     @property
     def conserved(self) -> ConservedQuantities:
         """Return momenta, energy and centre of mass of robot and deputy."""
-        of_robot = self._kinematics.conserved(self.q, self.v)
+        return self.with_deputy(self._kinematics.conserved(self.q, self.v))
+
+    def with_deputy(self, of_robot: ConservedQuantities) -> ConservedQuantities:
+        """Return what is conserved of robot and deputy, by that of the robot with what it carries."""
         if not isinstance(self._deputy, RigidDeputy) or self._deputy.holder:
             return of_robot
         return together(of_robot, self._robot.mass, self._deputy.conserved, self._deputy.inertia.mass)

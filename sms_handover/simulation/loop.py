@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from sms_handover.clearance.monitor import PeriodClearance
-from sms_handover.compiled.periods import CompiledPeriods
+from sms_handover.compiled.periods import CompiledPeriods, Room
 from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.control.law import Need
 from sms_handover.control.protocol import Carrying, CheckedController, Controller, Guidance
@@ -238,10 +238,13 @@ class Loop:
             excesses[last] = excesses.get(last, ()) + plant.end_excesses()
         return rows, excesses
 
-    def advance_quietly(self) -> Ticks | QuietPeriods:
-        """Carry out as many reference periods as there are without a decision, or the next one."""
+    def advance_quietly(self, room: Room | None = None) -> Ticks | QuietPeriods:
+        """Carry out as many reference periods as there are without a decision, or the next one.
+
+        The rows of quiet periods may be in the ``room`` for them that is returned for a number of ticks.
+        """
         if self._quiet and not self.finished and self._plant.tick % self._per_reference == 0:
-            quiet = self._quiet.run(self._guidance, self.last_tick)
+            quiet = self._quiet.run(self._guidance, self.last_tick, room)
             if quiet:
                 for self._guidance in quiet.guidance:
                     self._controller.guide(self._guidance)
