@@ -23,7 +23,7 @@ class RandomStreams:
 
     def sequence(self, name: str) -> np.random.SeedSequence:
         """Return what the numbers of a model follow from."""
-        digest = int.from_bytes(sha256(name.encode()).digest()[:_DIGEST_BYTES])
+        digest = int.from_bytes(sha256(name.encode()).digest()[:_DIGEST_BYTES], "big")
         return np.random.SeedSequence(self._seed, spawn_key=(self._case, digest))
 
     def parameters(self, name: str) -> np.random.Generator:

@@ -41,7 +41,9 @@ def with_histories(content: Mapping, folder: Path) -> Mapping:
     result, changed = copy(content), copy(wrenches)
     for name, wrench in wrenches.items():
         history = wrench.get(_HISTORY) if isinstance(wrench, Mapping) else None
-        file = history.get(_FILE) if isinstance(history, Mapping) else None
+        if not isinstance(history, Mapping):
+            continue
+        file = history.get(_FILE)
         if isinstance(file, str):
             inner = copy(history)
             del inner[_FILE]

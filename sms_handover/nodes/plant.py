@@ -66,7 +66,7 @@ class PlantNode(GraphNode[PlantParameters]):
     def prepare(self) -> None:
         """Place robot and deputy at the start of the schedule."""
         schedule = self.schedule
-        self._plant = make_plant(self.robot, schedule, self.common, self.parameters)
+        self._plant = make_plant(self.robot, schedule, self.common, self.parameters, self.conditions)
         self._deputy_size = schedule.deputy.size
         self._end_ns = schedule.end_ns
         self.lockstep = self.common.mode == LOCKSTEP

@@ -43,16 +43,28 @@ class PlantEffects:
         self._stepper: ConditionedStepper | None = None
         self._path: CommandPath | None = None
         self._motor: MotorTorque | None = None
+        self.external = NO_ACCOUNT
         self.seed(seed)
 
+    @property
+    def has_wrenches(self) -> bool:
+        """Whether wrenches from outside act."""
+        return bool(self._resistance.wrenches)
+
+    def reset(self) -> None:
+        """Go back to the start of a run."""
+        if self._path:
+            self._path.reset()
+        self.external = NO_ACCOUNT
+
     def seed(self, seed: int) -> None:
-        """Let every random stream follow from a seed, and go back to the start of a run."""
+        """Let every random stream follow from a seed, from the start of a run on."""
         streams, conditions = RandomStreams(seed), self._conditions
         if conditions.command:
             self._path = CommandPath(self._joints, self._delay, conditions.command.dropped, streams)
         if conditions.torque:
             self._motor = MotorTorque(conditions.torque, self._h, streams)
-        self.external = NO_ACCOUNT
+        self.reset()
 
     @property
     def state(self) -> EffectsState:

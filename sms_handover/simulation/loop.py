@@ -150,7 +150,9 @@ class Loop:
         parameters, truth = self.scenario.parameters, self.scenario.truth
         robot, schedule = self.scenario.model.robot, self.scenario.model.schedule
         self._common = parameters.common
-        self._plant = make_plant(truth.robot, truth.schedule, self._common, parameters.plant)
+        self._plant = make_plant(
+            truth.robot, truth.schedule, self._common, parameters.plant, truth.conditions
+        )
         self._generator = make_generator(robot, schedule, self._common, parameters.trajectory)
         self._find_joints = make_ik(robot, self._common, parameters.ik)
         measured = self._common.measures_clearance
@@ -182,6 +184,7 @@ class Loop:
         ``seed`` is that of every random stream, by default that of the scenario, and is kept by snapshots.
         """
         self.seed = self._common.seed if seed is None else seed
+        self._plant.seed(self.seed)
         self._plant.reset()
         self._generator.reset()
         self._controller.reset()
@@ -266,6 +269,7 @@ class Loop:
         Under another law than that of the snapshot the controller begins here, with the guidance in force.
         Raises ConfigurationError if the snapshot is of another robot or schedule.
         """
+        self._plant.seed(snapshot.seed)
         self._plant.restore(snapshot.plant)
         self._generator.restore(snapshot.trajectory)
         if self._monitor and snapshot.clearance:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from sms_handover.conditions.model_error import (
@@ -33,8 +34,8 @@ def test_draws_have_their_declared_spread() -> None:
     assert logs.std() == pytest.approx(0.02, rel=0.12)  # four sigma of 600
     shifts = np.array([body.com for body in drawn]) - _BODY.com
     assert shifts.std(axis=0) == pytest.approx(3 * [0.005], rel=0.12)
-    second = [0.5 * np.trace(body.matrix) * np.eye(3) - body.matrix for body in drawn]
-    bare = 0.5 * np.trace(_BODY.matrix) * np.eye(3) - _BODY.matrix
+    second = [(0.5 * np.trace(body.matrix) * np.eye(3) - body.matrix) / body.mass for body in drawn]
+    bare = (0.5 * np.trace(_BODY.matrix) * np.eye(3) - _BODY.matrix) / _BODY.mass
     per_mass = np.array(
         [np.log(s[0, 0] / body.mass * 2.0 / bare[0, 0]) for s, body in zip(second, drawn, strict=True)]
     )
@@ -61,7 +62,13 @@ def test_every_value_drawn_is_in_the_robot_that_the_plant_builds() -> None:
         assert model.inertias[joint].inertia == pytest.approx(body.matrix, rel=1e-9, abs=1e-15)
     for arm, before in zip(true.arms, known.arms, strict=True):
         assert 0.0 < np.abs(np.subtract(arm.mount.xyz, before.mount.xyz)).max() < 0.01
-        assert 0.0 < np.abs(np.subtract(arm.mount.rpy, before.mount.rpy)).max() < 0.1
+        turned = pin.rpy.rpyToMatrix(*before.mount.rpy).T @ pin.rpy.rpyToMatrix(*arm.mount.rpy)
+        assert 0.0 < np.linalg.norm(pin.log3(turned)) < 0.06
+        joint = model.getJointId(arm.joints[0].name)
+        frame = pin.SE3(pin.rpy.rpyToMatrix(*arm.mount.rpy), np.array(arm.mount.xyz))
+        first = arm.joints[0].origin
+        frame *= pin.SE3(pin.rpy.rpyToMatrix(*first.rpy), np.array(first.xyz))
+        assert model.jointPlacements[joint].isApprox(frame, 1e-12)
 
 
 def test_one_error_moves_no_draw_of_another() -> None:

@@ -79,7 +79,7 @@ def test_a_misfire_gives_the_impulse_of_its_thruster_whatever_the_tick(tick: flo
 
 
 def test_gravity_gradient_is_that_of_the_principal_axes() -> None:
-    """3 n^2 (I_z - I_y) sin(a) cos(a) about x, for the Earth at an angle a from y to z; none along an axis."""
+    """3 n^2 (I_z - I_y) sin(a) cos(a) about x with the Earth at an angle a from y; none along an axis."""
     angle, orbit = 0.3, Orbit(_GEO, np.array([0.0, cos(0.3), sin(0.3)]), _X)
     torque = GravityGradient(orbit).over(0.0, 0.0, _BODY).torque
     rate = 2.0 * pi / 86164.0  # [rad/s], a sidereal day
@@ -112,7 +112,7 @@ def test_a_history_is_linear_between_its_rows_and_nothing_beside_them() -> None:
     assert middle.force == pytest.approx([2.0, 0.0, 0.0])
     assert middle.torque == pytest.approx([0.0, 0.0, 1.0])
     assert not np.any(history.over(0.0, 0.1, _BODY).torque)
-    with pytest.raises(ConfigurationError, match="time of row 1 is 3 s"):
+    with pytest.raises(ConfigurationError, match="time of row 1 is 1 s, must be > 3 s"):
         WrenchHistory(history.rows[::-1])
 
 

@@ -6,6 +6,7 @@ from typing import Generic, TypeVar
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import Executor
 
+from sms_handover.conditions.conditions import Conditions
 from sms_handover.configuration.parameters import EVERY_NODE
 from sms_handover.configuration.scenario_file import COMMON
 from sms_handover.configuration.values import MODEL, TRUTH
@@ -118,6 +119,7 @@ class GraphNode(LifecycleNode, Generic[P]):
         world = load_world(self.common, role, self.scenario)
         self.robot: RobotModel = world.robot
         self.schedule: Schedule = world.schedule
+        self.conditions: Conditions = world.conditions
         topics = graph_topics(self.robot.arms, clearance=self.common.measures_clearance)
         self.endpoints = Endpoints(self, topics, self.common.peers, self.common.external)
         self.message_filter = MessageFilter(self.get_logger().warning, self._on_first_rejected)
