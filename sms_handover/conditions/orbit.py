@@ -5,7 +5,7 @@ from math import cos, sin, sqrt
 
 import numpy as np
 
-from sms_handover.conditions.wrench import BodyAtInstant, Wrench
+from sms_handover.conditions.wrench import BodyAtInstant, Wrench, cross
 from sms_handover.errors import ConfigurationError
 from sms_handover.types import Array, freeze
 
@@ -45,7 +45,7 @@ class Orbit:
     def direction(self, time_s: float) -> Array:
         """Return the direction (3,) from the Earth."""
         angle = self.rate * time_s
-        across = np.cross(self.normal, self.radial)
+        across = cross(self.normal, self.radial)
         result: Array = cos(angle) * self.radial + sin(angle) * across
         return result
 
@@ -59,7 +59,7 @@ class GravityGradient:
     def over(self, start_s: float, tick_s: float, body: BodyAtInstant) -> Wrench:
         """Return the wrench over a tick: that of its middle."""
         r = self.orbit.direction(start_s + 0.5 * tick_s)
-        return Wrench(np.zeros(3), 3.0 * self.orbit.rate**2 * np.cross(r, body.inertia @ r))
+        return Wrench(np.zeros(3), 3.0 * self.orbit.rate**2 * cross(r, body.inertia @ r))
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,4 +81,4 @@ class RelativeOrbit:
         r = self.orbit.direction(start_s + 0.5 * tick_s)
         away = body.centre - self.reference
         force = body.mass * self.orbit.rate**2 * (3.0 * float(r @ away) * r - away)
-        return Wrench(force, np.cross(body.centre - body.origin, force))
+        return Wrench(force, cross(body.centre - body.origin, force))

@@ -41,10 +41,15 @@ class WrenchModel(Protocol):
         """Return the wrench on a body over the tick that begins at ``start_s``."""
 
 
+def cross(a: Array, b: Array) -> Array:
+    """Return a x b (3,); ``np.cross`` takes twenty times as long."""
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+
+
 def at_point(force: Array, torque: Array, point: Array, axes: Array) -> Wrench:
     """Return the wrench of a force (3,) N at a point (3,) m of a body, and a torque (3,) N m.
 
     All are in axes whose rotation (3, 3) in ``world`` is given.
     """
-    turned = axes @ np.column_stack([force, torque + np.cross(point, force)])
-    return Wrench(frozen(turned[:, 0].copy()), frozen(turned[:, 1].copy()))
+    return Wrench(frozen(axes @ force), frozen(axes @ (torque + cross(point, force))))

@@ -7,7 +7,13 @@ import numpy as np
 
 from sms_handover.conditions.wrench import WrenchModel
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
-from sms_handover.plant.external_wrenches import ExternalAccount, WrenchStepper, robot_as_body, sum_over
+from sms_handover.plant.external_wrenches import (
+    Companion,
+    ExternalAccount,
+    WrenchStepper,
+    robot_as_body,
+    sum_over,
+)
 from sms_handover.plant.integrators import Tableau
 from sms_handover.plant.joint_friction import JointFriction
 from sms_handover.plant.stepper import Stepper
@@ -72,6 +78,8 @@ class ConditionedStepper:
             lost -= part
         return lost
 
-    def given(self, before: ExternalAccount) -> ExternalAccount:
+    def given(self, before: ExternalAccount, companion: Companion | None = None) -> ExternalAccount:
         """Return an account of what wrenches have given, after the latest step."""
-        return self._under_wrench.given(self._start, self._end, before) if self._under_wrench else before
+        if self._under_wrench is None:
+            return before
+        return self._under_wrench.given(self._start, self._end, before, companion)

@@ -10,7 +10,7 @@ from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.command_path import CommandPath, CommandsOnTheWay
 from sms_handover.plant.conditioned_stepper import ConditionedStepper, Resistance
 from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics
-from sms_handover.plant.external_wrenches import NO_ACCOUNT, ExternalAccount
+from sms_handover.plant.external_wrenches import NO_ACCOUNT, Companion, ExternalAccount
 from sms_handover.plant.integrators import Tableau
 from sms_handover.plant.joint_friction import JointFriction
 from sms_handover.plant.motor_torque import MotorTorque
@@ -103,11 +103,14 @@ class PlantEffects:
         if self._stepper:
             self._stepper.start_s = ns_to_seconds(tick * self._tick_ns)
 
-    def settle(self) -> float:
-        """Book what wrenches have given in the tick, and return what friction has taken, in J."""
+    def settle(self, companion: Companion | None) -> float:
+        """Book what wrenches have given in the tick, and return what friction has taken, in J.
+
+        A deputy with mass that floats is the ``companion``, as it was when the tick began.
+        """
         if self._stepper is None:
             return 0.0
-        self.external = self._stepper.given(self.external)
+        self.external = self._stepper.given(self.external, companion)
         return self._stepper.lost
 
 

@@ -15,7 +15,7 @@ from sms_handover.plant.deputy import DeputyMotion, MasslessDeputy
 from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics, pinocchio_dynamics
 from sms_handover.plant.effects import EffectsState, PlantEffects
 from sms_handover.plant.enforced_limits import EnforcedLimits
-from sms_handover.plant.external_wrenches import ExternalAccount
+from sms_handover.plant.external_wrenches import Companion, ExternalAccount
 from sms_handover.plant.grasping import execute_grasp
 from sms_handover.plant.integrators import TABLEAUS
 from sms_handover.plant.joint_limits import ENFORCE, Excess, JointLimitWatch
@@ -312,7 +312,7 @@ class FreeFloatingPlant:
             q, v, effort, lost = self._enforced.step(before, self.v, effort)
             self._losses += lost
         if effects:
-            self._losses += effects.settle()
+            self._losses += effects.settle(self._companion)
         for part in (effort * (q[BASE_NQ:] - before[BASE_NQ:])).tolist():
             self._work += part
         self.q, self.v, self.joint_effort = q, v, effort
@@ -353,6 +353,15 @@ class FreeFloatingPlant:
         if not self._enforces:
             return dynamics, None
         return dynamics, EnforcedLimits(robot, dynamics.stepper, self._rated_speed, self._tick_s)
+
+    @property
+    def _companion(self) -> Companion | None:
+        """The deputy where it floats and has mass."""
+        deputy = self._deputy
+        if not isinstance(deputy, RigidDeputy) or deputy.holder:
+            return None
+        conserved, mass = deputy.conserved, deputy.inertia.mass
+        return Companion(mass, conserved.centre_of_mass, conserved.linear_momentum / mass)
 
     def _limited(self, asked: Array) -> Array:
         """Return the efforts that act, and count those at their limit or beyond."""

@@ -14,6 +14,7 @@ from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import CONTROLLER
 from sms_handover.model.conserved import ConservedQuantities
+from sms_handover.plant.external_wrenches import ExternalAccount
 from sms_handover.simulation.quiet_periods import QuietPeriods, QuietRunner
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.snapshot import Snapshot, controller_data, restore_controller
@@ -43,7 +44,8 @@ class Period:
     """What is worked out once per reference period, at the instant at which it begins.
 
     Tool poses and targets are in ``world``; since the start the joint efforts have done ``work`` J, wrenches
-    from outside ``external_work`` J, and ``lost`` J have become heat; ``ik_status`` is None where no tool had
+    from outside ``external_work`` J, and ``lost`` J have become heat;
+    ``external_impulse`` is None where no such wrenches act; ``ik_status`` is None where no tool had
     a target. ``events`` has what came of grasp commands, ``decisions`` what was decided about the task.
     ``clearance`` is None unless it is measured online.
     """
@@ -57,6 +59,7 @@ class Period:
     work: float
     external_work: float
     lost: float
+    external_impulse: ExternalAccount | None
     ik_status: IkStatus | None
     events: tuple[GraspEvent, ...]
     decisions: tuple[RunEvent, ...]
@@ -318,6 +321,7 @@ class Loop:
             plant.work,
             plant.external_work,
             plant.losses,
+            plant.external_impulse,
             status,
             events,
             decisions,

@@ -17,6 +17,8 @@ _CONTENTS = {
     topics.GRASP_EVENT: "result of a grasp command, with the errors at that instant [m, rad, m/s]",
     topics.LINEAR_MOMENTUM: "linear momentum of the whole robot in world axes [kg m/s]",
     topics.ANGULAR_MOMENTUM: "angular momentum about the centre of mass in world axes [kg m^2/s]",
+    topics.LINEAR_IMPULSE: "what wrenches from outside have added to it [N s]; only if there are any",
+    topics.ANGULAR_IMPULSE: "what they have added to that [N m s]; only if there are any",
     topics.ENERGY: "kinetic energy and work of the joint efforts, less what joint stops have taken [J]",
     topics.IK_STATUS: "how the last inverse-kinematics solve ended: status, iterations, errors [m, rad]",
     topics.ROBOT_DESCRIPTION: "URDF of the robot",
