@@ -1,5 +1,7 @@
 """Imports point one way: edge -> simulation -> {plant, trajectory, ik, control} -> model -> foundation.
 
+``conditions`` lies between plant and model.
+
 ``compiled``, which stands in for Pinocchio in plant, ik and control, lies between simulation and those.
 
 Read from the syntax trees, so an import inside a function or for type checking alone counts too.
@@ -24,6 +26,7 @@ MIDDLE = {"plant", "trajectory", "ik", "control"}
 CORE = {
     "messages",
     "model",
+    "conditions",
     *MIDDLE,
     "clearance",
     "compiled",
@@ -46,10 +49,12 @@ ALLOWED: dict[str, set[str]] = {
     "messages": set(),
     "terminal": set(),
     "model": set(),
-    **{layer: {"model"} for layer in MIDDLE},
+    "conditions": {"model"},
+    **{layer: {"model"} for layer in MIDDLE - {"plant"}},
+    "plant": {"model", "conditions"},
     "clearance": {"model"},
     "compiled": {"model", *MIDDLE},
-    "simulation": {"model", *MIDDLE, "compiled", "clearance"},
+    "simulation": {"model", "conditions", *MIDDLE, "compiled", "clearance"},
     "bag": {"messages", "model", "simulation"},
     "analysis": {"model", "trajectory", "clearance", "simulation", "bag", "scene"},
     "scene": {"messages", "model", "trajectory", "clearance", "bag"},

@@ -71,6 +71,8 @@ DEPUTY_ODOMETRY = "deputy/odometry"
 CLEARANCE = "clearance"  # only where it is measured online
 LINEAR_MOMENTUM = "momentum/linear"
 ANGULAR_MOMENTUM = "momentum/angular"
+LINEAR_IMPULSE = "impulse/linear"  # of wrenches from outside, only where there are any
+ANGULAR_IMPULSE = "impulse/angular"
 ENERGY = "energy"
 IK_STATUS = "ik/status"
 ROBOT_DESCRIPTION = "robot_description"
@@ -98,8 +100,13 @@ SOLVE_IK = "solve_ik"  # service of the ik node
 _OURS = "sms_handover_interfaces/msg"
 
 
-def graph_topics(arms: Iterable[str], *, clearance: bool = False) -> tuple[Topic, ...]:
-    """Return every topic of the graph for a robot with these arms; ``clearance`` if it is measured online."""
+def graph_topics(
+    arms: Iterable[str], *, clearance: bool = False, wrenches: bool = False
+) -> tuple[Topic, ...]:
+    """Return every topic of the graph for a robot with these arms.
+
+    ``clearance`` if it is measured online; ``wrenches`` if conditions have some from outside.
+    """
     everyone_else = (TRAJECTORY, IK, CONTROLLER)
     pose, vector = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/Vector3Stamped"
     odometry = "nav_msgs/msg/Odometry"
@@ -130,6 +137,10 @@ def graph_topics(arms: Iterable[str], *, clearance: bool = False) -> tuple[Topic
         Topic(CLOCK, "rosgraph_msgs/msg/Clock", (PLANT,), (), Rate.CLOCK),
         Topic(DIAGNOSTICS, "diagnostic_msgs/msg/DiagnosticArray", LOOP_NODES, (), Rate.WALL),
     ]
+    if wrenches:
+        table += [
+            Topic(name, vector, (PLANT,), (), Rate.REFERENCE) for name in (LINEAR_IMPULSE, ANGULAR_IMPULSE)
+        ]
     if clearance:
         table.append(Topic(CLEARANCE, f"{_OURS}/Clearance", (PLANT,), (TRAJECTORY,), Rate.REFERENCE))
     for arm in arms:

@@ -14,6 +14,7 @@ from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import CONTROLLER
 from sms_handover.model.conserved import ConservedQuantities
+from sms_handover.plant.external_wrenches import ExternalAccount
 from sms_handover.simulation.quiet_periods import QuietPeriods, QuietRunner
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.snapshot import Snapshot, controller_data, restore_controller
@@ -43,7 +44,8 @@ class Period:
     """What is worked out once per reference period, at the instant at which it begins.
 
     Tool poses and targets are in ``world``; since the start the joint efforts have done ``work`` J, wrenches
-    from outside ``external_work`` J, and ``lost`` J have become heat; ``ik_status`` is None where no tool had
+    from outside ``external_work`` J, and ``lost`` J have become heat;
+    ``external_impulse`` is None where no such wrenches act; ``ik_status`` is None where no tool had
     a target. ``events`` has what came of grasp commands, ``decisions`` what was decided about the task.
     ``clearance`` is None unless it is measured online.
     """
@@ -57,6 +59,7 @@ class Period:
     work: float
     external_work: float
     lost: float
+    external_impulse: ExternalAccount | None
     ik_status: IkStatus | None
     events: tuple[GraspEvent, ...]
     decisions: tuple[RunEvent, ...]
@@ -150,7 +153,9 @@ class Loop:
         parameters, truth = self.scenario.parameters, self.scenario.truth
         robot, schedule = self.scenario.model.robot, self.scenario.model.schedule
         self._common = parameters.common
-        self._plant = make_plant(truth.robot, truth.schedule, self._common, parameters.plant)
+        self._plant = make_plant(
+            truth.robot, truth.schedule, self._common, parameters.plant, truth.conditions
+        )
         self._generator = make_generator(robot, schedule, self._common, parameters.trajectory)
         self._find_joints = make_ik(robot, self._common, parameters.ik)
         measured = self._common.measures_clearance
@@ -182,6 +187,7 @@ class Loop:
         ``seed`` is that of every random stream, by default that of the scenario, and is kept by snapshots.
         """
         self.seed = self._common.seed if seed is None else seed
+        self._plant.seed(self.seed)
         self._plant.reset()
         self._generator.reset()
         self._controller.reset()
@@ -269,6 +275,7 @@ class Loop:
         Under another law than that of the snapshot the controller begins here, with the guidance in force.
         Raises ConfigurationError if the snapshot is of another robot or schedule.
         """
+        self._plant.seed(snapshot.seed)
         self._plant.restore(snapshot.plant)
         self._generator.restore(snapshot.trajectory)
         if self._monitor and snapshot.clearance:
@@ -320,6 +327,7 @@ class Loop:
             plant.work,
             plant.external_work,
             plant.losses,
+            plant.external_impulse,
             status,
             events,
             decisions,

@@ -18,6 +18,7 @@ _BY_PERIOD = (
     *("reference_position", "reference_velocity", "deputy_pose", "deputy_twist"),
     *("linear_momentum", "angular_momentum", "kinetic_energy", "work", "external_work", "lost"),
 )
+_NONE = np.zeros(3)  # [N s], [N m s]
 _NOT_ASKED = -1  # in place of a status where inverse kinematics was not asked
 _GROWTH = 1.5  # [-] of the room for rows, where a run is longer than it was told
 
@@ -78,6 +79,7 @@ class RunRecorder:
     def _add_period(self, period: Period) -> None:
         """Add what a reference period begins with."""
         reference, conserved, status = period.reference, period.conserved, period.ik_status
+        given = period.external_impulse
         deputy = pose_row(period.deputy.deputy_in_world)
         row = {
             "reference_ns": reference.stamp_ns,
@@ -91,6 +93,8 @@ class RunRecorder:
             "work": period.work,
             "external_work": period.external_work,
             "lost": period.lost,
+            "linear_impulse": _NONE if given is None else given.linear_impulse,
+            "angular_impulse": _NONE if given is None else given.angular_impulse,
             "ik_status": CONSTANTS[status] if status else _NOT_ASKED,
         }
         for name, value in row.items():
@@ -108,6 +112,8 @@ class RunRecorder:
         for name in _BY_PERIOD:
             self._periods[name].append(getattr(rows, name))
         self._periods["reference_ns"].append(rows.stamp_ns)
+        for name in ("linear_impulse", "angular_impulse"):  # in C nothing acts from outside
+            self._periods[name].append(np.zeros((len(rows.stamp_ns), 3)))
         status = [CONSTANTS[status] if status else _NOT_ASKED for status in rows.ik_status]
         self._periods["ik_status"].append(np.array(status))
         for arm in self._arms:

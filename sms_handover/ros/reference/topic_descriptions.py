@@ -18,6 +18,8 @@ _CONTENTS = {
     topics.GRASP_EVENT: "result of a grasp command: errors at that instant, impulse [N s, N m s], heat [J]",
     topics.LINEAR_MOMENTUM: "linear momentum of robot and deputy in world axes [kg m/s]",
     topics.ANGULAR_MOMENTUM: "angular momentum about their centre of mass in world axes [kg m^2/s]",
+    topics.LINEAR_IMPULSE: "what wrenches from outside have added to it [N s]; only if there are any",
+    topics.ANGULAR_IMPULSE: "what they have added to that [N m s]; only if there are any",
     topics.ENERGY: "kinetic energy, work of the joint efforts and from outside, and what became heat [J]",
     topics.IK_STATUS: "how the last inverse-kinematics solve ended: status, iterations, errors [m, rad]",
     topics.ROBOT_DESCRIPTION: "URDF of the robot",
