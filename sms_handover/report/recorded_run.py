@@ -11,6 +11,7 @@ from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.run.loop_record import LoopRecord, read_loop
 from sms_handover.bag.run.reader import read_run
 from sms_handover.clearance.contacts import CONTACT_DEPTH
+from sms_handover.engines.verdict import Verdict as EngineVerdict
 from sms_handover.errors import BagError, ConfigurationError
 from sms_handover.graph.topics import CONTROLLER, PLANT
 from sms_handover.plant.deputy import GraspTolerance
@@ -24,11 +25,12 @@ _TOLERANCES = ("grasp_position_tolerance", "grasp_angle_tolerance", "grasp_speed
 
 @dataclass(frozen=True, eq=False)
 class RecordedRun:
-    """The arrays of a run under a name, and the description of its bag."""
+    """The arrays of a run under a name, the description of its bag, and what a second engine says of it."""
 
     name: str
     data: RunData
     info: BagInfo
+    second_engine: EngineVerdict | None = None
 
     @cached_property
     def loop(self) -> LoopRecord:
