@@ -73,6 +73,16 @@ engine does not know, said in one line.
   one body, and integrates with its RK4 in steps of the tick. Its initial position is that of the centre of
   mass of the whole.
 
+A deputy **with mass** floats in MuJoCo as a body of its own, from its initial pose and twist. At a grasp it
+becomes a child of the hand at the relative pose that MuJoCo finds, and the run goes on from the velocities
+after the impulse, which MuJoCo computes by its own mass matrices and which is compared with that of the
+event; a release makes it a body of its own again. A deputy without mass, a missed grasp and a release of it
+move nothing, so they need no replay.
+
+A replay is open loop. Where neighbouring motions part exponentially, as with a law that does not know what
+the hand carries and throws its wrist about, rounding grows beyond any bound; the two engines then agree up
+to there, which the times in the list show.
+
 ## Bounds and what was measured
 
 The bounds are stated per scenario (`sms_handover/engines/bounds.py`); a scenario that is not shipped has
@@ -87,8 +97,6 @@ the scenario, written by `make engines`:
 | Engine | Effect | Why |
 |---|---|---|
 {limits}
-
-Deputies without mass, missed grasps and releases move nothing, so they need no replay.
 """
 
 

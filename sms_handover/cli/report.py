@@ -67,7 +67,8 @@ def command(options: Namespace) -> int:
         runs = read_all(options.runs, progress)
         if engine:
             progress.show(f"replaying in {engine.title}")
-            runs = [replace(run, second_engine=recorded_verdict(engine, run.info.path)) for run in runs]
+            said = [recorded_verdict(engine, run.info.path) for run in runs]
+            runs = tuple(replace(run, second_engine=verdict) for run, verdict in zip(runs, said, strict=True))
         progress.show("drawing")
         content = report_page(runs) if page else ""
     if page:

@@ -18,6 +18,7 @@ from sms_handover.types import BASE_NQ, BASE_NV, Array
 _LACKS = {
     Effect.ROTOR_INERTIA: "its spinning bodies have no rotors",
     Effect.JOINT_STOPS: "its spinning bodies have no stops",
+    Effect.DEPUTY_MASS: "it gives no mass matrix, by which the impulse of a grasp would follow",
 }
 _TASK = "task"
 _FIRST, _SECOND, _THIRD, _LAST = 300, 200, 100, 0  # order within a tick: the highest first
@@ -182,7 +183,8 @@ class _Sampler(sysModel.SysModel):  # type: ignore[misc]
                 place = pin.SE3(outer[0] @ axes, outer[1] + outer[0] @ origin)
                 poses[arm].append(pin.SE3ToXYZQUAT(place))
         rows = {arm: np.array(found) for arm, found in poses.items()}
-        return Motion(np.array(self.q), rows, np.array(self.linear), np.array(self.angular))
+        momenta = np.array(self.linear), np.array(self.angular)
+        return Motion(np.array(self.q), rows, *momenta, np.empty((0, 7)), np.empty((0, 6)))
 
 
 def _tools(bodies: list[RigidBody], replay: Replay) -> Mapping[str, tuple[int, tuple[Array, Array]]]:

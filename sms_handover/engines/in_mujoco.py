@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import mujoco
 import numpy as np
 
-from sms_handover.engines.mujoco_robot import MujocoRobot
+from sms_handover.engines.mujoco_deputy import MujocoScene
 from sms_handover.engines.protocol import Effect, Motion, Replay
 from sms_handover.frames import tool_frame
 from sms_handover.types import Array
@@ -29,25 +29,50 @@ class InMujoco:
 
     def run(self, replay: Replay) -> Motion:
         """Integrate a replay without an effect that it lacks."""
-        robot = MujocoRobot(replay.urdf, replay.rotor_inertia)
-        order = [replay.joint_names.index(name) for name in robot.joint_names]
-        back = np.argsort(order).tolist()
-        robot.place(_with_joints(replay.start_q, order), _with_joints(replay.start_v, order))
+        scene = MujocoScene(replay)
+        order = [replay.joint_names.index(name) for name in scene.robot.joint_names]
+        scene.robot.place(_with_joints(replay.start_q, order), _with_joints(replay.start_v, order))
         efforts, tick_s = replay.efforts[:, order], ns_to_seconds(replay.tick_ns)
-        rows, momenta, tick = list[Array](), list[tuple[Array, Array]](), 0
-        tools: dict[str, list[Array]] = {arm: [] for arm in replay.arms}
-        for sample in replay.samples.tolist():
-            for effort in efforts[tick:sample]:
-                robot.drive(effort)
-                robot.advance(tick_s, 1)
-            tick = sample
-            robot.evaluate()
-            rows.append(_with_joints(robot.state[0], back))
-            for arm, poses in tools.items():
-                poses.append(robot.pose(tool_frame(arm)))
-            momenta.append(robot.momentum())
-        linear, angular = (np.array(part) for part in zip(*momenta, strict=True))
-        return Motion(np.array(rows), {arm: np.array(poses) for arm, poses in tools.items()}, linear, angular)
+        grips, samples = list(replay.grips), set(replay.samples.tolist())
+        taken, impulses, tick = _Samples(replay, order), list[Array](), 0
+        for stop in sorted({*samples, *(grip.tick for grip in grips)}):
+            for effort in efforts[tick:stop]:
+                scene.robot.drive(effort)
+                scene.advance(tick_s)
+            tick = stop
+            if stop in samples:
+                taken.add(scene)
+            while grips and grips[0].tick == stop:  # after the state of this tick, before its integration
+                impulse = scene.grip(grips.pop(0).holder)
+                impulses += [] if impulse is None else [impulse]
+        return taken.motion(impulses)
+
+
+class _Samples:
+    """States that are to be compared, as MuJoCo has them."""
+
+    def __init__(self, replay: Replay, order: Sequence[int]) -> None:
+        self._back = np.argsort(order).tolist()
+        self._q, self._deputy = list[Array](), list[Array]()
+        self._momenta = list[tuple[Array, Array]]()
+        self._tools: dict[str, list[Array]] = {arm: [] for arm in replay.arms}
+
+    def add(self, scene: MujocoScene) -> None:
+        """Take the present state."""
+        scene.evaluate()
+        self._q.append(_with_joints(scene.robot.state[0], self._back))
+        self._momenta.append(scene.momentum())
+        for arm, poses in self._tools.items():
+            poses.append(scene.robot.pose(tool_frame(arm)))
+        deputy = scene.deputy
+        self._deputy += [] if deputy is None else [deputy]
+
+    def motion(self, impulses: list[Array]) -> Motion:
+        """Return all of them, with the impulses of grips."""
+        linear, angular = (np.array(part) for part in zip(*self._momenta, strict=True))
+        tools = {arm: np.array(poses) for arm, poses in self._tools.items()}
+        deputy, given = np.array(self._deputy).reshape(-1, 7), np.array(impulses).reshape(-1, 6)
+        return Motion(np.array(self._q), tools, linear, angular, deputy, given)
 
 
 def _with_joints(values: Array, order: Sequence[int]) -> Array:

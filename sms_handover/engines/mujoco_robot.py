@@ -5,15 +5,15 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from sms_handover.frames import BASE
 from sms_handover.model.assembly import RobotDescription
-from sms_handover.model.mjcf import to_mjcf
+from sms_handover.model.mjcf import Payload, to_mjcf
 from sms_handover.model.urdf import to_urdf
 from sms_handover.types import Array
 
 State = tuple[Array, Array]  # q (7 + n,) and v (6 + n,) as RobotModel has them
 
 _NO_OTHER_FORCES = ("AUTORESET", "CONSTRAINT", "CONTACT", "DAMPER", "GRAVITY", "LIMIT", "SPRING")
+_ROOT = 1  # number of the body that floats, after the world
 
 
 class MujocoRobot:
@@ -23,9 +23,9 @@ class MujocoRobot:
     axes) and its angular velocity in base axes: v_mujoco = T v with T = diag(R, 1, 1).
     """
 
-    def __init__(self, urdf: str, rotor_inertia: Mapping[str, float]) -> None:
+    def __init__(self, urdf: str, rotor_inertia: Mapping[str, float], payload: Payload | None = None) -> None:
         """Load a robot; ``rotor_inertia`` kg m^2 by joint is what a URDF cannot say."""
-        text = to_mjcf(urdf, rotor_inertia, limited=False)
+        text = to_mjcf(urdf, rotor_inertia, limited=False, payload=payload)
         self.model = mujoco.MjModel.from_xml_string(text)
         for name in _NO_OTHER_FORCES:
             self.model.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
@@ -75,16 +75,25 @@ class MujocoRobot:
         to_mujoco = _map(q)
         turning = np.zeros_like(v)
         turning[:3] = to_mujoco[:3, :3] @ np.cross(v[3:6], v[:3])
-        mass = self._mass_matrix()
+        mass = self.mass_matrix()
         bias = to_mujoco.T @ (self.data.qfrc_bias + mass @ turning)
         return to_mujoco.T @ mass @ to_mujoco, bias, to_mujoco.T @ (self.data.qacc - turning)
 
     def momentum(self) -> tuple[Array, Array]:
         """Return linear and angular momentum (about the centre of mass) where it was last evaluated."""
         mujoco.mj_subtreeVel(self.model, self.data)
-        root = self.model.body(BASE).id
-        mass = self.model.body_subtreemass[root]
-        return mass * self.data.subtree_linvel[root], np.array(self.data.subtree_angmom[root])
+        linear = self.mass * self.data.subtree_linvel[_ROOT]
+        return linear, np.array(self.data.subtree_angmom[_ROOT])
+
+    @property
+    def mass(self) -> float:
+        """The mass in kg of all of it."""
+        return float(self.model.body_subtreemass[_ROOT])
+
+    @property
+    def centre_of_mass(self) -> Array:
+        """The centre of mass in ``world`` where it was last evaluated."""
+        return np.array(self.data.subtree_com[_ROOT])
 
     def frame(self, name: str) -> tuple[Array, Array]:
         """Return position and rotation matrix in ``world`` of a body, or of a tool."""
@@ -99,8 +108,18 @@ class MujocoRobot:
         mujoco.mju_mat2Quat(quaternion, axes.ravel())
         return np.concatenate([position, np.roll(quaternion, -1)])
 
-    def _mass_matrix(self) -> Array:
-        """Return M (nv, nv) in MuJoCo's coordinates, column by column."""
+    def jacobian(self, body: str) -> Array:
+        """Return the Jacobian (6, nv) of a body in MuJoCo's coordinates, where it was last evaluated.
+
+        Its rows are the velocity of the origin in ``world`` axes and the angular velocity in those of the
+        body, as MuJoCo has the velocity of a body that floats.
+        """
+        linear, angular = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
+        mujoco.mj_jacBody(self.model, self.data, linear, angular, self.model.body(body).id)
+        return np.concatenate([linear, self.frame(body)[1].T @ angular])
+
+    def mass_matrix(self) -> Array:
+        """Return M (nv, nv) in MuJoCo's coordinates where it was last evaluated, column by column."""
         columns = np.empty((self.model.nv, self.model.nv))
         for row, unit in zip(columns, np.eye(self.model.nv), strict=True):
             mujoco.mj_mulM(self.model, self.data, row, unit)

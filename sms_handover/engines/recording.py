@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from sms_handover.engines.protocol import Effect, Replay
+from sms_handover.engines.protocol import Effect, FreeBody, Grip, Replay
 from sms_handover.errors import BagError
 from sms_handover.plant.joint_limits import ENFORCE
 from sms_handover.run_data import RunData
 from sms_handover.simulation.scenario import Scenario
+from sms_handover.types import GraspAction, GraspEvent, GraspStatus
 from sms_handover.units import ns_to_seconds
 
 
@@ -30,7 +31,15 @@ def replay_of(run: RunData, scenario: Scenario) -> Replay:
         efforts=run.joint_effort[1:],
         samples=np.searchsorted(run.tick_ns, run.reference_ns[compared_periods(run)]),
         effects=frozenset(_effects(scenario)),
+        deputy=_deputy(scenario),
+        grips=_grips(run, tick_ns),
     )
+
+
+def grasps(run: RunData) -> list[GraspEvent]:
+    """Return the events by which a hand took hold of the deputy, in order of time."""
+    held = (event for event in run.grasp_events if event.status is GraspStatus.SUCCEEDED)
+    return [event for event in held if event.command.action is not GraspAction.RELEASE]
 
 
 def compared_periods(run: RunData) -> np.ndarray:
@@ -53,6 +62,27 @@ def _check_complete(run: RunData, tick_ns: int) -> None:
         )
 
 
+def _deputy(scenario: Scenario) -> FreeBody | None:
+    """Return the deputy as it floats at time zero, None without mass."""
+    deputy = scenario.truth.schedule.deputy
+    if deputy.body is None:
+        return None
+    return FreeBody(deputy.body, deputy.deputy_in_world, deputy.twist_in_world)
+
+
+def _grips(run: RunData, tick_ns: int) -> tuple[Grip, ...]:
+    """Return what changed between hands and deputy."""
+    first = int(run.tick_ns[0])
+    return tuple(
+        Grip(
+            (event.stamp_ns - first) // tick_ns,
+            "" if event.command.action is GraspAction.RELEASE else event.command.arm,
+        )
+        for event in run.grasp_events
+        if event.status is GraspStatus.SUCCEEDED
+    )
+
+
 def _effects(scenario: Scenario) -> list[Effect]:
     """Return the effects that a scenario has beyond efforts and links."""
     found = []
@@ -60,4 +90,6 @@ def _effects(scenario: Scenario) -> list[Effect]:
         found.append(Effect.ROTOR_INERTIA)
     if scenario.parameters.plant.joint_limits == ENFORCE:
         found.append(Effect.JOINT_STOPS)
+    if scenario.truth.schedule.deputy.mass:
+        found.append(Effect.DEPUTY_MASS)
     return found

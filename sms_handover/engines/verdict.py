@@ -5,34 +5,14 @@ from dataclasses import asdict, dataclass
 from math import isfinite
 from typing import Any
 
-import numpy as np
-
-from sms_handover.analysis.numbers import angle_between, complete, lengths
-from sms_handover.engines.bounds import BOUNDS, Bounds, scenario_of_bounds
-from sms_handover.engines.protocol import Engine, Motion
-from sms_handover.engines.recording import compared_periods, replay_of
+from sms_handover.engines.bounds import BOUNDS, scenario_of_bounds
+from sms_handover.engines.differences import Difference, differences
+from sms_handover.engines.protocol import Engine
+from sms_handover.engines.recording import replay_of
 from sms_handover.run_data import RunData
 from sms_handover.simulation.scenario import Scenario
-from sms_handover.types import BASE_NQ, Array
-from sms_handover.units import ns_to_seconds
 
 _WIDTH = 20  # [characters] of the longest quantity and a space
-
-
-@dataclass(frozen=True)
-class Difference:
-    """The largest difference of a quantity over a run, when it was, in s, and what it may be at most."""
-
-    quantity: str
-    largest: float
-    unit: str
-    time: float
-    bound: float
-
-    @property
-    def within(self) -> bool:
-        """Whether it is within its bound; NaN is not."""
-        return self.largest <= self.bound
 
 
 @dataclass(frozen=True)
@@ -98,45 +78,5 @@ def verdict_of(engine: Engine, run: RunData, scenario: Scenario, name: str) -> V
         if effect in engine.lacks:
             return Verdict(engine.title, bounds, f"{effect.value}: {engine.lacks[effect]}", 0, ())
     motion = engine.run(replay)
-    return Verdict(
-        engine.title,
-        bounds,
-        "",
-        replay.samples.size,
-        tuple(_differences(run, motion, replay.samples, BOUNDS[bounds])),
-    )
-
-
-def _differences(run: RunData, motion: Motion, samples: np.ndarray, bounds: Bounds) -> Iterator[Difference]:
-    """Yield the largest difference of each quantity, of the states of which it was recorded."""
-    periods = compared_periods(run)
-    base, joints = run.base_pose[samples], run.joint_position[samples]
-    found = [("joints", "rad", bounds.joints, _largest, [(motion.q[:, BASE_NQ:], joints)])]
-    tools = [(motion.tools[arm], run.tool_pose[arm][periods]) for arm in run.arms]
-    for name, pairs, at, turned in (
-        ("base", [(motion.q[:, :BASE_NQ], base)], bounds.base_position, bounds.base_attitude),
-        ("tool", tools, bounds.tool_position, bounds.tool_attitude),
-    ):
-        found.append((f"{name} position", "m", at, _distances, [(a[:, :3], b[:, :3]) for a, b in pairs]))
-        found.append(
-            (f"{name} attitude", "rad", turned, angle_between, [(a[:, 3:], b[:, 3:]) for a, b in pairs])
-        )
-    linear = motion.linear_momentum, run.linear_momentum[periods]
-    angular = motion.angular_momentum, run.angular_momentum[periods]
-    found.append(("linear momentum", "kg m/s", bounds.linear_momentum, _distances, [linear]))
-    found.append(("angular momentum", "kg m^2/s", bounds.angular_momentum, _distances, [angular]))
-    for quantity, unit, bound, apart, pairs in found:
-        recorded = np.flatnonzero(np.all([complete(theirs) for _, theirs in pairs], axis=0))
-        if recorded.size:
-            values = np.max([apart(ours[recorded], theirs[recorded]) for ours, theirs in pairs], axis=0)
-            place = int(np.argmax(values))  # of a NaN, if the engine diverged
-            time = ns_to_seconds(int(run.tick_ns[samples[recorded[place]]]))
-            yield Difference(quantity, float(values[place]), unit, time, bound)
-
-
-def _largest(a: Array, b: Array) -> Array:
-    return np.asarray(np.max(np.abs(a - b), axis=1))
-
-
-def _distances(a: Array, b: Array) -> Array:
-    return lengths(a - b)
+    found = differences(run, motion, BOUNDS[bounds])
+    return Verdict(engine.title, bounds, "", replay.samples.size, found)

@@ -1,4 +1,4 @@
-"""A second engine: its verdict on a run, from the bag alone; here the engine is our plant, or one that errs."""
+"""A second engine: its verdict on a run, from the bag alone; here our own stepper stands in for it."""
 
 import json
 import sys
@@ -63,7 +63,8 @@ class Ours:
         rows = np.array([q for q, _ in taken])
         rows[-1, BASE_NQ] += self._error
         linear, angular = ([getattr(each, f"{n}_momentum") for each in sums] for n in ("linear", "angular"))
-        return Motion(rows, tools, np.array(linear), np.array(angular))
+        momenta = np.array(linear), np.array(angular)
+        return Motion(rows, tools, *momenta, np.empty((0, 7)), np.empty((0, 6)))
 
 
 @pytest.fixture(scope="module")
@@ -82,8 +83,11 @@ def bag(scenario: Scenario, run: RunData, tmp_path_factory: pytest.TempPathFacto
     """A bag that says of the run what the recorder says."""
     folder, given = tmp_path_factory.mktemp("bags") / "run", scenario.parameters
     common = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(given.common).items()}
-    nodes = {"plant": given.plant, "trajectory": given.trajectory, "ik": given.ik}
-    values = {name: {**common, **asdict(part)} for name, part in nodes.items()}
+    values = {
+        "plant": {**common, **asdict(given.plant)},
+        "trajectory": {**common, **asdict(given.trajectory)},
+        "ik": {**common, **asdict(given.ik)},
+    }
     with Recording(folder, types=TYPES) as recording:
         recording.describe(
             urdf=scenario.truth.robot.urdf,
@@ -150,7 +154,7 @@ def test_what_an_engine_lacks_is_one_line(scenario: Scenario, run: RunData) -> N
 def test_a_gap_cannot_be_replayed(scenario: Scenario, run: RunData) -> None:
     effort = np.array(run.joint_effort)
     effort[200] = np.nan
-    with pytest.raises(BagError, match="lacks 1 states or efforts, the first after 0.199 s"):
+    with pytest.raises(BagError, match=r"lacks 1 states or efforts, the first after 0\.199 s"):
         verdict_of(Ours(scenario.truth.robot), replace(run, joint_effort=effort), scenario, NAME)
 
 

@@ -20,6 +20,7 @@ from test.verification.conftest import Record
 
 _HEAVIER = 1.001  # [-] what a link weighs that is to be noticed
 _SHORT = {"common": {"duration": 2.0}}  # [s]
+_TURN = [1e-3, -5e-4, 7e-4]  # [rad/s]
 _SCENARIOS = ("planar", "one_arm")  # every shipped one: make engines
 
 
@@ -93,3 +94,35 @@ def test_rotors_are_known_or_said_not_to_be(engine: Engine) -> None:
         else "rotor inertia: its spinning bodies have no rotors"
     )
     assert verdict.unsupported == told and verdict.agrees == (not told)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("planar", {"deputy.mass": 4.0}),  # kg
+        (
+            "one_arm",  # a deputy that drifts and turns past a hand at rest: mm/s, deg/s
+            {
+                "deputy": {"mass": 4.0, "twist_in_world": {"linear": [4e-4, -3e-4, 2e-4], "angular": _TURN}},
+                "plant": {"grasp_position_tolerance": 0.05, "grasp_angle_tolerance": 0.1},
+                "common": {"duration": 22.0},
+            },
+        ),
+    ],
+)
+def test_a_deputy_with_mass_is_captured_alike(
+    engine: Engine, name: str, values: dict[str, object], record: Record
+) -> None:
+    """MuJoCo computes the impulse of each grasp by its own mass matrices, and goes on with a new model."""
+    if Effect.DEPUTY_MASS in engine.lacks:
+        scenario = load_scenario(name, {**values, "common": {"duration": 0.1}})
+        verdict = verdict_of(engine, simulate(scenario), scenario, name)
+        assert verdict.unsupported.startswith("a deputy with mass: ") and not verdict.agrees
+        return
+    scenario = load_scenario(name, values)
+    verdict = verdict_of(engine, simulate(scenario), scenario, name)
+    found = {each.quantity: each for each in verdict.differences}
+    assert {"impulse", "impulsive moment", "deputy position", "deputy attitude"} <= found.keys()
+    for each in verdict.differences:
+        claim = f"{name}, a deputy of 4 kg: {each.quantity}"
+        record(claim, each.largest, each.bound, unit=each.unit, against=engine.title)
