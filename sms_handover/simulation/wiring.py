@@ -78,7 +78,7 @@ def make_generator(
     robot: RobotModel, schedule: Schedule, common: CommonParameters, parameters: TrajectoryParameters
 ) -> TrajectoryGenerator:
     """Return the generator of the trajectory; raises ConfigurationError."""
-    motion = CompiledToolMotion(robot) if common.dynamics == COMPILED else PinocchioToolMotion(robot)
+    motion = CompiledToolMotion if common.dynamics == COMPILED else PinocchioToolMotion
     aborts = common.aborts_on_collision
     return TrajectoryGenerator(robot, schedule, parameters, motion, abort_on_collision=aborts)
 
@@ -120,14 +120,15 @@ def make_controller(
     The efforts of a law of another package are checked. Raises ConfigurationError.
     """
     law, gains = law_named(parameters.law), gains_by_phase(schedule, parameters)
-    missing = sorted(need.value for need in law.needs - {Need.TOOL_TARGETS})
+    missing = sorted(need.value for need in law.needs - {Need.TOOL_TARGETS, Need.PAYLOAD})
     if missing:
         raise ConfigurationError(f"control law {law.name!r} needs {missing[0]}, which the loop has not")
     start = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
     check_stability(law, robot, gains, ns_to_seconds(common.tick_ns), start)
     computed_torque = CompiledComputedTorque if common.dynamics == COMPILED else ComputedTorque
     longest_ns = longest_reference_ns(common, parameters)
-    controller = law.make(LawSetup(robot, gains, common.tick_ns, longest_ns, computed_torque))
+    setup = LawSetup(robot, gains, common.tick_ns, longest_ns, computed_torque, schedule.deputy)
+    controller = law.make(setup)
     return controller if law.name in SHIPPED else CheckedController(controller, robot.joint_names)
 
 
