@@ -26,6 +26,8 @@ class Bounds:
 # is integrated twice over a minute.
 _STEPS = Bounds(1e-7, 1e-11, 1e-10, 1e-8, 1e-8, 1e-12, 1e-12)
 _SMOOTH = Bounds(1e-9, 1e-12, 1e-11, 1e-10, 1e-9, 1e-12, 1e-12)
+# What the hand carries multiplies the condition of the mass matrix, and momentum is that of kilogrammes.
+_CARRYING = Bounds(1e-7, 1e-10, 1e-9, 1e-8, 1e-7, 1e-11, 1e-11)
 
 BOUNDS: Mapping[str, Bounds] = MappingProxyType(
     {
@@ -36,10 +38,16 @@ BOUNDS: Mapping[str, Bounds] = MappingProxyType(
         "three_arms": _SMOOTH,
         "six_joints": _SMOOTH,
         "planar": _SMOOTH,
+        "massive": _CARRYING,
     }
 )
 
 
-def scenario_of_bounds(name: str) -> str:
-    """Return whose bounds hold for a scenario: its own, or those of ``paper`` if it is not shipped."""
+def scenario_of_bounds(name: str, *, carries: bool) -> str:
+    """Return whose bounds hold for a run of a scenario.
+
+    Its own; those of ``massive`` if the deputy has mass, those of ``paper`` if it is not shipped.
+    """
+    if carries:
+        return "massive"
     return name if name in BOUNDS else "paper"

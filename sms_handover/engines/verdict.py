@@ -73,7 +73,8 @@ def verdict_of(engine: Engine, run: RunData, scenario: Scenario, name: str) -> V
 
     Raises BagError where a state or an effort is missing.
     """
-    replay, bounds = replay_of(run, scenario), scenario_of_bounds(name)
+    replay = replay_of(run, scenario)
+    bounds = scenario_of_bounds(name, carries=replay.deputy is not None)
     for effect in sorted(replay.effects, key=lambda each: each.value):
         if effect in engine.lacks:
             return Verdict(engine.title, bounds, f"{effect.value}: {engine.lacks[effect]}", 0, ())
