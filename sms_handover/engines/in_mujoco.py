@@ -33,17 +33,17 @@ class InMujoco:
         order = [replay.joint_names.index(name) for name in scene.robot.joint_names]
         scene.robot.place(_with_joints(replay.start_q, order), _with_joints(replay.start_v, order))
         efforts, tick_s = replay.efforts[:, order], ns_to_seconds(replay.tick_ns)
-        grips, samples = list(replay.grips), set(replay.samples.tolist())
+        holds, samples = list(replay.holds), set(replay.samples.tolist())
         taken, impulses, tick = _Samples(replay, order), list[Array](), 0
-        for stop in sorted({*samples, *(grip.tick for grip in grips)}):
+        for stop in sorted({*samples, *(hold.tick for hold in holds)}):
             for effort in efforts[tick:stop]:
                 scene.robot.drive(effort)
                 scene.advance(tick_s)
             tick = stop
             if stop in samples:
                 taken.add(scene)
-            while grips and grips[0].tick == stop:  # after the state of this tick, before its integration
-                impulse = scene.grip(grips.pop(0).holder)
+            while holds and holds[0].tick == stop:  # after the state of this tick, before its integration
+                impulse = scene.hold(holds.pop(0).holder)
                 impulses += [] if impulse is None else [impulse]
         return taken.motion(impulses)
 
@@ -68,7 +68,7 @@ class _Samples:
         self._deputy += [] if deputy is None else [deputy]
 
     def motion(self, impulses: list[Array]) -> Motion:
-        """Return all of them, with the impulses of grips."""
+        """Return all of them, with the impulses of grasps."""
         linear, angular = (np.array(part) for part in zip(*self._momenta, strict=True))
         tools = {arm: np.array(poses) for arm, poses in self._tools.items()}
         deputy, given = np.array(self._deputy).reshape(-1, 7), np.array(impulses).reshape(-1, 6)

@@ -16,7 +16,8 @@ from sms_handover.types import Array, Pose
 class MujocoScene:
     """The robot of a replay and its deputy, if it has mass.
 
-    ``robot`` is the model that moves now: bare, or with the deputy in a hand. Every grip makes a new one.
+    ``robot`` is the model that moves now: bare, or with the deputy in a hand. Each change of
+    hands makes a new one.
     """
 
     def __init__(self, replay: Replay) -> None:
@@ -57,7 +58,7 @@ class MujocoScene:
             angular += spin + np.cross(part.centre_of_mass - centre, own)
         return linear, angular
 
-    def grip(self, holder: str) -> Array | None:
+    def hold(self, holder: str) -> Array | None:
         """Let the deputy change hands, '' for none; return the impulse (6,) of a hand that takes hold."""
         if self._floating is None:
             return None

@@ -31,7 +31,7 @@ class FreeBody:
 
 
 @dataclass(frozen=True)
-class Grip:
+class Hold:
     """Who holds the deputy from the integration of tick ``tick`` on, '' for nobody."""
 
     tick: int
@@ -46,7 +46,7 @@ class Replay:
     say. ``start_q`` (7 + n,) and ``start_v`` (6 + n,) are as in RobotState; row k of ``efforts`` (N, n) N m
     was held over tick k of ``tick_ns``, joints in the order of ``joint_names``. ``samples`` (K,) are the
     numbers of the states to compare, in rising order; 0 is the start, N the last. ``deputy`` is None without
-    mass; it changes hands by ``grips``, in order of time, each time with the impulse that leaves no relative
+    mass; it changes hands by ``holds``, in order of time, each time with the impulse that leaves no relative
     twist between hand and body. ``effects`` are those that an engine has to know beyond efforts and links.
     """
 
@@ -61,7 +61,7 @@ class Replay:
     samples: npt.NDArray[np.int64]
     effects: frozenset[Effect]
     deputy: FreeBody | None = None
-    grips: tuple[Grip, ...] = ()
+    holds: tuple[Hold, ...] = ()
 
     def __post_init__(self) -> None:
         freeze(self, "start_q", "start_v", "efforts")
@@ -76,7 +76,7 @@ class Motion:
     ``q`` (K, 7 + n); ``tools`` (K, 7) by arm, position and quaternion x y z w in ``world``; the momenta
     (K, 3) of all bodies together in ``world`` axes, the angular one about the common centre of mass.
     ``deputy`` (K, 7) is its pose, without rows if it has no mass. ``impulses`` (G, 6) N s and N m s has a row
-    per grip that takes hold: what the hand gives to the deputy, about its origin in ``world`` axes.
+    per grasp: what the hand gives to the deputy, about its origin in ``world`` axes.
     """
 
     q: Array

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sms_handover.engines.protocol import Effect, FreeBody, Grip, Replay
+from sms_handover.engines.protocol import Effect, FreeBody, Hold, Replay
 from sms_handover.errors import BagError
 from sms_handover.plant.joint_limits import ENFORCE
 from sms_handover.run_data import RunData
@@ -32,7 +32,7 @@ def replay_of(run: RunData, scenario: Scenario) -> Replay:
         samples=np.searchsorted(run.tick_ns, run.reference_ns[compared_periods(run)]),
         effects=frozenset(_effects(scenario)),
         deputy=_deputy(scenario),
-        grips=_grips(run, tick_ns),
+        holds=_holds(run, tick_ns),
     )
 
 
@@ -70,11 +70,11 @@ def _deputy(scenario: Scenario) -> FreeBody | None:
     return FreeBody(deputy.body, deputy.deputy_in_world, deputy.twist_in_world)
 
 
-def _grips(run: RunData, tick_ns: int) -> tuple[Grip, ...]:
+def _holds(run: RunData, tick_ns: int) -> tuple[Hold, ...]:
     """Return what changed between hands and deputy."""
     first = int(run.tick_ns[0])
     return tuple(
-        Grip(
+        Hold(
             (event.stamp_ns - first) // tick_ns,
             "" if event.command.action is GraspAction.RELEASE else event.command.arm,
         )
