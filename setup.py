@@ -123,6 +123,9 @@ setup(
             "sphinx>=9.0,<10",
             "sphinx-copybutton>=0.5.2,<0.6",
         ],
+        # second engines for verify --with; the tested ranges
+        "mujoco": ["mujoco>=4.0,<5"],  # needs Python 3.11
+        "basilisk": ["bsk>=2.12,<2.13"],  # its own pins of other packages need an environment of its own
         "bench": [  # what the benchmarks compare with, beyond verify
             "drake>=1.51,<2",
             "matplotlib>=3.10,<4",

@@ -33,6 +33,7 @@ CORE = {
     "simulation",
     "bag",
     "analysis",
+    "engines",
     "scene",
     "playback",
     "report",
@@ -57,10 +58,11 @@ ALLOWED: dict[str, set[str]] = {
     "simulation": {"model", "conditions", *MIDDLE, "compiled", "clearance"},
     "bag": {"messages", "model", "simulation"},
     "analysis": {"model", "trajectory", "clearance", "simulation", "bag", "scene"},
+    "engines": {"model", "plant", "simulation", "analysis"},
     "scene": {"messages", "model", "trajectory", "clearance", "bag"},
     "playback": {"messages", "bag"},
     "export": {"messages", "model", "clearance", "bag"},
-    "report": {"plant", "clearance", "bag", "analysis", "scene"},
+    "report": {"plant", "clearance", "bag", "analysis", "engines", "scene"},
     "ros": CORE,
     "nodes": CORE | {"ros"},
     "external": CORE | {"ros", "nodes"},
@@ -73,6 +75,8 @@ OPTIONAL = {
     "matplotlib": FIGURES,
     "mpl_toolkits": FIGURES,
     "casadi": "sms_handover.compiled",
+    "mujoco": "sms_handover.engines",
+    "Basilisk": "sms_handover.engines",
 }  # who needs them
 ROS = re.compile(r"rclpy|ament_index_python|launch(_ros)?|tf2_\w+|rosidl_\w+|\w+_(msgs|srvs|interfaces)")
 
