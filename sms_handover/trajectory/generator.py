@@ -110,6 +110,7 @@ class TrajectoryGenerator:
         make_motion: Callable[[RobotModel], ToolMotion] = PinocchioToolMotion,
         *,
         abort_on_collision: bool = False,
+        fail_on_touch: bool = False,
     ) -> None:
         """Follow a schedule; ``make_motion`` makes what leads the tools of a robot."""
         self._robot = robot
@@ -118,7 +119,9 @@ class TrajectoryGenerator:
         self._motion = make_motion(robot)
         self._deputy_twist = DeputyTwist(schedule.deputy)
         self._schedule = schedule
-        self._progress = TaskProgress(schedule, parameters, abort_on_collision=abort_on_collision)
+        self._progress = TaskProgress(
+            schedule, parameters, abort_on_collision=abort_on_collision, fail_on_touch=fail_on_touch
+        )
         self._time_law = TIME_LAWS[parameters.time_law]
         self._damping = parameters.jacobian_damping
         self.reset()
