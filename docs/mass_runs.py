@@ -83,7 +83,9 @@ def scenario_of(case: Case) -> Scenario:
     A larger body has its centre farther from the robot, so that the grasp frames are where they were.
     """
     values: dict[str, object] = {"law": case.law, "deputy.mass": case.mass}
-    if case.scenario != FIRST:
+    if case.scenario == FIRST:  # its grippers enter the deputy, as if there were none
+        values["common.on_touch"] = "report"
+    else:
         values.update(_placed(case.scenario, SIZES[size_of(case.mass)][1]))
     factor = BELIEFS[case.belief]
     if factor != 1.0:

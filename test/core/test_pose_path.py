@@ -63,7 +63,7 @@ def test_twist_is_the_rate_of_the_pose(draw: Draw) -> None:
 
 
 def test_twist_includes_that_of_a_goal_that_moves(draw: Draw) -> None:
-    """By differences of poses of the path while its goal goes on with its twist; at the end it is the same."""
+    """By differences of poses of the path while its goal goes on; at the end it is the twist of the goal."""
     still, rate = _between(draw, 2.0), 0.7
     end, twist = se3_of(still.end), Twist(draw.vector(3), draw.vector(3))
 
