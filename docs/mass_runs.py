@@ -86,7 +86,7 @@ def scenario_of(case: Case) -> Scenario:
     if case.scenario == FIRST:  # its grippers enter the deputy, as if there were none
         values["common.on_touch"] = "report"
     else:
-        values.update(_placed(case.scenario, SIZES[size_of(case.mass)][1]))
+        values.update(placed(case.scenario, SIZES[size_of(case.mass)][1]))
     factor = BELIEFS[case.belief]
     if factor != 1.0:
         values["model.deputy.mass"] = factor * case.mass
@@ -126,7 +126,7 @@ def grown(folder: Path, part: Sequence[Case]) -> Mapping[Case, Outcome]:
     return found
 
 
-def _placed(name: str, size: tuple[float, ...]) -> dict[str, object]:
+def placed(name: str, size: tuple[float, ...]) -> dict[str, object]:
     """Return the values by which the deputy of a scenario gets a size while its grasp frames stay."""
     deputy = load_scenario(name).truth.schedule.deputy
     back = np.array([(size[0] - deputy.size[0]) / 2.0, 0.0, 0.0])
