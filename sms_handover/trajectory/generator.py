@@ -11,7 +11,9 @@ from sms_handover.model.deputy import DeputyDescription
 from sms_handover.model.known_payload import EMPTY_HANDS, Grip, KnownPayload
 from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.model.robot_model import RobotModel
+from sms_handover.trajectory.deputy_twist import Before, DeputyTwist, twist_at
 from sms_handover.trajectory.parameters import TrajectoryParameters
+from sms_handover.trajectory.pose_path import PosePath
 from sms_handover.trajectory.schedule import (
     GraspFrameTarget,
     Hold,
@@ -82,12 +84,16 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class GeneratorState:
-    """Progress of the task, joints (n,) rad and tools as the phase began, and who holds the deputy."""
+    """Progress of the task, joints (n,) rad and tools as the phase began, who holds the deputy, where it was.
+
+    ``deputy_before`` is None unless the motion of the deputy is followed.
+    """
 
     progress: ProgressState
     joints_at_start: Array
     tools_at_start: Mapping[str, Pose]
     grip: Grip = EMPTY_HANDS
+    deputy_before: Before | None = None
 
 
 class TrajectoryGenerator:
@@ -111,6 +117,7 @@ class TrajectoryGenerator:
         self._make_motion = make_motion
         self._payload = KnownPayload(robot, schedule.deputy)
         self._motion = make_motion(robot)
+        self._deputy_twist = DeputyTwist(schedule.deputy)
         self._schedule = schedule
         self._progress = TaskProgress(
             schedule, parameters, abort_on_collision=abort_on_collision, fail_on_touch=fail_on_touch
@@ -123,18 +130,21 @@ class TrajectoryGenerator:
         """Return to the start of the schedule."""
         self._progress.reset()
         self._hold(EMPTY_HANDS)
+        self._deputy_twist.before = None
         self._joints_at_start: Array = np.zeros(self._robot.n_joints)
         self._tools_at_start: Mapping[str, Pose] = {}
 
     def snapshot(self) -> GeneratorState:
         """Return the state to :meth:`restore`."""
         joints, tools = read_only(self._joints_at_start), dict(self._tools_at_start)
-        return GeneratorState(self._progress.snapshot(), joints, tools, self._payload.grip)
+        before = self._deputy_twist.before
+        return GeneratorState(self._progress.snapshot(), joints, tools, self._payload.grip, before)
 
     def restore(self, state: GeneratorState) -> None:
         """Go back to a former state; raises ConfigurationError if it is that of another schedule."""
         self._progress.restore(state.progress)
         self._hold(state.grip)
+        self._deputy_twist.before = state.deputy_before
         self._joints_at_start, self._tools_at_start = state.joints_at_start, state.tools_at_start
 
     def targets(self, state: RobotState, deputy_in_world: Pose) -> tuple[TaskPhase, Targets]:
@@ -258,6 +268,7 @@ class TrajectoryGenerator:
         )
         poses: dict[str, Pose] = {}
         twists: dict[str, Twist] = {}
+        deputy_twist = self._deputy_twist.at(state.stamp_ns, deputy_in_world)
         position = np.array(state.joint_position)
         velocity = np.zeros(self._robot.n_joints)
         for arm, target in stage.targets.items():
@@ -266,7 +277,12 @@ class TrajectoryGenerator:
             match target:
                 case ToolTarget() | GraspFrameTarget():
                     goal = goal_in_world(target, self._schedule.deputy, deputy_in_world)
-                    poses[arm], twists[arm] = self._motion.on_path(self._tools_at_start[arm], goal, progress)
+                    tool = self._tools_at_start[arm]
+                    if deputy_twist and isinstance(target, GraspFrameTarget):
+                        moves = twist_at(deputy_twist, deputy_in_world.position, goal.position)
+                        poses[arm], twists[arm] = PosePath(tool, goal, moves).at(progress)
+                    else:
+                        poses[arm], twists[arm] = self._motion.on_path(tool, goal, progress)
                 case JointTarget():
                     position[joints], velocity[joints] = _joint_motion(start, target.position, progress)
                 case Hold():
