@@ -108,6 +108,7 @@ def is_refused(topic: str) -> bool:
 SOLVE_IK = "solve_ik"  # service of the ik node
 
 _OURS = "sms_handover_interfaces/msg"
+RUN_STATE_TYPE = f"{_OURS}/RunState"
 
 
 def graph_topics(arms: Iterable[str], *, clearance: bool = False) -> tuple[Topic, ...]:
@@ -135,7 +136,7 @@ def graph_topics(arms: Iterable[str], *, clearance: bool = False) -> tuple[Topic
         Topic(TF, TF_TYPE, (PLANT, TRAJECTORY), (), Rate.REFERENCE),
         Topic(TF_STATIC, TF_TYPE, (PLANT,), (), Rate.CHANGE),
         Topic(DEPUTY_MARKER, "visualization_msgs/msg/Marker", (PLANT,), (), Rate.CHANGE),
-        Topic(RUN_STATE, f"{_OURS}/RunState", (PLANT,), everyone_else, Rate.CHANGE),
+        Topic(RUN_STATE, RUN_STATE_TYPE, (PLANT,), everyone_else, Rate.CHANGE),
         Topic(RUN_READY, text, everyone_else, (PLANT,), Rate.CHANGE),
         Topic(RUN_PUBLISHED, f"{_OURS}/PublishedCounts", LOOP_NODES, (), Rate.CHANGE),
         Topic(RUN_EVENTS, f"{_OURS}/RunEvent", LOOP_NODES, (), Rate.CHANGE),

@@ -1,6 +1,6 @@
 """Recorder node: writes every message of the graph to a bag."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -26,6 +26,8 @@ from sms_handover.graph.topics import (
     REFUSED_TOPIC,
     RUN_PUBLISHED,
     RUN_RECORDED,
+    RUN_STATE,
+    RUN_STATE_TYPE,
     Rate,
     Topic,
 )
@@ -281,9 +283,13 @@ class RecorderNode(GraphNode[RecorderParameters]):
 
     def _discover_topics(self) -> None:
         """Record topics beyond the graph, with the quality of service that their publishers offer."""
-        for name, type_names in self.get_topic_names_and_types():
+        found = self.get_topic_names_and_types()
+        others = other_graphs(found, self.resolve_topic_name(RUN_STATE))
+        for name, type_names in found:
+            if name in self._topics or name.startswith(others):
+                continue
             publishers = self.get_publishers_info_by_topic(name)
-            if name in self._topics or not publishers:
+            if not publishers:
                 continue
             self._topics.add(name)
             offers = [publisher.qos_profile for publisher in publishers]
@@ -299,6 +305,15 @@ class RecorderNode(GraphNode[RecorderParameters]):
     def _on_other(self, name: str, data: bytes) -> None:
         """Record one message of a topic beyond the graph, which comes by the executor."""
         self._recording.receive(name, data, time_ns())
+
+
+def other_graphs(found: Iterable[tuple[str, Sequence[str]]], own: str) -> tuple[str, ...]:
+    """Return how the topics of other graphs begin, known by their run state, which ours has as ``own``.
+
+    ``found`` are topics with their types. They go into bags of their own.
+    """
+    states = (name for name, types in found if RUN_STATE_TYPE in types and name != own)
+    return tuple(name.removesuffix(RUN_STATE) for name in states if name not in (own, f"/{RUN_STATE}"))
 
 
 def main(args: Sequence[str] | None = None) -> int:
