@@ -8,7 +8,7 @@ from sms_handover.clearance.monitor import PeriodClearance
 from sms_handover.compiled.periods import CompiledPeriods
 from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.control.law import Need
-from sms_handover.control.protocol import CheckedController, Controller, Guidance
+from sms_handover.control.protocol import Carrying, CheckedController, Controller, Guidance
 from sms_handover.control.registry import law_named
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
@@ -294,6 +294,9 @@ class Loop:
         self._controller.guide(self._guidance)
         events = plant.execute(phase.commands)
         generator.grasped(events)
+        if isinstance(self._controller, Carrying):
+            for event in events:
+                self._controller.grasped(event)
         clearance = None
         if self._monitor:
             pose, holder = deputy.deputy_in_world, plant.deputy.holder

@@ -17,7 +17,6 @@ from sms_handover.control.law import LawSetup, Need
 from sms_handover.control.parameters import ControllerParameters, gains_of
 from sms_handover.control.protocol import CheckedController, Controller
 from sms_handover.control.registry import SHIPPED, law_named, require_law
-from sms_handover.control.stability import check_stability
 from sms_handover.errors import ConfigurationError, ScheduleError
 from sms_handover.ik.levenberg_marquardt import FindJoints, find_joints
 from sms_handover.ik.parameters import IkParameters
@@ -29,6 +28,7 @@ from sms_handover.plant.joint_limits import ENFORCE
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.simulation.parameters import COMPILED, CommonParameters
 from sms_handover.simulation.period_runner import PeriodRunner, PythonRunner
+from sms_handover.simulation.stability import check_stability_by_phase
 from sms_handover.trajectory.generator import TrajectoryGenerator
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.schedule import Schedule
@@ -78,9 +78,11 @@ def make_generator(
     robot: RobotModel, schedule: Schedule, common: CommonParameters, parameters: TrajectoryParameters
 ) -> TrajectoryGenerator:
     """Return the generator of the trajectory; raises ConfigurationError."""
-    motion = CompiledToolMotion(robot) if common.dynamics == COMPILED else PinocchioToolMotion(robot)
-    aborts = common.aborts_on_collision
-    return TrajectoryGenerator(robot, schedule, parameters, motion, abort_on_collision=aborts)
+    motion = CompiledToolMotion if common.dynamics == COMPILED else PinocchioToolMotion
+    aborts, fails = common.aborts_on_collision, common.fails_on_touch
+    return TrajectoryGenerator(
+        robot, schedule, parameters, motion, abort_on_collision=aborts, fail_on_touch=fails
+    )
 
 
 def make_ik(robot: RobotModel, common: CommonParameters, parameters: IkParameters) -> FindJoints:
@@ -120,14 +122,16 @@ def make_controller(
     The efforts of a law of another package are checked. Raises ConfigurationError.
     """
     law, gains = law_named(parameters.law), gains_by_phase(schedule, parameters)
-    missing = sorted(need.value for need in law.needs - {Need.TOOL_TARGETS})
+    missing = sorted(need.value for need in law.needs - {Need.TOOL_TARGETS, Need.PAYLOAD})
     if missing:
         raise ConfigurationError(f"control law {law.name!r} needs {missing[0]}, which the loop has not")
     start = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
-    check_stability(law, robot, gains, ns_to_seconds(common.tick_ns), start)
+    places = [(start, "at the start configuration")] * len(gains)
+    check_stability_by_phase(law, robot, schedule, gains, ns_to_seconds(common.tick_ns), places)
     computed_torque = CompiledComputedTorque if common.dynamics == COMPILED else ComputedTorque
     longest_ns = longest_reference_ns(common, parameters)
-    controller = law.make(LawSetup(robot, gains, common.tick_ns, longest_ns, computed_torque))
+    setup = LawSetup(robot, gains, common.tick_ns, longest_ns, computed_torque, schedule.deputy)
+    controller = law.make(setup)
     return controller if law.name in SHIPPED else CheckedController(controller, robot.joint_names)
 
 
