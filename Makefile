@@ -115,11 +115,12 @@ colcon:  ## build the package as a ROS workspace does, with colcon, and list its
 	PYTHON="$(PYTHON)" .ci/colcon
 
 clean:  ## remove the environment and everything built; recordings stay
-	rm -rf $(VENV) $(LOWEST) $(VENV)-basilisk build dist docs/api *.egg-info interfaces/build interfaces/*.egg-info .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) $(LOWEST) $(VENV)-basilisk build dist docs/api *.egg-info interfaces*/build interfaces*/*.egg-info .mypy_cache .pytest_cache .ruff_cache
 
 # Stamps: each holds until a file it depends on changes.
-INTERFACES := $(wildcard interfaces/*.txt interfaces/*.xml interfaces/*.py interfaces/*.toml) \
+INTERFACES := $(wildcard interfaces/*.txt interfaces/*.cmake interfaces/*.xml interfaces/*.py interfaces/*.toml) \
               $(wildcard interfaces/msg/*.msg interfaces/srv/*.srv)
+TF2 := $(wildcard interfaces_tf2/*.txt interfaces_tf2/*.xml interfaces_tf2/*.py interfaces_tf2/*.toml interfaces_tf2/msg/*.msg)
 METADATA := setup.py setup.cfg pyproject.toml package.xml
 
 $(VENV)/.environment:
@@ -138,7 +139,13 @@ $(VENV)/.interfaces: $(VENV)/.environment $(INTERFACES) .ci/constraints.txt
 	$(PIP) ./interfaces
 	@touch $@
 
-$(VENV)/.package: $(METADATA) | $(VENV)/.interfaces
+# An environment of wheels has no tf2_msgs of ROS; where ROS is installed nobody comes here.
+$(VENV)/.tf2: $(VENV)/.interfaces $(TF2)
+	@echo "Building tf2_msgs, which no wheel carries (half a minute)"
+	$(PIP) ./interfaces_tf2
+	@touch $@
+
+$(VENV)/.package: $(METADATA) | $(VENV)/.interfaces $(VENV)/.tf2
 	$(PIP) --editable '.[analysis,ros]'
 	@touch $@
 

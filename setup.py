@@ -87,11 +87,12 @@ setup(
         "matlab": ["scipy>=1.13,<2"],
         "pandas": ["pandas>=2.2.2,<4"],
         "parquet": ["pyarrow>=18,<27"],
-        "ros": [  # the graph over DDS; sms_handover_interfaces is in interfaces/, in no index
+        "ros": [  # the graph over DDS; the last two are in interfaces/ and interfaces_tf2/, in no index
             "ros-jazzy-rclpy>=7.1.6,<7.2",
             "ros-jazzy-common-interfaces>=5.3.6,<5.4",
             "ros-jazzy-rmw-fastrtps-cpp>=8.4.3,<8.5",
             "sms_handover_interfaces",
+            "tf2_msgs",
         ],
         "test": [
             "casadi>=3.7,<4",

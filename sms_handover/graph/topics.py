@@ -47,6 +47,16 @@ class Topic:
         """Whether a late subscriber still gets the last message."""
         return self.rate is Rate.CHANGE
 
+    @property
+    def is_global(self) -> bool:
+        """Whether the topic is outside the namespace of the graph, where other graphs may publish too."""
+        return self.name.startswith("/")
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether others may publish on the topic too, by the conventions of ROS."""
+        return self.is_global or self.name in (TF, TF_STATIC)
+
 
 def target_pose(arm: str) -> str:
     """Return the name of the topic with an arm's target pose."""
@@ -85,7 +95,9 @@ RUN_RECORDED = "run/recorded"  # up to which stamp everything is in the bag
 LOOP_TIMING = "loop_timing"
 CLOCK = "/clock"
 DIAGNOSTICS = "/diagnostics"
-TF = "/tf"  # written into the bag by the recorder; tf2_msgs cannot be imported everywhere
+TF = "tf"  # relative, so that the equal frames of two graphs stay apart; without a namespace it is /tf
+TF_STATIC = "tf_static"
+TF_TYPE = "tf2_msgs/msg/TFMessage"
 
 REFUSED_TOPIC = "/refused"  # ends the topic of a bag with what others published on a topic of one node
 
@@ -98,6 +110,7 @@ def is_refused(topic: str) -> bool:
 SOLVE_IK = "solve_ik"  # service of the ik node
 
 _OURS = "sms_handover_interfaces/msg"
+RUN_STATE_TYPE = f"{_OURS}/RunState"
 
 
 def graph_topics(
@@ -127,8 +140,10 @@ def graph_topics(
         Topic(ENERGY, f"{_OURS}/EnergyStamped", (PLANT,), (), Rate.REFERENCE),
         Topic(IK_STATUS, f"{_OURS}/IkStatus", (TRAJECTORY,), (), Rate.REFERENCE),
         Topic(ROBOT_DESCRIPTION, text, (PLANT,), (), Rate.CHANGE),
+        Topic(TF, TF_TYPE, (PLANT, TRAJECTORY), (), Rate.REFERENCE),
+        Topic(TF_STATIC, TF_TYPE, (PLANT,), (), Rate.CHANGE),
         Topic(DEPUTY_MARKER, "visualization_msgs/msg/Marker", (PLANT,), (), Rate.CHANGE),
-        Topic(RUN_STATE, f"{_OURS}/RunState", (PLANT,), everyone_else, Rate.CHANGE),
+        Topic(RUN_STATE, RUN_STATE_TYPE, (PLANT,), everyone_else, Rate.CHANGE),
         Topic(RUN_READY, text, everyone_else, (PLANT,), Rate.CHANGE),
         Topic(RUN_PUBLISHED, f"{_OURS}/PublishedCounts", LOOP_NODES, (), Rate.CHANGE),
         Topic(RUN_EVENTS, f"{_OURS}/RunEvent", LOOP_NODES, (), Rate.CHANGE),

@@ -79,6 +79,13 @@ class CommonParameters:
         "and uses public interfaces only",
         choices=TRANSPORTS,
     )
+    spin: float = parameter(
+        "wall time for which plant and controller look for what they await in lock step before they sleep; "
+        "it gives way to others, and stops where it does not pay; 0: never",
+        unit="s",
+        minimum=0.0,
+        maximum=0.1,
+    )
     cpu: int = parameter("CPU core of the nodes of the loop; -1: any", minimum=-1, maximum=4095)
     priority: int = parameter(
         "real-time priority of the nodes of the loop (SCHED_FIFO), where permitted; 0: none",

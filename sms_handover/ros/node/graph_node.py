@@ -24,6 +24,7 @@ from sms_handover.ros.node.run_membership import RunMembership
 from sms_handover.ros.parameters import declare, named_scenario, reject_unknown
 from sms_handover.ros.process.main import EXIT_OK, WAIT_S, RunnableNode, Stop
 from sms_handover.ros.process.realtime import settle
+from sms_handover.ros.transport.spinning import spin_of
 from sms_handover.simulation.parameters import DIRECT, EXECUTOR, LOCKSTEP, CommonParameters
 from sms_handover.simulation.scenario import deputy_masses, load_world
 from sms_handover.trajectory.schedule import Schedule
@@ -133,6 +134,7 @@ class GraphNode(LifecycleNode, Generic[P]):
         self.create_timer(_DIAGNOSTICS_PERIOD_S, self.publish_diagnostics)
         if self.get_name() in LOOP_NODES:  # processor and priority are for those
             settle(self.common)
+        self.inputs.loop.spin = spin_of(self.get_name(), self.common)
 
     def activate(self) -> None:
         """Take part in the run: what has waited in lock step is worked on now."""

@@ -23,6 +23,8 @@ _CONTENTS = {
     topics.ENERGY: "kinetic energy, work of the joint efforts and from outside, and what became heat [J]",
     topics.IK_STATUS: "how the last inverse-kinematics solve ended: status, iterations, errors [m, rad]",
     topics.ROBOT_DESCRIPTION: "URDF of the robot",
+    topics.TF: "every moving link in its parent [m], and in world base_link, deputy and targets",
+    topics.TF_STATIC: "every link that does not move in its parent [m], and the grasp frames in deputy",
     topics.RUN_STATE: "whether the run waits, runs, pauses or is over",
     topics.RUN_READY: "name of a node that is ready to begin",
     topics.RUN_PUBLISHED: "how many messages a node has published on each topic, once at the end",
