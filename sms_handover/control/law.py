@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from sms_handover.control.computed_torque import ComputedTorque, TrackingEfforts
-from sms_handover.control.protocol import Controller
+from sms_handover.control.protocol import Controller, Distances, Preview
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import Array
 
@@ -39,7 +39,9 @@ class LawSetup(Generic[G]):
     """What a controller is made from; ``gains`` has one set per phase of the schedule, by phase index.
 
     A joint reference is extrapolated up to an age of ``longest_reference_ns``, without bound if None.
-    ``computed_torque`` makes the inverse dynamics of a robot, by Pinocchio or compiled.
+    ``computed_torque`` makes the inverse dynamics of a robot, by Pinocchio or compiled. Guidance comes every
+    ``reference_ns``. What a law needs besides it gets if it declares so: a ``preview`` of targets to come, the
+    ``distances`` between bodies.
     """
 
     robot: RobotModel
@@ -47,6 +49,9 @@ class LawSetup(Generic[G]):
     tick_ns: int
     longest_reference_ns: int | None = None
     computed_torque: Callable[[RobotModel], TrackingEfforts] = ComputedTorque
+    reference_ns: int = 20_000_000
+    preview: Preview | None = None
+    distances: Distances | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,212 @@
+"""Preview of the targets to come: what phase, schedule and present targets tell about the next seconds."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+
+from sms_handover.model.poses import pose_distance, pose_of, se3_of
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.trajectory.generator import goal_in_world
+from sms_handover.trajectory.pose_path import PosePath
+from sms_handover.trajectory.schedule import ArmTarget, GraspFrameTarget, Hold, JointTarget, Schedule
+from sms_handover.trajectory.time_law import TIME_LAWS, Progress
+from sms_handover.types import (
+    Array,
+    GraspAction,
+    GraspCommand,
+    JointReference,
+    Pose,
+    PreviewedTargets,
+    PreviewState,
+    TaskPhase,
+)
+from sms_handover.units import ns_to_seconds
+
+_SAME = 1e-9  # [m + rad] by which one time law must fit better than the one that has fitted so far
+
+
+@dataclass(frozen=True, eq=False)
+class _Leg:
+    """A phase as far as it moves the arms: from where to where, and when."""
+
+    index: int
+    start_ns: int
+    end_ns: int
+    motion_s: float
+    targets: Mapping[str, ArmTarget]
+    tools: Mapping[str, Pose]
+    goals: Mapping[str, Pose]
+    joints: Array
+    ends: Array
+
+
+class TargetPreview:
+    """Expects the targets of the generator from what a controller is told, and from the schedule.
+
+    A controller does not hear by which time law targets move, nor where the deputy is: of the time laws that
+    one is taken which fits the targets of now best, and the deputy is where the schedule has it, then in the
+    grasp of the arm that was to grasp it. What the targets of now are off by, those to come are too. A preview
+    ends where commands are due, as what follows depends on their outcome.
+    """
+
+    def __init__(self, robot: RobotModel, schedule: Schedule) -> None:
+        """Follow a schedule, as known to the controller."""
+        self._robot, self._schedule = robot, schedule
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to the start of a run."""
+        self._now: PreviewState | None = None
+
+    @property
+    def state(self) -> PreviewState | None:
+        """Everything that later previews depend on, besides the next update."""
+        return self._now
+
+    def restore(self, state: PreviewState | None) -> None:
+        """Go back to a former :attr:`state`."""
+        self._now = state
+
+    def update(
+        self, phase: TaskPhase, reference: JointReference, tool_in_world: Mapping[str, Pose], q: Array
+    ) -> None:
+        """Take the guidance of now, at a configuration (7 + n,)."""
+        tools = self._robot.tools_at(q)
+        now = self._now
+        if now is None or phase.entry != now.phase.entry:
+            now = self._begun(phase, q, tools)
+        if now.holder:
+            frame = se3_of(self._schedule.deputy.grasp_frames[now.grasp_frame])
+            held = pose_of(se3_of(tools[now.holder]) * frame.inverse())
+            now = replace(now, deputy_in_world=held)
+        self._leg = self._leg_of(now)
+        now = replace(now, time_law=self._fitting(now, reference, tool_in_world))
+        self._corrections = self._corrections_of(now, phase.stamp_ns, tool_in_world)
+        self._now = now
+
+    def ahead(self, stamps_ns: Iterable[int]) -> tuple[PreviewedTargets, ...]:
+        """Return the targets at some instants in order, from that of the last update on."""
+        found, leg = list[PreviewedTargets](), self._leg
+        assert self._now is not None
+        for stamp_ns in stamps_ns:
+            while stamp_ns >= leg.end_ns and (later := self._after(leg)) is not None:
+                leg = later
+            found.append(self._targets(self._now, leg, stamp_ns))
+        return tuple(found)
+
+    def _begun(self, phase: TaskPhase, q: Array, tools: Mapping[str, Pose]) -> PreviewState:
+        """Return the state of a phase that begins, its commands taken as carried out."""
+        now, joints = self._now, q[-self._robot.n_joints :]
+        holder, frame = (now.holder, now.grasp_frame) if now else ("", "")
+        deputy = now.deputy_in_world if now else self._schedule.deputy.deputy_in_world
+        law = now.time_law if now else next(iter(TIME_LAWS))
+        for command in phase.commands:
+            holder, frame = _held_after(command)
+        return PreviewState(phase, phase.stamp_ns, joints, tools, holder, frame, deputy, law)
+
+    def _leg_of(self, now: PreviewState) -> _Leg:
+        """Return the leg of the phase of now."""
+        phase = self._schedule.phases[now.phase.index]
+        targets = {arm: Hold() for arm in phase.targets} if now.phase.failed else phase.targets
+        end_ns = now.start_ns + phase.end_ns - phase.start_ns
+        return self._leg_from(now, now.phase.index, end_ns, targets, now.tools_at_start, now.joints_at_start)
+
+    def _after(self, leg: _Leg) -> _Leg | None:
+        """Return the leg after another, None where that is not known yet."""
+        now, following = self._now, leg.index + 1
+        assert now is not None
+        if now.phase.failed or following == len(self._schedule.phases):
+            return None
+        phase = self._schedule.phases[following]
+        if phase.commands:
+            return None
+        end_ns = leg.end_ns + phase.end_ns - phase.start_ns
+        tools = {**leg.tools, **leg.goals}
+        return self._leg_from(now, following, end_ns, phase.targets, tools, leg.ends, leg.end_ns)
+
+    def _leg_from(
+        self,
+        now: PreviewState,
+        index: int,
+        end_ns: int,
+        targets: Mapping[str, ArmTarget],
+        tools: Mapping[str, Pose],
+        joints: Array,
+        start_ns: int | None = None,
+    ) -> _Leg:
+        """Return the leg of a phase from where tools and joints are when it begins."""
+        goals, ends = dict[str, Pose](), np.array(joints)
+        for arm, target in targets.items():
+            if isinstance(target, JointTarget):
+                ends[self._robot.arm_joints[arm]] = target.position
+            elif not isinstance(target, Hold):
+                goals[arm] = goal_in_world(target, self._schedule.deputy, now.deputy_in_world)
+        begun_ns = now.start_ns if start_ns is None else start_ns
+        motion_s = ns_to_seconds(self._schedule.phases[index].motion_ns)
+        return _Leg(index, begun_ns, end_ns, motion_s, targets, tools, goals, joints, ends)
+
+    def _fitting(
+        self, now: PreviewState, reference: JointReference, tool_in_world: Mapping[str, Pose]
+    ) -> str:
+        """Return the time law whose targets are nearest to those of now, that of before if several are."""
+        misfit = {law: self._misfit(law, now, reference, tool_in_world) for law in TIME_LAWS}
+        best = min(misfit, key=misfit.__getitem__)
+        return best if misfit[best] < misfit[now.time_law] - _SAME else now.time_law
+
+    def _misfit(
+        self, law: str, now: PreviewState, reference: JointReference, tool_in_world: Mapping[str, Pose]
+    ) -> float:
+        """Return how far the targets under a time law are from those of now, in m + rad."""
+        leg, misfit = self._leg, 0.0
+        done = _progress(law, leg, reference.stamp_ns)
+        for arm, goal in leg.goals.items():
+            pose = PosePath(leg.tools[arm], goal).at(done)[0]
+            misfit += sum(pose_distance(pose, tool_in_world[arm]))
+        for arm, target in leg.targets.items():
+            if isinstance(target, JointTarget):
+                part = self._robot.arm_joints[arm]
+                expected = leg.joints[part] + done.fraction * (leg.ends[part] - leg.joints[part])
+                misfit += float(np.abs(expected - reference.position[part]).sum())
+        return misfit
+
+    def _corrections_of(
+        self, now: PreviewState, stamp_ns: int, tool_in_world: Mapping[str, Pose]
+    ) -> Mapping[str, tuple[Array, Array]]:
+        """Return by how much the targets of now are off: a rotation (3, 3) and a shift (3,) m in ``world``."""
+        done, found = _progress(now.time_law, self._leg, stamp_ns), {}
+        for arm, goal in self._leg.goals.items():
+            expected, given = PosePath(self._leg.tools[arm], goal).at(done)[0], tool_in_world[arm]
+            turn = se3_of(given).rotation @ se3_of(expected).rotation.T
+            found[arm] = turn, given.position - expected.position
+        return found
+
+    def _targets(self, now: PreviewState, leg: _Leg, stamp_ns: int) -> PreviewedTargets:
+        """Return the targets of a leg at an instant."""
+        done, tools = _progress(now.time_law, leg, stamp_ns), dict[str, Pose]()
+        for arm, goal in leg.goals.items():
+            pose = PosePath(leg.tools[arm], goal).at(done)[0]
+            if arm in self._corrections:
+                turn, shift = self._corrections[arm]
+                pose = pose_of(pin.SE3(turn @ se3_of(pose).rotation, pose.position + shift))
+            tools[arm] = pose
+        joints = leg.joints + done.fraction * (leg.ends - leg.joints)
+        aims = {arm for arm, target in leg.targets.items() if isinstance(target, GraspFrameTarget)}
+        touching = frozenset(aims | ({now.holder} if now.holder else set()))
+        if now.holder:
+            frame = self._schedule.deputy.grasp_frames[now.grasp_frame]
+            return PreviewedTargets(tools, joints, now.holder, pose_of(se3_of(frame).inverse()), touching)
+        return PreviewedTargets(tools, joints, "", now.deputy_in_world, touching)
+
+
+def _progress(law: str, leg: _Leg, stamp_ns: int) -> Progress:
+    """Return the progress of a leg at an instant under a time law."""
+    return TIME_LAWS[law](ns_to_seconds(stamp_ns - leg.start_ns), leg.motion_s)
+
+
+def _held_after(command: GraspCommand) -> tuple[str, str]:
+    """Return which arm holds the deputy by which grasp frame once a command has succeeded."""
+    if command.action is GraspAction.RELEASE:
+        return "", ""
+    return command.arm, command.grasp_frame
