@@ -7,6 +7,7 @@ import numpy as np
 from sms_handover.control.mpc.horizon import Horizon
 from sms_handover.control.mpc.parameters import MpcGains
 from sms_handover.control.mpc.prediction import Prediction
+from sms_handover.control.mpc.products import product, times_vector
 from sms_handover.control.mpc.sensitivity import Sensitivity
 from sms_handover.control.mpc.tool_errors import ToolErrors
 from sms_handover.model.robot_model import RobotModel
@@ -43,8 +44,8 @@ class PlanCost:
         rows = sensitivity.rows(errors.by, later)
         flat, weights = rows.reshape(-1, count * n), (times[:, None] * self._of_tools).ravel()
         weighted = flat * weights[:, None]
-        hessian = weighted.T @ flat
-        gradient = weighted.T @ errors.errors.ravel()
+        hessian = product(weighted.T, flat)
+        gradient = times_vector(weighted.T, errors.errors.ravel())
 
         alpha, beta = horizon.position_per_acceleration[later], horizon.rate_per_acceleration[later]
         by_joint = np.zeros((n, count, count))

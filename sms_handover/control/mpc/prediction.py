@@ -21,7 +21,7 @@ from sms_handover.control.mpc.momentum import BaseStart
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.types import Array
 
-_ROUNDS = 5  # [-] of the implicit step of the attitude; each shrinks the error by h |omega| / 4, below 0.01
+_ROUNDS = 3  # [-] of the implicit step of the attitude; each shrinks its error by h |omega| / 4, below 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +40,8 @@ class Prediction:
 
     ``q``, ``w`` (N + 1, n); ``phi`` (N + 1, 3) rad and ``omega`` (N + 1, 3) rad/s of the base in its own axes;
     ``twist`` (N + 1, 6) of the base; ``effort`` (N, n) N m where an interval begins. ``centre`` (N + 1, 3) m is
-    the centre of mass in the base, ``centre_per_q`` (N + 1, 3, n) its derivative; ``centre_in_world``
-    (N + 1, 3). ``step_before`` and ``step_after`` (N, 3, 3) and ``by_omega_before``, ``by_omega_after``
-    (N, 3, 3) are those of the trapezoidal rule: D_after dphi_k+1 = D_before dphi_k + B domega_k + A domega_k+1.
+    the centre of mass in the base, ``centre_per_q`` (N + 1, 3, n) its derivative, ``centre_in_world``
+    (N + 1, 3) m where it is; ``rotation`` (N + 1, 3, 3) is the attitude of the base in ``world``.
     """
 
     q: Array
@@ -98,11 +97,12 @@ class PredictionModel:
                 h, before = horizon.intervals[k - 1], flow
                 guess = phi[k - 1] + h * before
                 for _ in range(_ROUNDS):
-                    nu = inverse @ (_momentum_in_base(start, guess, c)[0] - of_joints)
+                    nu = inverse @ (_momentum_in_base(start, guess, c) - of_joints)
                     flow = _flow(guess, nu[3:])
                     guess = phi[k - 1] + 0.5 * h * (before + flow)
                 phi[k] = guess
-            momentum, momentum_by_phi, momentum_by_c = _momentum_in_base(start, phi[k], c)
+            momentum = _momentum_in_base(start, phi[k], c)
+            momentum_by_phi, momentum_by_c = _momentum_derivatives(momentum, phi[k], c)
             nu = inverse @ (momentum - of_joints)
             flow = _flow(phi[k], nu[3:])
             twist[k], centre[k], centre_per_q[k] = nu, c, coupling[:3] / mass
@@ -134,26 +134,35 @@ class PredictionModel:
         )
 
 
-def _momentum_in_base(start: BaseStart, phi: Array, c: Array) -> tuple[Array, Array, Array]:
-    """Return h_b (6,) about the base's origin in its axes, and its derivatives by phi and by c, each (6, 3)."""
+def _momentum_in_base(start: BaseStart, phi: Array, c: Array) -> Array:
+    """Return the momentum h_b (6,) about the base's origin in its axes."""
     turned = (start.rotation @ pin.exp3(phi)).T
     linear, angular = turned @ start.linear_momentum, turned @ start.angular_momentum
-    by_turn = pin.Jexp3(phi)  # d(R^T P) = [R^T P] J_r(phi) dphi
-    linear_by = pin.skew(linear) @ by_turn
-    by_phi = np.vstack([linear_by, pin.skew(angular) @ by_turn + pin.skew(c) @ linear_by])
-    by_c = np.vstack([np.zeros((3, 3)), -pin.skew(linear)])
-    return np.concatenate([linear, angular + np.cross(c, linear)]), by_phi, by_c
+    return np.concatenate([linear, angular + pin.skew(c) @ linear])
+
+
+def _momentum_derivatives(momentum: Array, phi: Array, c: Array) -> tuple[Array, Array]:
+    """Return the derivatives (6, 3) of h_b by phi and by c."""
+    turn, around = pin.Jexp3(phi), pin.skew(c)
+    linear = pin.skew(momentum[:3])  # d(R^T P) = [R^T P] J_r(phi) dphi
+    angular = pin.skew(momentum[3:] - around @ momentum[:3])
+    by_phi, by_c = np.zeros((BASE_NV, 3)), np.zeros((BASE_NV, 3))
+    by_phi[:3] = linear @ turn
+    by_phi[3:] = angular @ turn + around @ by_phi[:3]
+    by_c[3:] = -linear
+    return by_phi, by_c
 
 
 def _flow(phi: Array, omega: Array) -> Array:
     """Return dphi/dt = omega + phi x omega / 2 + phi x (phi x omega) / 12, up to phi^4 omega / 720."""
-    once = np.cross(phi, omega)
-    return np.asarray(omega + 0.5 * once + np.cross(phi, once) / 12.0)
+    turn = pin.skew(phi)
+    once = turn @ omega
+    return np.asarray(omega + 0.5 * once + turn @ once / 12.0)
 
 
 def flow_derivatives(phi: Array, omega: Array) -> tuple[Array, Array]:
     """Return the derivatives (3, 3) of :func:`_flow` by phi and by omega."""
     turn, spin = pin.skew(phi), pin.skew(omega)
     by_omega = np.eye(3) + 0.5 * turn + turn @ turn / 12.0
-    by_phi = -0.5 * spin - (pin.skew(np.cross(phi, omega)) + turn @ spin) / 12.0
+    by_phi = -0.5 * spin - (pin.skew(turn @ omega) + turn @ spin) / 12.0
     return by_phi, by_omega

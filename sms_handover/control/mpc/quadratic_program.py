@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from sms_handover.control.mpc.constraints import Constraint
+from sms_handover.control.mpc.products import times_vector
 from sms_handover.errors import MissingDependencyError
 from sms_handover.types import Array, PlanStatus
 
@@ -58,7 +59,7 @@ def solve(
     if flag > 0:
         active = _active(constraints, multipliers)
         slack, row = _worst(constraints, change, soft=True)
-        residual = hessian @ change + gradient + matrix.T @ multipliers
+        residual = times_vector(hessian, change) + gradient + times_vector(matrix.T, multipliers)
         scaled = float(np.abs(residual).max() / max(1.0, float(np.abs(gradient).max())))
         return Solution(PlanStatus.SOLVED, change, iterations, active, slack, row, scaled)
     nothing = np.zeros(0)
@@ -94,7 +95,7 @@ def _worst(constraints: Sequence[Constraint], change: Array, *, soft: bool) -> t
     for item in constraints:
         if item.soft is not soft:
             continue
-        value = item.value + item.matrix @ change
+        value = item.value + times_vector(item.matrix, change)
         excess = np.maximum(value - item.limit_high, item.limit_low - value)
         share = excess / item.scale
         row = int(share.argmax())
