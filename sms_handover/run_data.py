@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sms_handover.graph.events import RunEvent
-from sms_handover.types import GraspEvent, TaskPhase
+from sms_handover.types import GraspEvent, PlanReport, TaskPhase
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
@@ -27,7 +27,8 @@ class RunData:
     per arm ``target_pose`` and ``tool_pose`` (M, 7) in ``world``; ``deputy_pose`` (M, 7);
     momentum (M, 3) in ``world`` axes, the angular one about the centre of mass; ``kinetic_energy``
     and ``work`` (M,) J, of the joint efforts less what joint stops have taken; ``ik_status`` (M,) the number
-    of the IkStatus message, -1 where none was asked.
+    of the IkStatus message, -1 where none was asked. ``plans`` has the reports of a predictive law, one per
+    solve.
     """
 
     joint_names: tuple[str, ...]
@@ -53,6 +54,7 @@ class RunData:
     phases: tuple[TaskPhase, ...]
     grasp_events: tuple[GraspEvent, ...]
     run_events: tuple[RunEvent, ...] = ()
+    plans: tuple[PlanReport, ...] = ()
 
     def __post_init__(self) -> None:
         for item in fields(self):

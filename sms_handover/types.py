@@ -332,20 +332,23 @@ class DeputyState:
 class PreviewedTargets:
     """What the arms are expected to do at one instant to come, as far as the schedule tells.
 
-    ``tool_in_world`` has the target pose of every tool that leads its arm; ``joint_position`` (n,) rad the
-    desired angles of the joints of all other arms. ``deputy`` is where the deputy is expected: in the tool of
+    ``tool_in_world`` has the target pose of every tool that leads its arm, ``tool_twist_in_world`` its twist;
+    ``joint_position`` (n,) rad and ``joint_velocity`` (n,) rad/s the desired motion of all other arms. ``deputy`` is where the deputy is expected: in the tool of
     ``holder``, or in ``world`` while nobody holds it; ``touching`` has the arms whose gripper may touch it.
     """
 
     tool_in_world: Mapping[str, Pose]
+    tool_twist_in_world: Mapping[str, Twist]
     joint_position: Array
+    joint_velocity: Array
     holder: str
     deputy: Pose
     touching: frozenset[str]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "tool_in_world", MappingProxyType(dict(self.tool_in_world)))
-        freeze(self, "joint_position")
+        object.__setattr__(self, "tool_twist_in_world", MappingProxyType(dict(self.tool_twist_in_world)))
+        freeze(self, "joint_position", "joint_velocity")
 
 
 @dataclass(frozen=True, eq=False)

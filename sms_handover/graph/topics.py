@@ -30,6 +30,7 @@ class Rate(Enum):
     CLOCK = "every 10 ms of simulation time"
     CHANGE = "on change, latched"
     WALL = "every second of wall time"
+    SOLVE = "every solve of a predictive law"
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,7 @@ LINEAR_MOMENTUM = "momentum/linear"
 ANGULAR_MOMENTUM = "momentum/angular"
 ENERGY = "energy"
 IK_STATUS = "ik/status"
+MPC_STATUS = "mpc/status"  # only where the law solves a program as it goes on
 ROBOT_DESCRIPTION = "robot_description"
 DEPUTY_MARKER = "deputy/marker"
 RUN_STATE = "run/state"
@@ -117,6 +119,7 @@ def graph_topics(arms: Iterable[str], *, clearance: bool = False) -> tuple[Topic
         Topic(ANGULAR_MOMENTUM, vector, (PLANT,), (), Rate.REFERENCE),
         Topic(ENERGY, f"{_OURS}/EnergyStamped", (PLANT,), (), Rate.REFERENCE),
         Topic(IK_STATUS, f"{_OURS}/IkStatus", (TRAJECTORY,), (), Rate.REFERENCE),
+        Topic(MPC_STATUS, f"{_OURS}/MpcStatus", (CONTROLLER,), (), Rate.SOLVE),
         Topic(ROBOT_DESCRIPTION, text, (PLANT,), (), Rate.CHANGE),
         Topic(DEPUTY_MARKER, "visualization_msgs/msg/Marker", (PLANT,), (), Rate.CHANGE),
         Topic(RUN_STATE, f"{_OURS}/RunState", (PLANT,), everyone_else, Rate.CHANGE),

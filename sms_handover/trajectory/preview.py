@@ -21,6 +21,7 @@ from sms_handover.types import (
     PreviewedTargets,
     PreviewState,
     TaskPhase,
+    Twist,
 )
 from sms_handover.units import ns_to_seconds
 
@@ -184,20 +185,23 @@ class TargetPreview:
 
     def _targets(self, now: PreviewState, leg: _Leg, stamp_ns: int) -> PreviewedTargets:
         """Return the targets of a leg at an instant."""
-        done, tools = _progress(now.time_law, leg, stamp_ns), dict[str, Pose]()
+        done, tools, twists = _progress(now.time_law, leg, stamp_ns), dict[str, Pose](), dict[str, Twist]()
         for arm, goal in leg.goals.items():
-            pose = PosePath(leg.tools[arm], goal).at(done)[0]
+            pose, twist = PosePath(leg.tools[arm], goal).at(done)
             if arm in self._corrections:
                 turn, shift = self._corrections[arm]
                 pose = pose_of(pin.SE3(turn @ se3_of(pose).rotation, pose.position + shift))
-            tools[arm] = pose
+                twist = Twist(twist.linear, turn @ twist.angular)
+            tools[arm], twists[arm] = pose, twist
+        rates = done.rate * (leg.ends - leg.joints)
         joints = leg.joints + done.fraction * (leg.ends - leg.joints)
         aims = {arm for arm, target in leg.targets.items() if isinstance(target, GraspFrameTarget)}
         touching = frozenset(aims | ({now.holder} if now.holder else set()))
         if now.holder:
             frame = self._schedule.deputy.grasp_frames[now.grasp_frame]
-            return PreviewedTargets(tools, joints, now.holder, pose_of(se3_of(frame).inverse()), touching)
-        return PreviewedTargets(tools, joints, "", now.deputy_in_world, touching)
+            held = pose_of(se3_of(frame).inverse())
+            return PreviewedTargets(tools, twists, joints, rates, now.holder, held, touching)
+        return PreviewedTargets(tools, twists, joints, rates, "", now.deputy_in_world, touching)
 
 
 def _progress(law: str, leg: _Leg, stamp_ns: int) -> Progress:

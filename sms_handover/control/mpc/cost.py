@@ -13,6 +13,7 @@ from sms_handover.control.mpc.tool_errors import ToolErrors
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import Array, PreviewedTargets
 
+_DAMPING = 0.01  # [-] of the generalised Jacobian's inverse
 _REGULAR = 1e-8  # [-] added to the Hessian's diagonal
 
 
@@ -20,7 +21,8 @@ class PlanCost:
     """Sum over the horizon, times the interval that an instant begins, and 1 s at its end.
 
     ell = w_p |e_p|^2 + w_o |e_o|^2 of tools that have a target, w_q |q - q_d|^2 of the joints of other arms,
-    w_w |w|^2 of all joint rates, w_a |a|^2; each over 2.
+    w_w |w - w_d|^2 of all joint rates, w_a |a|^2; each over 2. Desired rates w_d are those of joint targets, and
+    the least that move the tools as their targets move.
     """
 
     def __init__(self, robot: RobotModel, gains: MpcGains, horizon: Horizon) -> None:
@@ -53,7 +55,7 @@ class PlanCost:
         rate_weights = gains.joint_rate_weight * times
         rate_weights[-1] = gains.terminal_rate_weight
         by_joint += beta.T @ (rate_weights[:, None] * beta)
-        slope += beta.T @ (rate_weights[:, None] * prediction.w[later])
+        slope += beta.T @ (rate_weights[:, None] * (prediction.w[later] - _led_rates(prediction, errors, targets)))
         held = gains.joint_position_weight * times[:, None] * self._led_by_joints(targets)
         aims = np.array([target.joint_position for target in targets])
         by_joint += np.einsum("kj,kn,ki->nji", alpha, held, alpha)
@@ -73,3 +75,15 @@ class PlanCost:
             for arm in target.tool_in_world:
                 led[k, self._robot.arm_joints[arm]] = 0.0
         return led
+
+
+def _led_rates(prediction: Prediction, errors: ToolErrors, targets: Sequence[PreviewedTargets]) -> Array:
+    """Return the desired joint rates (K, n): J*^T (J* J*^T + d^2)^-1 of the targets' motion [Umetani1989]."""
+    rates = np.array([target.joint_velocity for target in targets])
+    if not errors.target_rates.any():
+        return rates
+    jacobian = errors.by.q + errors.by.phi @ prediction.omega_by.w[1:]
+    transposed = jacobian.transpose(0, 2, 1)
+    damped = jacobian @ transposed + _DAMPING**2 * np.eye(jacobian.shape[1])
+    found = transposed @ np.linalg.solve(damped, errors.target_rates[:, :, None])
+    return np.asarray(rates + found[:, :, 0])

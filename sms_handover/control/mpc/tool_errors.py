@@ -17,10 +17,13 @@ ROWS = 6  # [-] of a tool: position in world, then the rotation vector from targ
 
 @dataclass(frozen=True, eq=False)
 class ToolErrors:
-    """Errors (K, 6 A) in m and rad of A tools at K instants; ``led`` (K, A) tells which tools have a target."""
+    """Errors (K, 6 A) in m and rad of A tools at K instants, zero where a tool has no target.
+
+    ``target_rates`` (K, 6 A) is the motion of the targets in the same coordinates.
+    """
 
     errors: Array
-    led: Array
+    target_rates: Array
     by: Derivatives
 
 
@@ -34,7 +37,7 @@ class ToolErrorModel:
         """Return the errors at some placements; an arm without a target has zeros."""
         robot, model, data = self._robot, self._robot.pin, self._data
         count, rows, n = len(placed), ROWS * len(robot.arms), robot.n_joints
-        errors, led = np.zeros((count, rows)), np.zeros((count, len(robot.arms)))
+        errors, rates = np.zeros((count, rows)), np.zeros((count, rows))
         by_q, by_phi = np.zeros((count, rows, n)), np.zeros((count, rows, 3))
         for k, (place, target) in enumerate(zip(placed, targets, strict=True)):
             if not target.tool_in_world:
@@ -43,7 +46,6 @@ class ToolErrorModel:
             for index, arm in enumerate(robot.arms):
                 if arm not in target.tool_in_world:
                     continue
-                led[k, index] = 1.0
                 frame, goal = robot.tool_frame_id[arm], se3_of(target.tool_in_world[arm])
                 tool = pin.updateFramePlacement(model, data, frame)
                 whole = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
@@ -52,6 +54,8 @@ class ToolErrorModel:
                 turn = pin.Jlog3(apart) @ tool.rotation.T
                 at = slice(ROWS * index, ROWS * index + ROWS)
                 errors[k, at] = np.concatenate([tool.translation - goal.translation, pin.log3(apart)])
+                twist = target.tool_twist_in_world[arm]
+                rates[k, at] = np.concatenate([twist.linear, turn @ twist.angular])
                 by_q[k, at] = np.vstack([of_q[:3], turn @ of_q[3:]])
                 by_phi[k, at] = np.vstack([of_phi[:3], turn @ of_phi[3:]])
-        return ToolErrors(errors, led, Derivatives(by_q, np.zeros_like(by_q), by_phi))
+        return ToolErrors(errors, rates, Derivatives(by_q, np.zeros_like(by_q), by_phi))

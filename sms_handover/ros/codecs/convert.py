@@ -16,6 +16,7 @@ from sms_handover_interfaces.msg import Clearance as ClearanceMessage
 from sms_handover_interfaces.msg import GraspCommand as GraspCommandMessage
 from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
 from sms_handover_interfaces.msg import IkStatus as IkStatusMessage
+from sms_handover_interfaces.msg import MpcStatus
 from sms_handover_interfaces.msg import RunEvent as RunEventMessage
 from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
 from std_msgs.msg import Header
@@ -25,7 +26,7 @@ from sms_handover.errors import MessageError, Reason
 from sms_handover.frames import WORLD
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.message_constants import CONSTANTS
-from sms_handover.types import Array, GraspCommand, GraspEvent, IkResult, Pose, TaskPhase, frozen
+from sms_handover.types import Array, GraspCommand, GraspEvent, IkResult, PlanReport, Pose, TaskPhase, frozen
 from sms_handover.units import NS_PER_S
 
 
@@ -122,6 +123,26 @@ def _group_message(item: GroupDistance) -> BodyClearance:
         allowed=item.allowed,
         first_point=first,
         second_point=second,
+    )
+
+
+def plan_message(report: PlanReport) -> MpcStatus:
+    """Return the report of a solve as a message."""
+    return MpcStatus(
+        header=header(report.stamp_ns),
+        plan=report.plan,
+        status=CONSTANTS[report.status],
+        iterations=report.iterations,
+        active=list(report.active),
+        largest_slack=report.largest_slack,
+        largest_slack_row=report.largest_slack_row,
+        kkt_residual=report.kkt_residual,
+        linearization_time=report.linearization_time,
+        program_time=report.program_time,
+        total_time=report.total_time,
+        plan_age=report.plan_age,
+        late_plans=report.late_plans,
+        reused_plans=report.reused_plans,
     )
 
 

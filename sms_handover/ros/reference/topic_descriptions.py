@@ -19,6 +19,7 @@ _CONTENTS = {
     topics.ANGULAR_MOMENTUM: "angular momentum about the centre of mass in world axes [kg m^2/s]",
     topics.ENERGY: "kinetic energy and work of the joint efforts, less what joint stops have taken [J]",
     topics.IK_STATUS: "how the last inverse-kinematics solve ended: status, iterations, errors [m, rad]",
+    topics.MPC_STATUS: "what came of a solve: status, rows that bind, slack, times [s]; only under law mpc",
     topics.ROBOT_DESCRIPTION: "URDF of the robot",
     topics.RUN_STATE: "whether the run waits, runs, pauses or is over",
     topics.RUN_READY: "name of a node that is ready to begin",
