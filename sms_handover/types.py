@@ -333,8 +333,9 @@ class PreviewedTargets:
     """What the arms are expected to do at one instant to come, as far as the schedule tells.
 
     ``tool_in_world`` has the target pose of every tool that leads its arm, ``tool_twist_in_world`` its twist;
-    ``joint_position`` (n,) rad and ``joint_velocity`` (n,) rad/s the desired motion of all other arms. ``deputy`` is where the deputy is expected: in the tool of
-    ``holder``, or in ``world`` while nobody holds it; ``touching`` has the arms whose gripper may touch it.
+    ``joint_position`` (n,) rad and ``joint_velocity`` (n,) rad/s the desired motion of all other arms.
+    ``deputy`` is where the deputy is expected: in the tool of ``holder``, or in ``world`` while nobody holds
+    it; ``touching`` has the arms whose gripper may touch it.
     """
 
     tool_in_world: Mapping[str, Pose]
@@ -355,8 +356,8 @@ class PreviewedTargets:
 class PreviewState:
     """Everything that a preview depends on: the phase as it began, the deputy, and the time law of targets.
 
-    ``start_ns`` is when the phase began, with joints (n,) rad and tools as they were. ``grasp_frame`` is where
-    ``holder`` has the deputy; ``deputy_in_world`` is where it was last.
+    ``start_ns`` is when the phase began, with joints (n,) rad and tools as they were. ``grasp_frame`` is
+    where ``holder`` has the deputy; ``deputy_in_world`` is where it was last.
     """
 
     phase: TaskPhase
@@ -387,8 +388,8 @@ class PlanReport:
     """One solve of a predictive law for the state at ``stamp_ns``.
 
     ``plan`` is the number of the solve, ``active`` the rows of constraints that bind. ``largest_slack`` is by
-    how much the worst soft limit is exceeded, in the unit of ``largest_slack_row``. Times in s are of the wall
-    clock, ``plan_age`` is simulation time since the plan in use began; counts are since the start.
+    how much the worst soft limit is exceeded, in the unit of ``largest_slack_row``. Times in s are of the
+    wall clock, ``plan_age`` is simulation time since the plan in use began; counts are since the start.
     """
 
     stamp_ns: int

@@ -68,6 +68,7 @@ OPTIONAL = {
     "matplotlib": FIGURES,
     "mpl_toolkits": FIGURES,
     "casadi": "sms_handover.compiled",
+    "daqp": "sms_handover.control.mpc",
 }  # who needs them
 ROS = re.compile(r"rclpy|ament_index_python|launch(_ros)?|tf2_\w+|rosidl_\w+|\w+_(msgs|srvs|interfaces)")
 

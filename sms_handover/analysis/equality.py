@@ -40,8 +40,9 @@ class Difference:
 def compare_runs(a: RunData, b: RunData) -> tuple[Difference, ...]:
     """Return the fields in which two runs differ; none if they are bit-identical (NaN equals NaN).
 
-    The wall times of solves are left out. Of the run events only those of the trajectory are compared, because those of other nodes depend on
-    wall time too. Events of rejected messages are left out: they depend on what strangers sent.
+    The wall times of solves are left out. Of the run events only those of the trajectory are compared,
+    because those of other nodes depend on wall time too. Events of rejected messages are left out: they
+    depend on what strangers sent.
     """
     return tuple(_differences(a, b))
 

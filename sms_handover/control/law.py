@@ -40,8 +40,8 @@ class LawSetup(Generic[G]):
 
     A joint reference is extrapolated up to an age of ``longest_reference_ns``, without bound if None.
     ``computed_torque`` makes the inverse dynamics of a robot, by Pinocchio or compiled. Guidance comes every
-    ``reference_ns``. What a law needs besides it gets if it declares so: a ``preview`` of targets to come, the
-    ``distances`` between bodies.
+    ``reference_ns``. What a law needs besides it gets if it declares so: a ``preview`` of targets to come,
+    the ``distances`` between bodies.
     """
 
     robot: RobotModel

@@ -127,7 +127,7 @@ class Distances(Protocol):
         """Return the signed distance (pairs,) m of every pair at a configuration (7 + n,)."""
 
     def nearest(self, pair: int) -> tuple[Array, Array]:
-        """Return where a pair was nearest in the last call: points (2, 3) m and unit normal (3,) in ``world``.
+        """Return where a pair was nearest in the last call: points (2, 3) m, unit normal (3,) in ``world``.
 
         The normal points from the first body to the second.
         """

@@ -227,7 +227,7 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
         self._watchdog.reset()
 
     def on_answered(self, stamp: int) -> None:
-        """Publish what came of a solve; in real time, report when references stop and when they come again."""
+        """Publish what came of a solve; in real time, report when references stop and come again."""
         report = self._solves.take_status() if self._solves else None
         if report:
             self._plans.publish(plan_message(report))

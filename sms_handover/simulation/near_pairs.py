@@ -1,4 +1,4 @@
-"""Near pairs: the distances between bodies as a control law uses them, with the joints that carry the bodies."""
+"""Near pairs: distances between bodies as a control law uses them, with the joints that carry them."""
 
 from sms_handover.clearance.bodies import BodyKind
 from sms_handover.clearance.contacts import may_touch
@@ -8,7 +8,7 @@ from sms_handover.types import Array, Pose
 
 
 class NearPairs:
-    """The pairs of a clearance model as names, joints and contacts that can be declared, and their distances."""
+    """The pairs of a clearance model by names, joints and declarable contacts, and their distances."""
 
     def __init__(self, model: ClearanceModel) -> None:
         """Tell the pairs of a model, which is only used."""
@@ -28,6 +28,6 @@ class NearPairs:
         return self._model.distances(q, deputy_in_world)
 
     def nearest(self, pair: int) -> tuple[Array, Array]:
-        """Return where a pair was nearest in the last call: points (2, 3) m and unit normal (3,) in ``world``."""
+        """Return where a pair was nearest in the last call: points (2, 3) m and normal (3,) in ``world``."""
         found = self._model.nearest_points(pair)
         return found.points_in_world, found.normal_in_world

@@ -48,8 +48,8 @@ class TargetPreview:
 
     A controller does not hear by which time law targets move, nor where the deputy is: of the time laws that
     one is taken which fits the targets of now best, and the deputy is where the schedule has it, then in the
-    grasp of the arm that was to grasp it. What the targets of now are off by, those to come are too. A preview
-    ends where commands are due, as what follows depends on their outcome.
+    grasp of the arm that was to grasp it. What the targets of now are off by, those to come are too. A
+    preview ends where commands are due, as what follows depends on their outcome.
     """
 
     def __init__(self, robot: RobotModel, schedule: Schedule) -> None:
@@ -175,7 +175,7 @@ class TargetPreview:
     def _corrections_of(
         self, now: PreviewState, stamp_ns: int, tool_in_world: Mapping[str, Pose]
     ) -> Mapping[str, tuple[Array, Array]]:
-        """Return by how much the targets of now are off: a rotation (3, 3) and a shift (3,) m in ``world``."""
+        """Return by how much the targets of now are off: rotation (3, 3) and shift (3,) m in ``world``."""
         done, found = _progress(now.time_law, self._leg, stamp_ns), {}
         for arm, goal in self._leg.goals.items():
             expected, given = PosePath(self._leg.tools[arm], goal).at(done)[0], tool_in_world[arm]

@@ -1,1 +1,1 @@
-"""Predictive control with constraints: the plan of a horizon by a quadratic program, and the loop that follows it."""
+"""Predictive control with constraints: plans by a quadratic program, and what follows them."""

@@ -1,8 +1,8 @@
 """Constraints of a plan: rows with a name, a unit and a limit, hard or soft.
 
-A soft row may be exceeded at a price, and by how much is reported. What is exceeded where the plan begins has to
-be back at its limit at the end of the horizon, linearly in time, so that a start outside is no infeasible program
-and no violent motion either.
+A soft row may be exceeded at a price, and by how much is reported. What is exceeded where the plan begins has
+to be back at its limit at the end of the horizon, linearly in time, so that a start outside is no infeasible
+program and no violent motion either.
 """
 
 from collections.abc import Sequence
@@ -70,7 +70,9 @@ class Limits:
         found = [self._efforts(prediction, sensitivity, count)]
         later, eye, none = slice(1, count + 1), np.eye(n), np.zeros((n, n))
         by_phi = np.zeros((count, n, 3))
-        positions = Derivatives(np.broadcast_to(eye, (count, n, n)), np.broadcast_to(none, (count, n, n)), by_phi)
+        positions = Derivatives(
+            np.broadcast_to(eye, (count, n, n)), np.broadcast_to(none, (count, n, n)), by_phi
+        )
         rates = Derivatives(positions.w, positions.q, by_phi)
         left = 1.0 - horizon.times[1:] / horizon.times[-1]
 
@@ -81,7 +83,13 @@ class Limits:
             return _flat(names, at, rows, (wide_low, wide_high), (low, high), is_soft=True)
 
         found.append(
-            soft([f"position of {name}" for name in self._joints], prediction.q, positions, self._lower, self._upper)
+            soft(
+                [f"position of {name}" for name in self._joints],
+                prediction.q,
+                positions,
+                self._lower,
+                self._upper,
+            )
         )
         found.append(
             soft([f"rate of {name}" for name in self._joints], prediction.w, rates, -self._rate, self._rate)
@@ -89,7 +97,9 @@ class Limits:
         if self._base_rate:
             by, limit = prediction.omega_by, np.full(3, self._base_rate)
             some = Derivatives(by.q[later], by.w[later], by.phi[later])
-            found.append(soft([f"base rate about {axis}" for axis in _AXES], prediction.omega, some, -limit, limit))
+            found.append(
+                soft([f"base rate about {axis}" for axis in _AXES], prediction.omega, some, -limit, limit)
+            )
         if self._attitude:
             angle, by_turn = self._attitudes(prediction)
             flat = np.zeros((count, 3, n))
@@ -133,7 +143,7 @@ def _flat(
     *,
     is_soft: bool,
 ) -> Constraint:
-    """Return a constraint from values (K, r), rows (K, r, N n), bounds and limits that broadcast to (K, r)."""
+    """Return a constraint from values (K, r), rows (K, r, N n), bounds and limits (K, r) or (r,)."""
     low, high = (np.broadcast_to(bound, values.shape).ravel() for bound in bounds)
     limit_low, limit_high = (np.broadcast_to(limit, values.shape).ravel() for limit in limits)
     scale = 0.5 * (limit_high - limit_low)

@@ -21,8 +21,8 @@ class PlanCost:
     """Sum over the horizon, times the interval that an instant begins, and 1 s at its end.
 
     ell = w_p |e_p|^2 + w_o |e_o|^2 of tools that have a target, w_q |q - q_d|^2 of the joints of other arms,
-    w_w |w - w_d|^2 of all joint rates, w_a |a|^2; each over 2. Desired rates w_d are those of joint targets, and
-    the least that move the tools as their targets move.
+    w_w |w - w_d|^2 of all joint rates, w_a |a|^2; each over 2. Desired rates w_d are those of joint targets,
+    and the least that move the tools as their targets move.
     """
 
     def __init__(self, robot: RobotModel, gains: MpcGains, horizon: Horizon) -> None:
@@ -55,7 +55,9 @@ class PlanCost:
         rate_weights = gains.joint_rate_weight * times
         rate_weights[-1] = gains.terminal_rate_weight
         by_joint += beta.T @ (rate_weights[:, None] * beta)
-        slope += beta.T @ (rate_weights[:, None] * (prediction.w[later] - _led_rates(prediction, errors, targets)))
+        slope += beta.T @ (
+            rate_weights[:, None] * (prediction.w[later] - _led_rates(prediction, errors, targets))
+        )
         held = gains.joint_position_weight * times[:, None] * self._led_by_joints(targets)
         aims = np.array([target.joint_position for target in targets])
         by_joint += np.einsum("kj,kn,ki->nji", alpha, held, alpha)

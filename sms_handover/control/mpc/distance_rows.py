@@ -94,5 +94,3 @@ class DistanceModel:
         jacobian = pin.getJointJacobian(robot.pin, self._data, joint, _ALIGNED)
         arm = point - self._data.oMi[joint].translation
         return np.asarray(jacobian[:3] - pin.skew(arm) @ jacobian[3:])
-
-

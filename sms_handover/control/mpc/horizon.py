@@ -37,7 +37,7 @@ class Horizon:
             middle = 0.5 * (low + high)
             longer = first * float(np.sum(middle**powers)) > length
             low, high = (low, middle) if longer else (middle, high)
-        return cls(first * low**powers)
+        return cls(np.asarray(first * low**powers, dtype=np.float64))
 
     @property
     def count(self) -> int:

@@ -1,8 +1,8 @@
 """Law ``mpc``: predictive control of robot and base under constraints, replanned every reference period.
 
-A plan begins one reference period after the state it is made for, which is predicted along the plan in use, so
-that the result does not depend on how long a solve takes. Between solves the joints follow the plan by computed
-torque. Nothing here waits for a clock: a solve that gives no plan leaves the one before in use.
+A plan begins one reference period after the state it is made for, which is predicted along the plan in use,
+so that the result does not depend on how long a solve takes. Between solves the joints follow the plan by
+computed torque. Nothing here waits for a clock: a solve that gives no plan leaves the one before in use.
 """
 
 from dataclasses import dataclass, replace
@@ -57,7 +57,9 @@ class MpcController:
         """Set up the planners of all phases; raises ConfigurationError, MissingDependencyError."""
         require_daqp()
         if setup.preview is None or setup.distances is None:
-            raise ConfigurationError("control law 'mpc' needs a preview of targets and the distances of bodies")
+            raise ConfigurationError(
+                "control law 'mpc' needs a preview of targets and the distances of bodies"
+            )
         self._robot, self._gains, self._preview = setup.robot, setup.gains, setup.preview
         self._distances, self._period_ns = setup.distances, setup.reference_ns
         self._efforts = setup.computed_torque(setup.robot)

@@ -1,4 +1,4 @@
-"""Momentum of robot and payload, which no joint effort changes, and the centre of mass that it carries along."""
+"""Momentum of robot and payload, which no joint effort changes, and the centre of mass."""
 
 from dataclasses import dataclass
 
@@ -42,6 +42,8 @@ def base_velocity(robot: RobotModel, base: BaseStart, joints: Array, rates: Arra
     q = np.concatenate([np.zeros(6), [1.0], joints])
     centroidal = pin.computeCentroidalMap(robot.pin, robot.data, q)
     matrix = np.array(centroidal)
-    momentum = np.concatenate([base.rotation.T @ base.linear_momentum, base.rotation.T @ base.angular_momentum])
+    momentum = np.concatenate(
+        [base.rotation.T @ base.linear_momentum, base.rotation.T @ base.angular_momentum]
+    )
     twist = np.linalg.solve(matrix[:, :BASE_NV], momentum - matrix[:, BASE_NV:] @ rates)
     return np.asarray(twist[3:])

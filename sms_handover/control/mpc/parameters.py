@@ -71,7 +71,9 @@ class MpcGains:
     plan_position_gain: float = parameter(
         "mpc: feedback of joint position about the plan", unit="1/s^2", minimum=0.0
     )
-    plan_velocity_gain: float = parameter("mpc: feedback of joint rate about the plan", unit="1/s", minimum=0.0)
+    plan_velocity_gain: float = parameter(
+        "mpc: feedback of joint rate about the plan", unit="1/s", minimum=0.0
+    )
     program_iterations: int = parameter(
         "mpc: most iterations of the quadratic program; a solve that needs more gives no plan",
         minimum=1,

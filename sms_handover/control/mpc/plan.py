@@ -12,7 +12,7 @@ from sms_handover.units import ns_to_seconds
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Joint angles ``q`` and rates ``w`` (n,) at ``begin_ns``, and accelerations (N, n) of the intervals (N,) s.
+    """Joint angles and rates (n,) at ``begin_ns``, and accelerations (N, n) over the intervals (N,) s.
 
     ``number`` is that of the solve. After its end the joints stand still.
     """

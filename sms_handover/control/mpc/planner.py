@@ -51,10 +51,12 @@ class Planner:
         self._tools, self._cost = ToolErrorModel(robot), PlanCost(robot, gains, self.horizon)
         self._limits = Limits(robot, gains, initial_rotation)
         apart = distances is not None and gains.least_distance > 0.0
-        self._distances = DistanceModel(robot, distances, gains.distance_pairs) if distances and apart else None
+        self._distances = (
+            DistanceModel(robot, distances, gains.distance_pairs) if distances and apart else None
+        )
 
     def step(self, start: PlanStart, accelerations: Array, targets: Sequence[PreviewedTargets]) -> Step:
-        """Return one iteration about accelerations (N, n), towards the targets at each instant but the first."""
+        """Return one iteration about accelerations (N, n), towards targets at all instants but the first."""
         begun = perf_counter()
         horizon = self.horizon
         prediction = self.prediction.predict(horizon, start.base, start.q, start.w, accelerations)

@@ -1,14 +1,16 @@
 """Prediction of the robot over a horizon with the momentum eliminated, and its derivatives.
 
-The state is (q_m, w, phi): joint angles and rates, and the rotation vector of the base from its attitude at the
-beginning, R = R_0 exp(phi); the input is the joint acceleration a, constant over an interval, so that the joints
-are exact double integrators. The base's twist nu = (v, omega) follows from the momentum [Papadopoulos2021],
+The state is (q_m, w, phi): joint angles and rates, and the rotation vector of the base from its attitude at
+the beginning, R = R_0 exp(phi); the input is the joint acceleration a, constant over an interval, so that the
+joints are exact double integrators. The base's twist nu = (v, omega) follows from the momentum
+[Papadopoulos2021],
 
     nu = H_b^-1 (h_b - H_bm w),    h_b = (R^T P, R^T L + c x R^T P),
 
 in its own axes, with P and L (about the centre of mass) conserved and c the centre of mass in the base; its
-position is that of the centre of mass less R c. Joint efforts are an output, u = H* a + c*: the inverse dynamics
-are the better transcription [Ferrolho2021]. Derivatives are Pinocchio's analytic ones [Carpentier2018].
+position is that of the centre of mass less R c. Joint efforts are an output, u = H* a + c*: the inverse
+dynamics are the better transcription [Ferrolho2021]. Derivatives are Pinocchio's analytic ones
+[Carpentier2018].
 """
 
 from dataclasses import dataclass
@@ -38,9 +40,9 @@ class Derivatives:
 class Prediction:
     """The motion over a horizon of N intervals, and its derivatives at each instant.
 
-    ``q``, ``w`` (N + 1, n); ``phi`` (N + 1, 3) rad and ``omega`` (N + 1, 3) rad/s of the base in its own axes;
-    ``twist`` (N + 1, 6) of the base; ``effort`` (N, n) N m where an interval begins. ``centre`` (N + 1, 3) m is
-    the centre of mass in the base, ``centre_per_q`` (N + 1, 3, n) its derivative, ``centre_in_world``
+    ``q``, ``w`` (N + 1, n); ``phi`` (N + 1, 3) rad and ``omega`` (N + 1, 3) rad/s of the base in its own
+    axes; ``twist`` (N + 1, 6) of the base; ``effort`` (N, n) N m where an interval begins. ``centre`` (N + 1,
+    3) m is the centre of mass in the base, ``centre_per_q`` (N + 1, 3, n) its derivative, ``centre_in_world``
     (N + 1, 3) m where it is; ``rotation`` (N + 1, 3, 3) is the attitude of the base in ``world``.
     """
 

@@ -1,7 +1,7 @@
 """Products of matrices whose bits do not depend on how many threads BLAS has.
 
-OpenBLAS shares out what is large among its threads, which changes the order of sums. These products are cut into
-pieces that it leaves to one thread; a matrix times a vector is left to NumPy.
+OpenBLAS shares out what is large among its threads, which changes the order of sums. These products are cut
+into pieces that it leaves to one thread; a matrix times a vector is left to NumPy.
 """
 
 import numpy as np

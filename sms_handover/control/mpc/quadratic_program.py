@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ _EXCEEDED = 1e-9  # [-] of the scale of a row, from which it is exceeded
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Changes of the accelerations (N n,), and what is reported of them; empty unless ``status`` is SOLVED."""
+    """Changes of the accelerations (N n,), empty unless ``status`` is SOLVED, and what is reported."""
 
     status: PlanStatus
     change: Array
@@ -34,12 +35,11 @@ class Solution:
 def require_daqp() -> Any:
     """Return the solver; raises MissingDependencyError where it is not installed."""
     try:
-        import daqp
+        return import_module("daqp")
     except ImportError as error:
         if error.name != "daqp":
             raise
         raise MissingDependencyError("predictive control laws", "daqp", "mpc") from error
-    return daqp
 
 
 def solve(

@@ -1,4 +1,4 @@
-"""Sensitivity of a prediction: how every output depends on the accelerations of all intervals (condensing)."""
+"""Sensitivity of a prediction: how outputs depend on the accelerations of all intervals (condensing)."""
 
 from collections.abc import Sequence
 
@@ -12,8 +12,8 @@ from sms_handover.types import Array
 class Sensitivity:
     """Turns derivatives by the state at an instant into rows by the N n accelerations up to it.
 
-    Those of the joints are known in advance, dq_k/da_j = alpha_kj and dw_k/da_j = beta_kj for each joint; that
-    of the attitude follows the trapezoidal rule by which it is predicted.
+    Those of the joints are known in advance, dq_k/da_j = alpha_kj and dw_k/da_j = beta_kj for each joint;
+    that of the attitude follows the trapezoidal rule by which it is predicted.
     """
 
     def __init__(self, horizon: Horizon, prediction: Prediction) -> None:
@@ -22,7 +22,9 @@ class Sensitivity:
         nodes, n = prediction.q.shape
         count = horizon.count
         by, self._size = prediction.omega_by, (count, n)
-        spin = by.q[:, :, None] * self._alpha[:, None, :, None] + by.w[:, :, None] * self._beta[:, None, :, None]
+        spin = (
+            by.q[:, :, None] * self._alpha[:, None, :, None] + by.w[:, :, None] * self._beta[:, None, :, None]
+        )
         spin = spin.reshape(nodes, 3, count * n)
         self.phi = np.zeros((nodes, 3, count * n))
         flows = [flow_derivatives(*row) for row in zip(prediction.phi, prediction.omega, strict=True)]

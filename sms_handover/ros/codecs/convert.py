@@ -11,12 +11,11 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point
 from geometry_msgs.msg import Pose as PoseMessage
 from sensor_msgs.msg import JointState
-from sms_handover_interfaces.msg import BodyClearance
+from sms_handover_interfaces.msg import BodyClearance, MpcStatus
 from sms_handover_interfaces.msg import Clearance as ClearanceMessage
 from sms_handover_interfaces.msg import GraspCommand as GraspCommandMessage
 from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
 from sms_handover_interfaces.msg import IkStatus as IkStatusMessage
-from sms_handover_interfaces.msg import MpcStatus
 from sms_handover_interfaces.msg import RunEvent as RunEventMessage
 from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
 from std_msgs.msg import Header
