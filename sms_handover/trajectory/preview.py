@@ -25,7 +25,8 @@ from sms_handover.types import (
 )
 from sms_handover.units import ns_to_seconds
 
-_SAME = 1e-9  # [m + rad] by which one time law must fit better than the one that has fitted so far
+_CLEARLY = 0.5  # [-] share of the misfit of the time law so far that another must stay below
+_SAME = 1e-9  # [m + rad] of misfit that is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +83,7 @@ class TargetPreview:
             frame = se3_of(self._schedule.deputy.grasp_frames[now.grasp_frame])
             held = pose_of(se3_of(tools[now.holder]) * frame.inverse())
             now = replace(now, deputy_in_world=held)
-        self._leg = self._leg_of(now)
+        self._leg, self._joints = self._leg_of(now), q[-self._robot.n_joints :]
         now = replace(now, time_law=self._fitting(now, reference, tool_in_world))
         self._corrections = self._corrections_of(now, phase.stamp_ns, tool_in_world)
         self._now = now
@@ -125,7 +126,12 @@ class TargetPreview:
             return None
         end_ns = leg.end_ns + phase.end_ns - phase.start_ns
         tools = {**leg.tools, **leg.goals}
-        return self._leg_from(now, following, end_ns, phase.targets, tools, leg.ends, leg.end_ns)
+        joints = np.array(leg.ends)
+        for arm in leg.goals:  # where inverse kinematics will take it is not known
+            joints[self._robot.arm_joints[arm]] = self._joints[self._robot.arm_joints[arm]]
+        later = self._leg_from(now, following, end_ns, phase.targets, tools, joints, leg.end_ns)
+        held = {arm: leg.goals[arm] for arm in leg.goals if isinstance(phase.targets[arm], Hold)}
+        return replace(later, goals={**later.goals, **held})
 
     def _leg_from(
         self,
@@ -154,7 +160,7 @@ class TargetPreview:
         """Return the time law whose targets are nearest to those of now, that of before if several are."""
         misfit = {law: self._misfit(law, now, reference, tool_in_world) for law in TIME_LAWS}
         best = min(misfit, key=misfit.__getitem__)
-        return best if misfit[best] < misfit[now.time_law] - _SAME else now.time_law
+        return best if misfit[best] < _CLEARLY * misfit[now.time_law] - _SAME else now.time_law
 
     def _misfit(
         self, law: str, now: PreviewState, reference: JointReference, tool_in_world: Mapping[str, Pose]
