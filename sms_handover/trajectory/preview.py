@@ -15,7 +15,8 @@ from sms_handover.trajectory.time_law import TIME_LAWS, Progress
 from sms_handover.types import (
     Array,
     GraspAction,
-    GraspCommand,
+    GraspEvent,
+    GraspStatus,
     JointReference,
     Pose,
     PreviewedTargets,
@@ -48,8 +49,8 @@ class TargetPreview:
     """Expects the targets of the generator from what a controller is told, and from the schedule.
 
     A controller does not hear by which time law targets move, nor where the deputy is: of the time laws that
-    one is taken which fits the targets of now best, and the deputy is where the schedule has it, then in the
-    grasp of the arm that was to grasp it. What the targets of now are off by, those to come are too. A
+    one is taken which fits the targets of now best; the deputy is where the schedule has it, then in the
+    grasp of the arm that has grasped it. What the targets of now are off by, those to come are too. A
     preview ends where commands are due, as what follows depends on their outcome.
     """
 
@@ -88,6 +89,14 @@ class TargetPreview:
         self._corrections = self._corrections_of(now, phase.stamp_ns, tool_in_world)
         self._now = now
 
+    def grasped(self, event: GraspEvent) -> None:
+        """Learn what came of a grasp command, between two updates."""
+        if self._now and event.status is GraspStatus.SUCCEEDED:
+            command = event.command
+            released = command.action is GraspAction.RELEASE
+            holder, frame = ("", "") if released else (command.arm, command.grasp_frame)
+            self._now = replace(self._now, holder=holder, grasp_frame=frame)
+
     def ahead(self, stamps_ns: Iterable[int]) -> tuple[PreviewedTargets, ...]:
         """Return the targets at some instants in order, from that of the last update on."""
         found, leg = list[PreviewedTargets](), self._leg
@@ -99,14 +108,12 @@ class TargetPreview:
         return tuple(found)
 
     def _begun(self, phase: TaskPhase, q: Array, tools: Mapping[str, Pose]) -> PreviewState:
-        """Return the state of a phase that begins, its commands taken as carried out."""
+        """Return the state of a phase that begins."""
         now, joints = self._now, q[-self._robot.n_joints :]
-        holder, frame = (now.holder, now.grasp_frame) if now else ("", "")
         deputy = now.deputy_in_world if now else self._schedule.deputy.deputy_in_world
         law = now.time_law if now else next(iter(TIME_LAWS))
-        for command in phase.commands:
-            holder, frame = _held_after(command)
-        return PreviewState(phase, phase.stamp_ns, joints, tools, holder, frame, deputy, law)
+        grip = (now.holder, now.grasp_frame) if now else ("", "")
+        return PreviewState(phase, phase.stamp_ns, joints, tools, *grip, deputy, law)
 
     def _leg_of(self, now: PreviewState) -> _Leg:
         """Return the leg of the phase of now."""
@@ -213,10 +220,3 @@ class TargetPreview:
 def _progress(law: str, leg: _Leg, stamp_ns: int) -> Progress:
     """Return the progress of a leg at an instant under a time law."""
     return TIME_LAWS[law](ns_to_seconds(stamp_ns - leg.start_ns), leg.motion_s)
-
-
-def _held_after(command: GraspCommand) -> tuple[str, str]:
-    """Return which arm holds the deputy by which grasp frame once a command has succeeded."""
-    if command.action is GraspAction.RELEASE:
-        return "", ""
-    return command.arm, command.grasp_frame

@@ -16,7 +16,8 @@ from sms_handover.model.robot_model import RobotModel
 from sms_handover.run_data import RunData
 from sms_handover.simulation import feasibility
 from sms_handover.simulation.check import check_scenario
-from sms_handover.simulation.feasibility import PhasePrediction, base_after, check_feasibility
+from sms_handover.simulation.feasibility import PhasePrediction, check_feasibility
+from sms_handover.simulation.predicted_momentum import base_after
 from sms_handover.simulation.scenario import Scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.simulation.wiring import initial_joints

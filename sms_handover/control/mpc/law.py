@@ -20,10 +20,12 @@ from sms_handover.control.mpc.planner import Planner, PlanStart, Step
 from sms_handover.control.mpc.quadratic_program import require_daqp
 from sms_handover.control.protocol import Guidance
 from sms_handover.errors import ConfigurationError
+from sms_handover.model.known_payload import EMPTY_HANDS, Grip, KnownPayload
 from sms_handover.types import (
     BASE_NQ,
     BASE_NV,
     Array,
+    GraspEvent,
     PlanReport,
     PlanStatus,
     PreviewState,
@@ -37,7 +39,8 @@ from sms_handover.units import ns_to_seconds, seconds_to_ns
 class MpcState:
     """Everything that later efforts depend on: plans, counts, the preview, and the initial attitude (3, 3).
 
-    ``coming`` takes the place of ``plan`` when it begins; ``failures`` counts solves in a row without a plan.
+    ``coming`` takes the place of ``plan`` when it begins; ``failures`` counts solves in a row without a plan;
+    ``news`` are grasps that count from the next state on.
     """
 
     phase_index: int
@@ -48,6 +51,8 @@ class MpcState:
     reused: int
     initial_rotation: Array
     preview: PreviewState | None
+    grip: Grip
+    news: tuple[GraspEvent, ...]
 
 
 class MpcController:
@@ -60,9 +65,9 @@ class MpcController:
             raise ConfigurationError(
                 "control law 'mpc' needs a preview of targets and the distances of bodies"
             )
-        self._robot, self._gains, self._preview = setup.robot, setup.gains, setup.preview
+        self._gains, self._preview, self._make_efforts = setup.gains, setup.preview, setup.computed_torque
         self._distances, self._period_ns = setup.distances, setup.reference_ns
-        self._efforts = setup.computed_torque(setup.robot)
+        self._payload = KnownPayload(setup.robot, setup.deputy)
         self._rest = read_only(np.zeros(setup.robot.n_joints))  # N m
         for gains in setup.gains:
             Planner(setup.robot, gains, None, np.eye(3))  # rejects what cannot be planned with
@@ -76,8 +81,9 @@ class MpcController:
         self._coming: Plan | None = None
         self._solves = self._failures = self._reused = 0
         self._initial_rotation: Array = np.zeros((3, 3))
-        self._planners: dict[MpcGains, Planner] = {}
         self._guidance: Guidance | None = None
+        self._news: tuple[GraspEvent, ...] = ()
+        self._hold(EMPTY_HANDS)
         self._report: PlanReport | None = None
 
     def guide(self, guidance: Guidance) -> None:
@@ -87,6 +93,8 @@ class MpcController:
 
     def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
         """Return the efforts (n,) N m for a state, read-only; zero until first guidance has come."""
+        if self._news and stamp_ns > self._news[0].stamp_ns:
+            self._heed_news()
         if self._coming and stamp_ns >= self._coming.begin_ns:
             self._plan, self._coming = self._coming, None
         if self._guidance is not None:
@@ -98,6 +106,10 @@ class MpcController:
         feedback = np.array([[gains.plan_position_gain], [gains.plan_velocity_gain]])
         every = np.repeat(feedback, self._robot.n_joints, axis=1)
         return frozen(self._robot.limited(self._efforts(q, v, self._plan.at(stamp_ns), every)))
+
+    def grasped(self, event: GraspEvent) -> None:
+        """Learn what came of a grasp command; it counts from the next state on."""
+        self._news = (*self._news, event)
 
     def take_status(self) -> PlanReport | None:
         """Return the report of the solve since the last call, None if there was none."""
@@ -121,6 +133,8 @@ class MpcController:
             self._reused,
             read_only(self._initial_rotation),
             self._preview.state,
+            self._payload.grip,
+            self._news,
         )
 
     def restore(self, state: MpcState) -> None:
@@ -130,6 +144,23 @@ class MpcController:
         self._solves, self._failures, self._reused = state.solves, state.failures, state.reused
         self._initial_rotation = state.initial_rotation
         self._preview.restore(state.preview)
+        self._news = state.news
+        self._hold(state.grip)
+
+    def _heed_news(self) -> None:
+        """Take up the payload of the latest events."""
+        news, self._news = self._news, ()
+        for event in news:
+            self._preview.grasped(event)
+        if any([self._payload.grasped(event) for event in news]):
+            self._hold(self._payload.grip)
+
+    def _hold(self, grip: Grip) -> None:
+        """Go on with the dynamics of the robot with what an arm holds."""
+        self._payload.hold(grip)
+        self._robot = self._payload.robot
+        self._efforts = self._make_efforts(self._robot)
+        self._planners: dict[MpcGains, Planner] = {}
 
     def _replan(self, stamp_ns: int, q: Array, v: Array, guidance: Guidance) -> None:
         """Make the plan of the next reference period."""
@@ -232,5 +263,5 @@ MPC = Law(
     MpcGains,
     MpcController,
     linearised,
-    frozenset({Need.TOOL_TARGETS, Need.PREVIEW, Need.CLEARANCE}),
+    frozenset({Need.TOOL_TARGETS, Need.PREVIEW, Need.PAYLOAD, Need.CLEARANCE}),
 )
