@@ -27,6 +27,7 @@ from sms_handover.types import (
 from sms_handover.units import ns_to_seconds
 
 _CLEARLY = 0.5  # [-] share of the misfit of the time law so far that another must stay below
+_BEGINNING = 0.25  # [-] of a motion, in which the time law is looked at
 _SAME = 1e-9  # [m + rad] of misfit that is rounding
 
 
@@ -164,7 +165,13 @@ class TargetPreview:
     def _fitting(
         self, now: PreviewState, reference: JointReference, tool_in_world: Mapping[str, Pose]
     ) -> str:
-        """Return the time law whose targets are nearest to those of now, that of before if several are."""
+        """Return the time law whose targets are nearest to those of now, that of before if several are.
+
+        Only where a motion begins do time laws differ so much that nothing else can be the reason.
+        """
+        elapsed_s = ns_to_seconds(reference.stamp_ns - self._leg.start_ns)
+        if elapsed_s > _BEGINNING * self._leg.motion_s:
+            return now.time_law
         misfit = {law: self._misfit(law, now, reference, tool_in_world) for law in TIME_LAWS}
         best = min(misfit, key=misfit.__getitem__)
         return best if misfit[best] < _CLEARLY * misfit[now.time_law] - _SAME else now.time_law
@@ -209,7 +216,8 @@ class TargetPreview:
         rates = done.rate * (leg.ends - leg.joints)
         joints = leg.joints + done.fraction * (leg.ends - leg.joints)
         aims = {arm for arm, target in leg.targets.items() if isinstance(target, GraspFrameTarget)}
-        touching = frozenset(aims | ({now.holder} if now.holder else set()))
+        commanded = {arm for command in now.phase.commands for arm in (command.arm, command.from_arm)}
+        touching = frozenset(aims | commanded | {now.holder}) - {""}
         if now.holder:
             frame = self._schedule.deputy.grasp_frames[now.grasp_frame]
             held = pose_of(se3_of(frame).inverse())

@@ -106,7 +106,7 @@ class Limits:
             limit, some = np.full(3, self._attitude), Derivatives(flat, flat, by_turn[1:])
             found.append(soft([f"base attitude about {axis}" for axis in _AXES], angle, some, -limit, limit))
         if distances is not None:
-            found.append(self._distances(distances, sensitivity, later))
+            found.append(self._distances(distances, sensitivity, later, left))
         return found
 
     def _efforts(self, prediction: Prediction, sensitivity: Sensitivity, count: int) -> Constraint:
@@ -123,15 +123,18 @@ class Limits:
             angles[k], by[k] = pin.log3(turned), pin.Jlog3(turned) @ pin.Jexp3(phi)
         return angles, by
 
-    def _distances(self, distances: DistanceRows, sensitivity: Sensitivity, later: slice) -> Constraint:
-        """Return the soft rows of distances; a pair that is too near already may only come apart."""
+    def _distances(
+        self, distances: DistanceRows, sensitivity: Sensitivity, later: slice, left: Array
+    ) -> Constraint:
+        """Return the soft rows of distances."""
         rows = sensitivity.rows(distances.by, later)
         least = np.full(distances.distance.shape, self._least)
         high = np.full_like(least, np.inf)
         names = [f"distance {name}" for node in distances.names for name in node]
         flat = rows.reshape(-1, rows.shape[-1])
+        wide = (least - left[:, None] * np.maximum(least - distances.at_start, 0.0)).ravel()
         value, low, top = distances.distance.ravel(), least.ravel(), high.ravel()
-        return Constraint(tuple(names), value, flat, low, top, low, top, np.abs(low), soft=True)
+        return Constraint(tuple(names), value, flat, wide, top, low, top, np.abs(low), soft=True)
 
 
 def _flat(

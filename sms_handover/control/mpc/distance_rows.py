@@ -22,9 +22,13 @@ _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 @dataclass(frozen=True, eq=False)
 class DistanceRows:
-    """Signed distances (K, r) m of the r nearest pairs at K instants, the pairs (K, r), and derivatives."""
+    """Signed distances (K, r) m of the r nearest pairs at K instants, by name, and their derivatives.
+
+    ``at_start`` (K, r) m are the distances of the same pairs where the prediction begins.
+    """
 
     distance: Array
+    at_start: Array
     names: tuple[tuple[str, ...], ...]
     by: Derivatives
 
@@ -39,9 +43,15 @@ class DistanceModel:
         self._most = min(most, len(self._pairs))
 
     def at(self, placed: Sequence[Placement], targets: Sequence[PreviewedTargets]) -> DistanceRows:
-        """Return the rows at some placements; a gripper that may touch the deputy has none with it."""
+        """Return the rows at all placements but the first, which only tells what distances are at the start.
+
+        A gripper that may touch the deputy has no row with it.
+        """
+        start, placed = placed[0], placed[1:]
+        pin.computeJointJacobians(self._robot.pin, self._data, start.q)
+        beginning = self._distances.distances(start.q, self._deputy_in_world(targets[0]))
         count, most, n = len(placed), self._most, self._robot.n_joints
-        distance, names = np.zeros((count, most)), list[tuple[str, ...]]()
+        distance, at_start, names = np.zeros((count, most)), np.zeros((count, most)), list[tuple[str, ...]]()
         by_q, by_phi = np.zeros((count, most, n)), np.zeros((count, most, 3))
         for k, (place, target) in enumerate(zip(placed, targets, strict=True)):
             pin.computeJointJacobians(self._robot.pin, self._data, place.q)
@@ -50,17 +60,10 @@ class DistanceModel:
             nearest = np.argsort(np.where(counted, found, np.inf), kind="stable")[:most]
             for row, index in enumerate(nearest.tolist()):
                 pair = self._pairs[index]
-                distance[k, row] = found[index]
+                distance[k, row], at_start[k, row] = found[index], beginning[index]
                 by_q[k, row], by_phi[k, row] = place.reduced(self._gradient(pair, index, target))
             names.append(tuple(" - ".join(self._pairs[index].names) for index in nearest.tolist()))
-        return DistanceRows(distance, tuple(names), Derivatives(by_q, np.zeros_like(by_q), by_phi))
-
-    def least(self, q: Array, target: PreviewedTargets) -> float:
-        """Return the least distance that counts at a configuration (7 + n,), m."""
-        pin.computeJointJacobians(self._robot.pin, self._data, q)
-        found = self._distances.distances(q, self._deputy_in_world(target))
-        counted = [not self._touches(pair, target) for pair in self._pairs]
-        return float(found[counted].min(initial=np.inf))
+        return DistanceRows(distance, at_start, tuple(names), Derivatives(by_q, np.zeros_like(by_q), by_phi))
 
     def _deputy_in_world(self, target: PreviewedTargets) -> Pose:
         """Return the pose of the deputy where joints have been placed."""

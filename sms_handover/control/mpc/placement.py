@@ -28,9 +28,9 @@ class Placement:
 
 
 def placements(prediction: Prediction) -> list[Placement]:
-    """Return the placement at every instant of a prediction but the first."""
+    """Return the placement at every instant of a prediction."""
     found = []
-    for k in range(1, len(prediction.q)):
+    for k in range(len(prediction.q)):
         rotation, centre = prediction.rotation[k], prediction.centre[k]
         position = prediction.centre_in_world[k] - rotation @ centre
         quaternion = pin.Quaternion(rotation).coeffs()

@@ -61,7 +61,7 @@ class Planner:
         horizon = self.horizon
         prediction = self.prediction.predict(horizon, start.base, start.q, start.w, accelerations)
         placed = placements(prediction)
-        errors = self._tools.at(placed, targets)
+        errors = self._tools.at(placed[1:], targets)
         distances = self._distances.at(placed, targets) if self._distances else None
         sensitivity = Sensitivity(horizon, prediction)
         hessian, gradient = self._cost.quadratic(prediction, accelerations, sensitivity, errors, targets)
