@@ -216,7 +216,9 @@ class TargetPreview:
         rates = done.rate * (leg.ends - leg.joints)
         joints = leg.joints + done.fraction * (leg.ends - leg.joints)
         aims = {arm for arm, target in leg.targets.items() if isinstance(target, GraspFrameTarget)}
-        commanded = {arm for command in now.phase.commands for arm in (command.arm, command.from_arm)}
+        phases, following = self._schedule.phases, leg.index + 1
+        due = phases[following].commands if following < len(phases) else ()
+        commanded = {arm for one in (*now.phase.commands, *due) for arm in (one.arm, one.from_arm)}
         touching = frozenset(aims | commanded | {now.holder}) - {""}
         if now.holder:
             frame = self._schedule.deputy.grasp_frames[now.grasp_frame]
