@@ -86,6 +86,7 @@ setup(
         "compiled": ["casadi>=3.7,<4"],  # writes the equations of motion out as C
         "matlab": ["scipy>=1.13,<2"],
         "pandas": ["pandas>=2.2.2,<4"],
+        "mpc": ["daqp>=0.11,<0.12"],  # solves the quadratic programs of the law mpc
         "parquet": ["pyarrow>=18,<27"],
         "ros": [  # the graph over DDS; the last two are in interfaces/ and interfaces_tf2/, in no index
             "ros-jazzy-rclpy>=7.1.6,<7.2",
@@ -96,6 +97,7 @@ setup(
         ],
         "test": [
             "casadi>=3.7,<4",
+            "daqp>=0.11,<0.12",
             "hypothesis>=6.140,<7",  # draws the inputs of the fuzzers
             "jsonschema>=4.26,<5",  # validates files against the schemas for editors
             "mcap-ros2-support>=0.5.7,<1",
@@ -114,7 +116,7 @@ setup(
         ],
         "verify": [  # second engines and methods; mujoco 4 needs Python 3.11
             "casadi>=3.7,<4",
-            "daqp>=0.11,<1",
+            "daqp>=0.11,<0.12",
             "mink>=1.3,<2",
             "mujoco>=4.0,<5",
         ],

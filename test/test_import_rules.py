@@ -77,6 +77,7 @@ OPTIONAL = {
     "casadi": "sms_handover.compiled",
     "mujoco": "sms_handover.engines",
     "Basilisk": "sms_handover.engines",
+    "daqp": "sms_handover.control.mpc",
 }  # who needs them
 ROS = re.compile(r"rclpy|ament_index_python|launch(_ros)?|tf2_\w+|rosidl_\w+|\w+_(msgs|srvs|interfaces)")
 

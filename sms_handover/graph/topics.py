@@ -30,6 +30,7 @@ class Rate(Enum):
     CLOCK = "every 10 ms of simulation time"
     CHANGE = "on change, latched"
     WALL = "every second of wall time"
+    SOLVE = "every solve of a predictive law"
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,7 @@ LINEAR_IMPULSE = "impulse/linear"  # of wrenches from outside, only where there 
 ANGULAR_IMPULSE = "impulse/angular"
 ENERGY = "energy"
 IK_STATUS = "ik/status"
+MPC_STATUS = "mpc/status"  # only where the law solves a program as it goes on
 ROBOT_DESCRIPTION = "robot_description"
 DEPUTY_MARKER = "deputy/marker"
 RUN_STATE = "run/state"
@@ -139,6 +141,7 @@ def graph_topics(
         Topic(ANGULAR_MOMENTUM, vector, (PLANT,), (), Rate.REFERENCE),
         Topic(ENERGY, f"{_OURS}/EnergyStamped", (PLANT,), (), Rate.REFERENCE),
         Topic(IK_STATUS, f"{_OURS}/IkStatus", (TRAJECTORY,), (), Rate.REFERENCE),
+        Topic(MPC_STATUS, f"{_OURS}/MpcStatus", (CONTROLLER,), (), Rate.SOLVE),
         Topic(ROBOT_DESCRIPTION, text, (PLANT,), (), Rate.CHANGE),
         Topic(TF, TF_TYPE, (PLANT, TRAJECTORY), (), Rate.REFERENCE),
         Topic(TF_STATIC, TF_TYPE, (PLANT,), (), Rate.CHANGE),

@@ -8,7 +8,15 @@ from sms_handover.clearance.monitor import PeriodClearance
 from sms_handover.compiled.periods import CompiledPeriods, Room
 from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.control.law import Need
-from sms_handover.control.protocol import Carrying, CheckedController, Controller, Guidance
+from sms_handover.control.plan_events import PlanEvents
+from sms_handover.control.protocol import (
+    Carrying,
+    CheckedController,
+    Controller,
+    Guidance,
+    Planning,
+    inner_of,
+)
 from sms_handover.control.registry import law_named
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
@@ -32,6 +40,7 @@ from sms_handover.types import (
     GraspEvent,
     IkStatus,
     JointReference,
+    PlanReport,
     Pose,
     RobotState,
     TaskPhase,
@@ -108,13 +117,15 @@ class Observation(NamedTuple):
 class Ticks:
     """Ticks under one guidance, as arrays; ``period`` is there if a reference period begins with them.
 
-    ``excesses`` tells, by the number of the tick, of limits of the joints that were exceeded.
+    ``excesses`` tells, by the number of the tick, of limits of the joints that were exceeded and of solves
+    without a plan; ``plan`` is what came of the solve of a predictive law.
     """
 
     rows: TickRows
     excesses: Mapping[int, tuple[RunEvent, ...]]
     guidance: Guidance
     period: Period | None
+    plan: PlanReport | None = None
 
     @property
     def phases(self) -> tuple[TaskPhase, ...]:
@@ -174,6 +185,9 @@ class Loop:
             self.law = parameters.controller.law
             self._aims = Need.TOOL_TARGETS in law_named(self.law).needs
             self._controller = make_controller(robot, schedule, self._common, parameters.controller)
+        inner = inner_of(self._controller)
+        self._solves = inner if isinstance(inner, Planning) else None
+        self._plan_events = PlanEvents()
         self._runner = make_runner(self._plant, self._controller, robot, self._common, parameters.plant)
         self._quiet: QuietRunner | None = None
         if isinstance(self._runner, CompiledTicks) and not self._monitor:
@@ -191,6 +205,7 @@ class Loop:
         self._plant.reset()
         self._generator.reset()
         self._controller.reset()
+        self._plan_events.reset()
         if self._monitor:
             self._monitor.reset()
         schedule, rest = self.scenario.model.schedule, self._plant.state
@@ -231,7 +246,12 @@ class Loop:
         period = None if since else self._begin_period()
         left = self.last_tick - plant.tick
         ticks = min(most, self._per_reference - since, left + 1)
-        return Ticks(*self._run(ticks, left), self._guidance, period)
+        rows, excesses = self._run(ticks, left)
+        report = self._solves.take_status() if self._solves else None
+        told = self._plan_events.of(report) if report else ()
+        if told:
+            excesses = {**excesses, 0: excesses.get(0, ()) + told}
+        return Ticks(rows, excesses, self._guidance, period, report)
 
     def _run(self, ticks: int, left: int) -> tuple[TickRows, Mapping[int, tuple[RunEvent, ...]]]:
         """Carry out some ticks, with ``left`` still to be integrated; return them with their excesses."""
@@ -284,6 +304,7 @@ class Loop:
         self.last_tick = self._common.last_tick(phase.end_ns, failed=phase.failed)
         self.seed, self.finished = snapshot.seed, snapshot.finished
         self._controller.reset()
+        self._plan_events.reset()
         if snapshot.law == self.law:
             restore_controller(self._controller, snapshot.controller)
         elif snapshot.plant.tick:

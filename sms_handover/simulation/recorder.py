@@ -12,7 +12,7 @@ from sms_handover.model.poses import pose_row, twist_in_deputy
 from sms_handover.run_data import RunData
 from sms_handover.simulation.loop import Period, Ticks
 from sms_handover.simulation.quiet_periods import QuietPeriods
-from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, TaskPhase, TickRows
+from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, PlanReport, TaskPhase, TickRows
 
 _BY_PERIOD = (
     *("reference_position", "reference_velocity", "deputy_pose", "deputy_twist"),
@@ -42,6 +42,7 @@ class RunRecorder:
         self._phases: list[TaskPhase] = []
         self._events: list[GraspEvent] = []
         self._decisions: list[RunEvent] = []
+        self._plans: list[PlanReport] = []
 
     def add(self, ticks: Ticks | QuietPeriods) -> None:
         """Add some ticks, and the reference periods that begin with them."""
@@ -51,6 +52,8 @@ class RunRecorder:
             self._add_periods(ticks)
         elif ticks.period:
             self._add_period(ticks.period)
+        if isinstance(ticks, Ticks) and ticks.plan:
+            self._plans.append(ticks.plan)
         for index, events in ticks.excesses.items():
             self._decisions.extend(events if index else ())
 
@@ -139,5 +142,6 @@ class RunRecorder:
             phases=tuple(self._phases),
             grasp_events=tuple(self._events),
             run_events=tuple(self._decisions),
+            plans=tuple(self._plans),
             **{name: np.concatenate(rows) for name, rows in self._periods.items()},
         )

@@ -28,11 +28,13 @@ from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
 from sms_handover.plant.integrators import TABLEAUS, Tableau
 from sms_handover.plant.joint_limits import ENFORCE
 from sms_handover.plant.parameters import PlantParameters
+from sms_handover.simulation.near_pairs import NearPairs
 from sms_handover.simulation.parameters import COMPILED, CommonParameters
 from sms_handover.simulation.period_runner import PeriodRunner, PythonRunner
 from sms_handover.simulation.stability import check_stability_by_phase
 from sms_handover.trajectory.generator import TrajectoryGenerator
 from sms_handover.trajectory.parameters import TrajectoryParameters
+from sms_handover.trajectory.preview import TargetPreview
 from sms_handover.trajectory.schedule import Schedule
 from sms_handover.trajectory.tool_motion import PinocchioToolMotion
 from sms_handover.types import Array
@@ -130,7 +132,8 @@ def make_controller(
     The efforts of a law of another package are checked. Raises ConfigurationError.
     """
     law, gains = law_named(parameters.law), gains_by_phase(schedule, parameters)
-    missing = sorted(need.value for need in law.needs - {Need.TOOL_TARGETS, Need.PAYLOAD})
+    have = {Need.TOOL_TARGETS, Need.PREVIEW, Need.CLEARANCE, Need.PAYLOAD}
+    missing = sorted(need.value for need in law.needs - have)
     if missing:
         raise ConfigurationError(f"control law {law.name!r} needs {missing[0]}, which the loop has not")
     start = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
@@ -138,7 +141,19 @@ def make_controller(
     check_stability_by_phase(law, robot, schedule, gains, ns_to_seconds(common.tick_ns), places)
     computed_torque = CompiledComputedTorque if common.dynamics == COMPILED else ComputedTorque
     longest_ns = longest_reference_ns(common, parameters)
-    setup = LawSetup(robot, gains, common.tick_ns, longest_ns, computed_torque, schedule.deputy)
+    preview = TargetPreview(robot, schedule) if Need.PREVIEW in law.needs else None
+    distances = NearPairs(make_clearance(robot, schedule)) if Need.CLEARANCE in law.needs else None
+    setup = LawSetup(
+        robot,
+        gains,
+        common.tick_ns,
+        longest_ns,
+        computed_torque,
+        schedule.deputy,
+        reference_ns=common.reference_ns,
+        preview=preview,
+        distances=distances,
+    )
     controller = law.make(setup)
     return controller if law.name in SHIPPED else CheckedController(controller, robot.joint_names)
 

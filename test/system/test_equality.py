@@ -62,6 +62,21 @@ def test_run_on_busy_cores(schedule: Path, simulated: dict[str, RunData], tmp_pa
     assert_same_bits(read_run(tmp_path / "out" / "bag"), simulated["nmpc"])
 
 
+def test_a_predictive_law(schedule: Path, tmp_path: Path) -> None:
+    """Its plans too, with the limits that bind: all but the wall times of the solves."""
+    limits = {"joint_rate_limit": 1.0, "base_rate_limit": 0.1, "least_distance": 0.01}
+    options = [part for name, value in limits.items() for part in ("-p", f"controller.{name}:={value}")]
+    command = ("run", "--controller", "mpc", *options, "--schedule", schedule, "-o", "mpc")
+    ended = sms_handover(*command, cwd=tmp_path)
+    assert ended.code == 0, ended
+    values = {"common": {"schedule": str(schedule)}, "controller": {"law": "mpc", **limits}}
+    expected, recorded = simulate(load_scenario(values=values)), read_run(tmp_path / "mpc" / "bag")
+    assert compare_runs(recorded, expected) == ()
+    assert len(recorded.plans) == len(recorded.reference_ns)
+    assert all(plan.total_time > plan.program_time > 0.0 for plan in recorded.plans)
+    assert {row for plan in recorded.plans for row in plan.active}
+
+
 @pytest.mark.parametrize(("law", "transport"), [("nmpc", "direct"), ("pid", "executor")])
 def test_run_in_one_process(
     law: str, transport: str, schedule: Path, simulated: dict[str, RunData], tmp_path: Path

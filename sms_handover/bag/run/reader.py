@@ -89,6 +89,7 @@ def _assemble(collector: RunCollector) -> RunData:
         phases=_last_run(collector.phases),
         grasp_events=tuple(collector.events),
         run_events=tuple(collector.run_events),
+        plans=tuple(collector.plans),
     )
 
 

@@ -22,6 +22,7 @@ _CONTENTS = {
     topics.ANGULAR_IMPULSE: "what they have added to that [N m s]; only if there are any",
     topics.ENERGY: "kinetic energy, work of the joint efforts and from outside, and what became heat [J]",
     topics.IK_STATUS: "how the last inverse-kinematics solve ended: status, iterations, errors [m, rad]",
+    topics.MPC_STATUS: "what came of a solve: status, rows that bind, slack, times [s]; only under law mpc",
     topics.ROBOT_DESCRIPTION: "URDF of the robot",
     topics.TF: "every moving link in its parent [m], and in world base_link, deputy and targets",
     topics.TF_STATIC: "every link that does not move in its parent [m], and the grasp frames in deputy",
