@@ -39,7 +39,17 @@ KEYS = {
     "zstandard": "mcap-ros2-support",
 }
 # Extras that a user installs with pip: rosdep has no key for them.
-BY_PIP_ONLY = {"SALib", "casadi", "distributed", "pandas", "playwright", "plotly", "pyarrow", "scipy", "statsmodels"}
+BY_PIP_ONLY = {
+    "SALib",
+    "casadi",
+    "distributed",
+    "pandas",
+    "playwright",
+    "plotly",
+    "pyarrow",
+    "scipy",
+    "statsmodels",
+}
 ROS_PACKAGE = re.compile(r"rclpy|rosidl_\w+|ament_index_python|tf2_\w+|\w+_(msgs|srvs|interfaces)")
 
 

@@ -3,8 +3,9 @@
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from pathlib import Path
 
+from sms_handover.campaign.page.campaign_page import campaign_page
 from sms_handover.cli.figure_files import LISTED, add_figure_options, draw, figures_of
-from sms_handover.cli.recorded_runs import read_all
+from sms_handover.cli.recorded_runs import campaign_among, read_all
 from sms_handover.cli.text_files import write_text
 from sms_handover.errors import ConfigurationError
 from sms_handover.report.page import report_page
@@ -34,7 +35,13 @@ def add_parser(parser: ArgumentParser) -> None:
         "exit codes: 0 the page or the figures are written; 1 a package is missing; 2 wrong input, as a\n"
         "bag that is not ours or a page that exists already, and nothing was written"
     )
-    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="output folder of a run, or a bag")
+    parser.add_argument(
+        "runs",
+        nargs="+",
+        type=Path,
+        metavar="RUN",
+        help="output folder of a run, or a bag; or the folder of one campaign",
+    )
     parser.add_argument(
         "-o",
         "--output",
@@ -52,10 +59,16 @@ def command(options: Namespace) -> int:
     page = _page(options.output or _FOLDER) if options.output or not figures else None
     if page and page.exists() and not options.overwrite:
         raise ConfigurationError(f"{page} exists; choose another place, or --overwrite it")
+    campaign = campaign_among(options.runs)
+    if campaign and figures:
+        raise ConfigurationError(f"{campaign.path} is a campaign: the paper's figures are those of runs")
     with Progress() as progress:
-        runs = read_all(options.runs, progress)
+        runs = () if campaign else read_all(options.runs, progress)
         progress.show("drawing")
-        content = report_page(runs) if page else ""
+        if campaign:
+            content = campaign_page(campaign)
+        else:
+            content = report_page(runs) if page else ""
     if page:
         write_text(page, content, parents=True)
         print(f"{page}: {len(content.encode()) / _BYTES_PER_MB:.1f} MB; open it in a browser")

@@ -129,4 +129,7 @@ def in_words(row: Row, worst_by: str) -> str:
 
 def inputs_in_words(inputs: Mapping[str, Value]) -> str:
     """Return drawn values in one line."""
-    return ", ".join(f"{path} {value:.6g}" if isinstance(value, float) else f"{path} {value}" for path, value in inputs.items())
+    return ", ".join(
+        f"{path} {value:.6g}" if isinstance(value, float) else f"{path} {value}"
+        for path, value in inputs.items()
+    )

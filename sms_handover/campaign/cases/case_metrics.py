@@ -42,9 +42,7 @@ USUAL: Mapping[str, tuple[str, str]] = MappingProxyType(
 )
 
 
-def metrics_of(
-    run: RunData, scenario: Scenario, further: Sequence[str]
-) -> tuple[Metrics, tuple[str, ...]]:
+def metrics_of(run: RunData, scenario: Scenario, further: Sequence[str]) -> tuple[Metrics, tuple[str, ...]]:
     """Return the usual metrics of a run and further ones by name, None where not defined; and what it lacks."""
     truth, common = scenario.truth, scenario.parameters.common
     texts = TaskTexts(truth.robot.urdf, truth.schedule.text, common.contact_depth)
@@ -109,4 +107,3 @@ def _usual(metrics: RunMetrics) -> dict[str, float | None]:
 def _plain(value: float | None) -> float | None:
     """Return a finite number as Python's float, None for any other."""
     return float(value) if value is not None and isfinite(value) else None
-

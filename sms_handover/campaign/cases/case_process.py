@@ -41,7 +41,12 @@ class CaseProcess:
     """A child process that runs cases one after the other; it is started again after a bad end."""
 
     def __init__(
-        self, frozen: Frozen, cases: int | None, seed: int, limits: Limits, program: Sequence[str] = CASE_PROGRAM
+        self,
+        frozen: Frozen,
+        cases: int | None,
+        seed: int,
+        limits: Limits,
+        program: Sequence[str] = CASE_PROGRAM,
     ) -> None:
         """Take what the child needs; it starts with the first task."""
         self._first = json.dumps({"files": dict(frozen.files), "cases": cases})

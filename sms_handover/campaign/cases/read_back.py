@@ -120,9 +120,11 @@ def _of_limits(joint: Any, steps: Sequence[str]) -> float:
 
 def _of_inertia(inertia: Inertia, steps: Sequence[str]) -> float:
     """Return a value of the inertia of a body."""
-    return inertia.mass if steps[0] == "mass" else {"com": inertia.com, "inertia": inertia.moments}[steps[0]][
-        int(steps[1])
-    ]
+    return (
+        inertia.mass
+        if steps[0] == "mass"
+        else {"com": inertia.com, "inertia": inertia.moments}[steps[0]][int(steps[1])]
+    )
 
 
 def _of_origin(origin: Origin, steps: Sequence[str]) -> float:

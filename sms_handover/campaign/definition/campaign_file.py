@@ -23,6 +23,7 @@ from sms_handover.campaign.definition.distributions import (
 from sms_handover.campaign.definition.fields import (
     CAMPAIGN_FIELDS,
     COUNTED,
+    EXTENDABLE,
     LIST,
     NONE,
     RANDOM,
@@ -125,8 +126,10 @@ def read_campaign(path: Path, cases: int | None = None) -> Campaign:
     sampler = _sampler(root, path.parent)
     if "cases" in root and sampler.kind not in COUNTED:
         raise root.error(f"sampler {sampler.kind} has its own number of cases: leave cases out", "cases")
-    if cases is not None and sampler.kind not in COUNTED:
-        raise ConfigurationError(f"{path}: sampler {sampler.kind} has its own number of cases")
+    if cases is not None and sampler.kind not in EXTENDABLE:
+        raise ConfigurationError(
+            f"{path}: sampler {sampler.kind} has a fixed number of cases: only {' and '.join(EXTENDABLE)} go on"
+        )
     if cases is None and "cases" in root:
         cases = int(root.number("cases"))
     draws = _draws(root)

@@ -14,6 +14,7 @@ from sms_handover.configuration.field_specification import (
 RANDOM, LHS, SOBOL = "random", "lhs", "sobol"
 GRID, MORRIS, SALTELLI, LIST = "grid", "morris", "saltelli", "list"
 COUNTED = (RANDOM, LHS, SOBOL)  # samplers that take the number of cases; the others have their own
+EXTENDABLE = (RANDOM, SOBOL)  # whose cases stay when more are added
 NONE, FAILURES, ALL = "none", "failures", "all"
 MOST_CASES = 100_000_000
 _LARGEST = 2**53  # from which on not every whole number is a double

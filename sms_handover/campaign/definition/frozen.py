@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sms_handover.campaign.definition.campaign_file import Campaign, csv_file_of, read_campaign
-from sms_handover.campaign.definition.fields import COUNTED, LIST
+from sms_handover.campaign.definition.fields import EXTENDABLE, LIST
 from sms_handover.configuration.documents import as_yaml
 from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.scenario_file import scenario_names
@@ -23,7 +23,7 @@ _SUFFIX = ".yaml"
 
 @dataclass(frozen=True)
 class Frozen:
-    """The texts of a campaign by the names of their files, without the number of its cases."""
+    """The texts of a campaign by the names of their files, without a number of cases that may grow."""
 
     files: Mapping[str, str]
 
@@ -71,7 +71,9 @@ def freeze(path: Path) -> tuple[Frozen, int | None]:
     """
     campaign = read_campaign(path)
     content = read_yaml(path)
-    content.pop("cases", None)
+    extendable = campaign.sampler.kind in EXTENDABLE
+    if extendable:  # more cases are not another campaign
+        content.pop("cases", None)
     files: dict[str, str] = {}
     scenarios: dict[str, object] = {}
     for name, chosen in campaign.scenarios.items():
@@ -90,7 +92,7 @@ def freeze(path: Path) -> tuple[Frozen, int | None]:
         files[_TABLE] = table.read_text(encoding="utf-8")
         content["sampler"] = {LIST: {"file": _TABLE}}
     files[CAMPAIGN_FILE] = as_yaml(content)
-    return Frozen(files), campaign.cases if campaign.sampler.kind in COUNTED else None
+    return Frozen(files), campaign.cases if extendable else None
 
 
 def read_frozen(folder: Path) -> Frozen:

@@ -38,7 +38,11 @@ class JournalFaults:
     def in_words(self, path: Path) -> tuple[str, ...]:
         """Return each fault in a line."""
         said = [f"{path}, line {number} is corrupted: its case is run again" for number in self.broken]
-        return (*said, f"{path}: {self.torn} bytes of an unfinished last line are cut off") if self.torn else (*said,)
+        return (
+            (*said, f"{path}: {self.torn} bytes of an unfinished last line are cut off")
+            if self.torn
+            else (*said,)
+        )
 
 
 def entries_of(path: Path, faults: JournalFaults) -> Iterator[Entry]:
