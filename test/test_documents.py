@@ -189,7 +189,7 @@ def test_commands_in_the_text_exist(path: Path) -> None:
         if words[:1] == ["make"]:
             check(words)
         elif words[:1] == ["sms-handover"] and len(words) > 1 and words[1].islower():
-            if words[1:] == [BAG]:
+            if words[1] in FAMILIES and len(words) == 2:
                 continue
             parser, arguments = called(words[1:])
             options = [word for word in arguments if word.startswith("--")]

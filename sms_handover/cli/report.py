@@ -1,14 +1,17 @@
 """``sms-handover report``: recorded runs as one HTML page, or as figures for print."""
 
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from collections.abc import Sequence
 from pathlib import Path
 
 from sms_handover.campaign.page.campaign_page import campaign_page
+from sms_handover.campaign.record.campaign_folder import CampaignFolder
 from sms_handover.cli.figure_files import LISTED, add_figure_options, draw, figures_of
 from sms_handover.cli.recorded_runs import campaign_among, read_all
 from sms_handover.cli.text_files import write_text
 from sms_handover.errors import ConfigurationError
 from sms_handover.report.page import report_page
+from sms_handover.report.recorded_run import RecordedRun
 from sms_handover.terminal.progress import Progress
 
 _PAGE = "index.html"
@@ -65,16 +68,18 @@ def command(options: Namespace) -> int:
     with Progress() as progress:
         runs = () if campaign else read_all(options.runs, progress)
         progress.show("drawing")
-        if campaign:
-            content = campaign_page(campaign)
-        else:
-            content = report_page(runs) if page else ""
+        content = _content(runs, campaign) if page else ""
     if page:
         write_text(page, content, parents=True)
         print(f"{page}: {len(content.encode()) / _BYTES_PER_MB:.1f} MB; open it in a browser")
     if figures:
         draw(runs, figures)
     return 0
+
+
+def _content(runs: Sequence[RecordedRun], campaign: CampaignFolder | None) -> str:
+    """Return the page of runs, or of a campaign."""
+    return campaign_page(campaign) if campaign else report_page(runs)
 
 
 def _page(place: Path) -> Path:

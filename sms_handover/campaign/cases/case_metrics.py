@@ -1,4 +1,4 @@
-"""Metrics of a case: the usual figures of its run by short names, and any figure of a phase that is asked for."""
+"""Metrics of a case: the usual figures of its run by short names, and any other that is asked for."""
 
 from collections.abc import Mapping, Sequence
 from math import inf, isfinite
@@ -43,7 +43,7 @@ USUAL: Mapping[str, tuple[str, str]] = MappingProxyType(
 
 
 def metrics_of(run: RunData, scenario: Scenario, further: Sequence[str]) -> tuple[Metrics, tuple[str, ...]]:
-    """Return the usual metrics of a run and further ones by name, None where not defined; and what it lacks."""
+    """Return metrics of a run, the usual and further ones, None where not defined; and what it lacks."""
     truth, common = scenario.truth, scenario.parameters.common
     texts = TaskTexts(truth.robot.urdf, truth.schedule.text, common.contact_depth)
     comparison = compare({"": run}, texts={"": texts})

@@ -1,4 +1,4 @@
-"""Process that carries out cases, watched from outside: a case that hangs, dies or eats memory is a row too."""
+"""Process that carries out cases, watched from outside: one that hangs, dies or eats memory is a row too."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Row of a case: what it was given, how it ended, and its metrics; and beside it what depends on the machine."""
+"""Row of a case: what it was given, how it ended, its metrics; and beside it what depends on the machine."""
 
 import hashlib
 import json

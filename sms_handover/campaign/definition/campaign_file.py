@@ -128,7 +128,7 @@ def read_campaign(path: Path, cases: int | None = None) -> Campaign:
         raise root.error(f"sampler {sampler.kind} has its own number of cases: leave cases out", "cases")
     if cases is not None and sampler.kind not in EXTENDABLE:
         raise ConfigurationError(
-            f"{path}: sampler {sampler.kind} has a fixed number of cases: only {' and '.join(EXTENDABLE)} go on"
+            f"{path}: sampler {sampler.kind} has a fixed number of cases; {' and '.join(EXTENDABLE)} have not"
         )
     if cases is None and "cases" in root:
         cases = int(root.number("cases"))

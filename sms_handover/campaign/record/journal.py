@@ -67,7 +67,7 @@ class JournalWriter:
     """Appends to a journal that nobody else writes to."""
 
     def __init__(self, path: Path) -> None:
-        """Lock the journal, mend it, and keep its faults; raises ConfigurationError while it is written to."""
+        """Lock the journal and mend it; raises ConfigurationError while somebody else writes to it."""
         self.path = path
         self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
         try:

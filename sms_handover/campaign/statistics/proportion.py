@@ -31,7 +31,7 @@ class Proportion(NamedTuple):
 
 
 def proportion(successes: int, trials: int) -> Proportion:
-    """Return a proportion: its interval is about (p + z^2/2n) / (1 + z^2/n); all of [0, 1] without a trial."""
+    """Return a proportion: its interval is about (p + z^2/2n) / (1 + z^2/n), [0, 1] without a trial."""
     if trials == 0:
         return Proportion(successes, trials, 0.0, 1.0)
     share, spread = successes / trials, _Z**2 / trials

@@ -1,4 +1,4 @@
-"""``sms-handover campaign``: run scenarios many times with drawn values, go on, look at and merge what there is."""
+"""``sms-handover campaign``: run scenarios many times with drawn values, and look at what came of it."""
 
 COMMANDS = {
     "run": "run a campaign, or go on with one",
@@ -7,6 +7,6 @@ COMMANDS = {
     "merge": "merge the folders of shards into one",
 }
 DESCRIPTION = (
-    "Run scenarios many times with drawn values under one law or several. 'sms-handover check FILE' checks a\n"
-    "campaign file; 'compare' and 'report' take the folder of a campaign. See docs/campaigns.md."
+    "Run scenarios many times with drawn values under one law or several. 'sms-handover check FILE'\n"
+    "checks a campaign file; 'compare' and 'report' take the folder of a campaign. See docs/campaigns.md."
 )

@@ -11,8 +11,8 @@ from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
 def add_parser(parser: ArgumentParser) -> None:
     """Describe the command."""
     parser.description = (
-        "Write a new folder with the rows of several folders of one campaign, such as those of its shards; the "
-        "command that ran them goes on with it. Two rows of one case must be equal."
+        "Write a new folder with the rows of several folders of one campaign, such as those of its shards. "
+        "Two rows of one case must be equal."
     )
     parser.epilog = (
         "exit codes: 0 every case has a row; 1 it cannot be written; 2 wrong input; 3 cases are missing"
