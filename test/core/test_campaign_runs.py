@@ -17,6 +17,7 @@ import pytest
 from sms_handover.campaign.cases.case import Cases
 from sms_handover.campaign.definition.frozen import freeze
 from sms_handover.campaign.engine.choice import workers_for
+from sms_handover.campaign.engine.dask_workers import DaskWorkers
 from sms_handover.campaign.engine.run import run_campaign
 from sms_handover.campaign.engine.scheduler_url import require_safe
 from sms_handover.campaign.record.campaign_folder import CampaignFolder, merge, open_campaign
@@ -48,7 +49,7 @@ def journal_lines(folder: Path) -> int:
 def family(pid: int) -> list[psutil.Process]:
     """Return the processes below one."""
     try:
-        return psutil.Process(pid).children(recursive=True)
+        return list(psutil.Process(pid).children(recursive=True))
     except psutil.NoSuchProcess:
         return []
 
@@ -96,16 +97,9 @@ def test_rows_depend_on_no_worker_order_or_kill(tmp_path: Path) -> None:
     frozen, number = freeze(file)
     with open_campaign(out, frozen, number, Shard()) as opened:
         assert "17 bytes of an unfinished last line are cut off" in opened.faults[0]
-        run_campaign(opened, lambda: dask_workers(frozen, number, 1), lambda tally: None)
+        run_campaign(opened, lambda: DaskWorkers(frozen, number, workers=1), lambda tally: None)
     assert digests_of(out) == expected
     assert journal_lines(out) == CASES, "no case twice"
-
-
-def dask_workers(frozen: object, number: int | None, workers: int) -> object:
-    """Return workers of a cluster, also if it is one."""
-    from sms_handover.campaign.engine.dask_workers import DaskWorkers  # noqa: PLC0415
-
-    return DaskWorkers(frozen, number, workers=workers)  # type: ignore[arg-type]
 
 
 def assert_only_local(processes: list[psutil.Process]) -> None:
@@ -204,9 +198,7 @@ def test_a_full_disk_is_a_clear_error_and_the_same_command_goes_on(
 
     with monkeypatch.context() as patched:
         patched.setattr("sms_handover.campaign.record.journal.os.write", full)
-        with pytest.raises(
-            SmsHandoverError, match="No space left on device; make room, then the same command"
-        ):
+        with pytest.raises(SmsHandoverError, match="No space left on device; make room, then the same"):
             run_here(file, out, program=STUB)
     assert len(rows_of(out)) == journal_lines(out) == 3
     run_here(file, out, program=STUB)

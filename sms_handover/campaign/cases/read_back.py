@@ -172,7 +172,8 @@ def _of_schedule(world: World, steps: Sequence[str]) -> Any:
     target, rest = phase.targets[steps[3]], steps[4:]
     if isinstance(target, JointTarget):
         return float(target.position[int(rest[1])])
-    if isinstance(target, ToolTarget | GraspFrameTarget):
-        in_world = isinstance(target, ToolTarget)
-        return _of_pose(target.tool_in_world if in_world else target.tool_in_grasp_frame, rest[1:])
+    if isinstance(target, ToolTarget):
+        return _of_pose(target.tool_in_world, rest[1:])
+    if isinstance(target, GraspFrameTarget):
+        return _of_pose(target.tool_in_grasp_frame, rest[1:])
     raise KeyError(steps[3])

@@ -2,6 +2,7 @@
 
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -22,8 +23,7 @@ def trajectory(run: RunData) -> bytes:
     """Return a run at the rate of its references, as a NumPy archive."""
     rows = np.searchsorted(run.tick_ns, run.reference_ns)
     stream = BytesIO()
-    np.savez_compressed(
-        stream,
+    arrays: dict[str, Any] = dict(
         stamp_ns=run.reference_ns,
         joint_names=np.array(run.joint_names),
         joint_position=run.joint_position[rows],
@@ -35,6 +35,7 @@ def trajectory(run: RunData) -> bytes:
         **{f"tool_pose.{arm}": pose for arm, pose in run.tool_pose.items()},
         **{f"target_pose.{arm}": pose for arm, pose in run.target_pose.items()},
     )
+    np.savez_compressed(stream, **arrays)
     return stream.getvalue()
 
 

@@ -25,6 +25,7 @@ from sms_handover.campaign.definition.fields import (
     COUNTED,
     EXTENDABLE,
     LIST,
+    MORRIS,
     NONE,
     RANDOM,
 )
@@ -169,10 +170,11 @@ def _sampler(root: Section, folder: Path) -> Sampler:
         with inner.located("file"):
             return Sampler(kind, {}, _table(folder / inner.text("file")))
     numbers = {key: int(inner.number(key)) for key in inner.keys}
-    for key, odd in (("base", lambda n: n & (n - 1)), ("levels", lambda n: kind == "morris" and n % 2)):
-        if key in numbers and odd(numbers[key]):
-            must = "a power of two" if key == "base" else "even"
-            raise inner.error(f"{inner.path(key)} is {numbers[key]}, must be {must}", key)
+    base, levels = numbers.get("base", 2), numbers.get("levels", 2)
+    if base & (base - 1):
+        raise inner.error(f"{inner.path('base')} is {base}, must be a power of two", "base")
+    if kind == MORRIS and levels % 2:
+        raise inner.error(f"{inner.path('levels')} is {levels}, must be even", "levels")
     return Sampler(kind, MappingProxyType(numbers))
 
 
@@ -253,7 +255,8 @@ def _distribution(section: Section, path: str) -> Distribution:
         if kind == "normal":
             return Normal(inner.number("mean"), inner.number("std"))
         if kind == "truncated":
-            return Truncated(*(inner.number(key) for key in ("mean", "std", "low", "high")))
+            mean, std, low, high = (inner.number(key) for key in ("mean", "std", "low", "high"))
+            return Truncated(mean, std, low, high)
         if kind == "uniform":
             return Uniform(inner.number("low"), inner.number("high"))
         if kind == "integers":
@@ -330,9 +333,11 @@ def _limits(root: Section) -> Limits:
     if "limits" not in root:
         return Limits()
     section = root.section("limits")
-    whole = {key: int(section.number(key)) for key in ("ticks", "retries") if key in section}
-    other = {key: section.number(key) for key in ("wall_time", "memory") if key in section}
-    return Limits(**whole, **other)
+    given: dict[str, Any] = {
+        **{key: int(section.number(key)) for key in ("ticks", "retries") if key in section},
+        **{key: section.number(key) for key in ("wall_time", "memory") if key in section},
+    }
+    return Limits(**given)
 
 
 def csv_file_of(path: Path) -> Path | None:

@@ -73,7 +73,8 @@ class CasePlugin(distributed.WorkerPlugin):
 def run_chunk(tasks: Sequence[tuple[int, str, str]]) -> list[_Answer]:
     """Carry out some tasks on a worker; return row, what is beside it, and trajectory of each."""
     worker = distributed.get_worker()
-    with worker.plugins[_PLUGIN].process() as process:
+    plugin: Any = worker.plugins[_PLUGIN]
+    with plugin.process() as process:
         done = [process.run(Task(*task)) for task in tasks]
     return [(one.row.text, asdict(one.beside), one.trajectory) for one in done]
 

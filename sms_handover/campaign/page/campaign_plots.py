@@ -114,7 +114,9 @@ def _trade(scenario: str, laws: Sequence[tuple[str, CaseColumns]], x: str, y: st
             front = pareto_front(costs)
             keep = _thinned(len(costs)) | front
             flags = (one.succeeded[keep].astype(float), front[keep].astype(float))
-            traces.append(Trace(POINTS, law, colour, *costs[keep].T, full=flags[0], large=flags[1]))
+            points = costs[keep]
+            trace = Trace(POINTS, law, colour, points[:, 0], points[:, 1], full=flags[0], large=flags[1])
+            traces.append(trace)
     title = f"{scenario}: {y} against {x}, the Pareto front large, what is no success hollow"
     return CampaignPlot(f"trade-{x}-{scenario}", title, _axis(x), _axis(y), tuple(traces))
 
