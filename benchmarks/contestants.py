@@ -13,7 +13,7 @@ from benchmarks.handover_task import HandoverTask, NmpcTracker, State
 from benchmarks.mujoco_model import MujocoRobot, rotation_matrix
 from sms_handover.control.protocol import Guidance
 from sms_handover.plant.integrators import Tableau
-from sms_handover.simulation.wiring import make_controller, make_plant, make_stepper
+from sms_handover.simulation.wiring import make_controller, make_dynamics, make_plant
 from sms_handover.types import BASE_NQ, BASE_NV, Array
 
 
@@ -30,7 +30,7 @@ class Ours:
         common = replace(parameters.common, dynamics=dynamics)
         short = replace(common, tick=task.tick_s / steps)
         self._plant = make_plant(robot, schedule, short, parameters.plant)
-        self._plant._stepper = make_stepper(robot, dynamics, tableau, short.tick)
+        self._plant._stepper = make_dynamics(dynamics, tableau, short.tick)(robot).stepper
         self._controller = make_controller(robot, schedule, common, parameters.controller)
         self._task, self._steps = task, steps
         self._ticks, self._tick_ns = parameters.common.ticks_per_reference, parameters.common.tick_ns

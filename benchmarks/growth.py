@@ -21,7 +21,7 @@ from sms_handover.plant.integrators import TABLEAUS
 from sms_handover.simulation.parameters import COMPILED, DYNAMICS
 from sms_handover.simulation.scenario import load_parameters, load_scenario
 from sms_handover.simulation.simulate import simulate
-from sms_handover.simulation.wiring import make_stepper
+from sms_handover.simulation.wiring import make_dynamics
 from sms_handover.types import JointReference, Pose, TaskPhase
 from sms_handover.units import ns_to_seconds
 
@@ -57,8 +57,8 @@ def robot_with(arms: int, folder: Path) -> RobotModel:
 def ticks_of(robot: RobotModel, dynamics: str) -> Callable[[], None]:
     """Return what lets a robot under NMPC go through ticks of 1 ms towards a reference."""
     joints, parameters = np.tile(BENT, len(robot.arms)), load_parameters().plant
-    stepper = make_stepper(robot, dynamics, TABLEAUS[parameters.integrator], ns_to_seconds(TICK_NS))
-    plant = FreeFloatingPlant(robot, parameters, InitialState(HOME, joints, HOME, {}), TICK_NS, stepper)
+    make = make_dynamics(dynamics, TABLEAUS[parameters.integrator], ns_to_seconds(TICK_NS))
+    plant = FreeFloatingPlant(robot, parameters, InitialState(HOME, joints, HOME, {}), TICK_NS, make)
     torque = CompiledComputedTorque if dynamics == COMPILED else ComputedTorque
     controller = NMPC.make(LawSetup(robot, (NmpcGains(1.0, 0),), TICK_NS, computed_torque=torque))
     reference = JointReference(0, joints + 0.1, np.zeros_like(joints))

@@ -24,10 +24,12 @@ class RunData:
     ``base_link`` in ``world``; ``base_twist`` (N, 6) linear then angular in ``base_link`` axes.
 
     Rows per reference period: ``reference_ns`` (M,); reference position and velocity (M, n);
-    per arm ``target_pose`` and ``tool_pose`` (M, 7) in ``world``; ``deputy_pose`` (M, 7);
-    momentum (M, 3) in ``world`` axes, the angular one about the centre of mass; ``kinetic_energy``
-    and ``work`` (M,) J, of the joint efforts less what joint stops have taken; ``ik_status`` (M,) the number
-    of the IkStatus message, -1 where none was asked.
+    per arm ``target_pose`` and ``tool_pose`` (M, 7) in ``world``; ``deputy_pose`` (M, 7), and
+    ``deputy_twist`` (M, 6) in axes of the deputy; momentum (M, 3) of robot and deputy in ``world`` axes, the
+    angular one about the common centre of mass; ``kinetic_energy`` (M,) J, which grows by ``work`` of the
+    joint efforts and ``external_work`` of wrenches from outside, less ``lost`` to heat, each (M,) J since the
+    start; ``ik_status`` (M,) the number of the IkStatus message, -1 where none was asked. Bags of older
+    versions have no deputy twist (NaN), and their work is less what joint stops have taken.
     """
 
     joint_names: tuple[str, ...]
@@ -45,10 +47,13 @@ class RunData:
     target_pose: Mapping[str, Array]
     tool_pose: Mapping[str, Array]
     deputy_pose: Array
+    deputy_twist: Array
     linear_momentum: Array
     angular_momentum: Array
     kinetic_energy: Array
     work: Array
+    external_work: Array
+    lost: Array
     ik_status: npt.NDArray[np.int64]
     phases: tuple[TaskPhase, ...]
     grasp_events: tuple[GraspEvent, ...]

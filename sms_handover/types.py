@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
+from math import nan
 from types import MappingProxyType
 
 import numpy as np
@@ -70,6 +71,11 @@ class Twist:
 
     def __post_init__(self) -> None:
         freeze(self, "linear", "angular")
+
+    @property
+    def row(self) -> Array:
+        """Both parts as one row (6,)."""
+        return np.concatenate([self.linear, self.angular])
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,8 +161,9 @@ class PeriodRows:
     """Reference periods as arrays, a row each: what every one began with.
 
     Stamps (k,) ns; references (k, n) rad and rad/s; poses (k, 7) of targets and tools by arm, and of the
-    deputy; momenta (k, 3); energy and work (k,) J; the status of inverse kinematics, None where it was not
-    asked.
+    deputy, whose twist (k, 6) is in its own axes; momenta (k, 3); kinetic energy, and since the start work of
+    the joints, work of wrenches from outside and what became heat (k,) J; the status of inverse kinematics,
+    None where it was not asked.
     """
 
     stamp_ns: npt.NDArray[np.int64]
@@ -165,10 +172,13 @@ class PeriodRows:
     target_pose: Mapping[str, Array]
     tool_pose: Mapping[str, Array]
     deputy_pose: Array
+    deputy_twist: Array
     linear_momentum: Array
     angular_momentum: Array
     kinetic_energy: Array
     work: Array
+    external_work: Array
+    lost: Array
     ik_status: tuple["IkStatus | None", ...]
 
 
@@ -251,9 +261,12 @@ class GraspStatus(Enum):
 
 @dataclass(frozen=True)
 class GraspEvent:
-    """The outcome of a grasp command with the errors of the tool against the grasp frame.
+    """The outcome of a grasp command with the errors of the tool against the grasp frame, and its impulse.
 
-    ``position_error`` m, ``angle_error`` rad, ``relative_speed`` m/s; NaN where they do not apply.
+    ``position_error`` m, ``angle_error`` rad, ``relative_speed`` m/s, ``relative_rate`` rad/s; NaN where they
+    do not apply. ``relative_twist`` (6 numbers) is that of the deputy relative to the hand before it closed,
+    ``impulse`` N s and N m s what the hand gave to the deputy, both about the origin of the deputy in
+    ``world`` axes. ``energy_lost`` J has become heat in the grip.
     """
 
     stamp_ns: int
@@ -263,6 +276,10 @@ class GraspEvent:
     angle_error: float
     relative_speed: float
     detail: str
+    relative_rate: float = nan
+    relative_twist: tuple[float, ...] = (nan,) * 6
+    impulse: tuple[float, ...] = (0.0,) * 6
+    energy_lost: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,11 @@ from math import nan
 
 import numpy as np
 
-from sms_handover.analysis.numbers import largest, lengths
+from sms_handover.analysis.numbers import complete, largest, lengths
 from sms_handover.analysis.phases import PhaseSpan
 from sms_handover.analysis.signals import energy_residual
 from sms_handover.graph.message_constants import CONSTANTS
-from sms_handover.run_data import RunData
+from sms_handover.run_data import Array, RunData
 from sms_handover.types import IkStatus
 
 _NOT_ASKED = -1
@@ -17,11 +17,11 @@ _NOT_ASKED = -1
 
 @dataclass(frozen=True)
 class PhysicsResiduals:
-    """Largest violation of each conservation law in a run that starts at rest.
+    """Largest violation of each conservation law in a run.
 
-    ``linear_momentum`` kg m/s and ``angular_momentum`` kg m^2/s, the latter about the centre of
-    mass; ``energy`` is the largest |change of kinetic energy - work of torques and joint stops|, relative
-    to ``peak_kinetic_energy`` J, and NaN if nothing moved.
+    ``linear_momentum`` kg m/s and ``angular_momentum`` kg m^2/s, the latter about the centre of mass, are the
+    largest changes since the start; ``energy`` is the largest |change of kinetic energy - work + heat|,
+    relative to ``peak_kinetic_energy`` J, and NaN if nothing moved.
     """
 
     linear_momentum: float
@@ -53,11 +53,17 @@ def physics_residuals(run: RunData, phase: PhaseSpan | None = None) -> PhysicsRe
     residual = energy_residual(run).values[rows, 0]
     known = residual[~np.isnan(residual)]
     return PhysicsResiduals(
-        linear_momentum=largest(lengths(run.linear_momentum[rows])),
-        angular_momentum=largest(lengths(run.angular_momentum[rows])),
+        linear_momentum=largest(lengths(_change(run.linear_momentum)[rows])),
+        angular_momentum=largest(lengths(_change(run.angular_momentum)[rows])),
         energy=largest(np.abs(known - known[:1])) / peak if peak > 0.0 else nan,
         peak_kinetic_energy=peak,
     )
+
+
+def _change(rows: Array) -> Array:
+    """Return rows less the first one that is known."""
+    known = rows[complete(rows)][:1]
+    return rows - known if len(known) else rows
 
 
 def ik_outcomes(run: RunData, phase: PhaseSpan | None = None) -> IkOutcomes:

@@ -95,24 +95,27 @@ def base_turn_rate(run: RunData) -> Signal:
 
 
 def linear_momentum(run: RunData) -> Signal:
-    """Return P in kg m/s in ``world`` axes, each reference period; zero up to rounding."""
+    """Return P of robot and deputy in kg m/s in ``world`` axes, each period; constant up to rounding."""
     return _signal("linear momentum", "kg m/s", run.reference_ns, run.linear_momentum, AXES)
 
 
 def angular_momentum(run: RunData) -> Signal:
-    """Return L in kg m^2/s about the centre of mass in ``world`` axes; zero up to rounding."""
+    """Return L in kg m^2/s about the common centre of mass in ``world`` axes; constant up to rounding."""
     return _signal("angular momentum", "kg m^2/s", run.reference_ns, run.angular_momentum, AXES)
 
 
 def energy(run: RunData) -> Signal:
-    """Return kinetic energy E and work W of the torques in J, each reference period."""
-    both = np.column_stack([run.kinetic_energy, run.work])
-    return _signal("energy", "J", run.reference_ns, both, ("kinetic energy", "work"))
+    """Return kinetic energy E, work W of the torques and heat D in J, each reference period."""
+    account = np.column_stack([run.kinetic_energy, run.work, run.lost])
+    return _signal("energy", "J", run.reference_ns, account, ("kinetic energy", "work", "lost"))
 
 
 def energy_residual(run: RunData) -> Signal:
-    """Return (E(t) - E(0)) - (W(t) - W(0)) in J, each reference period; zero up to rounding."""
-    balance = (run.kinetic_energy - run.work)[:, np.newaxis]
+    """Return E - W - X + D less its first value in J, each reference period; zero up to rounding.
+
+    W is the work of the torques, X that of wrenches from outside, D what has become heat.
+    """
+    balance = (run.kinetic_energy - run.work - run.external_work + run.lost)[:, np.newaxis]
     return _signal("energy residual", "J", run.reference_ns, balance - _first(balance), ("residual",))
 
 

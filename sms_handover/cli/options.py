@@ -27,7 +27,7 @@ def add_scenario_options(parser: ArgumentParser) -> None:
         "scenario",
         nargs="?",
         metavar="SCENARIO",
-        help="name of a shipped scenario ('sms-handover list'), or a scenario file (default: paper); "
+        help="name of a shipped scenario ('sms-handover list'), or a scenario file (default: smooth); "
         "what the options say lies over it",
     )
     group.add_argument(

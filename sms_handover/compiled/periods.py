@@ -12,7 +12,7 @@ from sms_handover.compiled.library import dynamics_library
 from sms_handover.compiled.names import PERIODS
 from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.ik.parameters import IkParameters
-from sms_handover.model.poses import pose_row
+from sms_handover.model.poses import pose_row, twist_in_deputy
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.deputy import MasslessDeputy
 from sms_handover.trajectory.generator import Course
@@ -81,6 +81,7 @@ class CompiledPeriods:
         quiet["holder"] = self._arms.index(deputy.holder) if deputy.holder else -1
         quiet["in_tool"] = numbers_of(deputy)
         quiet["deputy"] = pose_row(deputy.state.deputy_in_world)
+        quiet["deputy_twist"] = deputy.state.twist_deputy_in_world.row
         quiet["failures"], quiet["most_failures"] = failed
 
     def _rows(self, periods: Any, ticks: TickRows) -> PeriodRows:
@@ -93,10 +94,13 @@ class CompiledPeriods:
             target_pose={arm: periods["targets"][:, index] for index, arm in enumerate(self._arms)},
             tool_pose={arm: periods["tools"][:, index] for index, arm in enumerate(self._arms)},
             deputy_pose=periods["deputy"],
+            deputy_twist=twist_in_deputy(periods["deputy"], periods["deputy_twist"]),
             linear_momentum=conserved[:, :3],
             angular_momentum=conserved[:, 3:6],
             kinetic_energy=conserved[:, 9],
             work=periods["work"],
+            external_work=np.full(len(periods), self._ticks.plant.external_work),
+            lost=np.full(len(periods), self._ticks.plant.losses),
             ik_status=tuple(None if k < 0 else STATUSES[k] for k in periods["status"].astype(int).tolist()),
         )
 
@@ -115,5 +119,11 @@ def _period(joints: int, arms: int) -> Any:
     """Return the fields of ``period_t`` in native/periods.c."""
     poses = (arms, POSE_ROW)
     reals: dict[str, Any] = {"reference": joints, "rates": joints, "targets": poses, "tools": poses}
-    reals |= {"deputy": POSE_ROW, "conserved": CONSERVED_SIZE, "work": (), "status": ()}
+    reals |= {
+        "deputy": POSE_ROW,
+        "deputy_twist": TWIST,
+        "conserved": CONSERVED_SIZE,
+        "work": (),
+        "status": (),
+    }
     return np.dtype([(name, "f8", shape) for name, shape in reals.items()])

@@ -44,7 +44,7 @@ class CompiledTicks:
         """Load the loop; ``known`` is the robot as the law knows it. Raises ConfigurationError."""
         assert isinstance(controller, JointController)
         true, longest_ns = plant.robot, controller.track.longest_ns
-        self._plant, self._controller = plant, controller
+        self.plant, self._controller = plant, controller
         self._scheme = tuple(TABLEAUS).index(scheme)
         self._tick_ns = tick_ns
         self._state = np.zeros((), _layout(true.n_joints))
@@ -71,7 +71,7 @@ class CompiledTicks:
 
     def run(self, ticks: int, steps: int) -> TickRows:
         """Carry out ``ticks`` ticks, of which the first ``steps`` are integrated."""
-        first_ns, rows = self._plant.stamp_ns, self.room(ticks)
+        first_ns, rows = self.plant.stamp_ns, self.room(ticks)
         self.take_over()
         self._call(*self.address, rows.ctypes.data, ticks, steps)
         self.give_back(steps)
@@ -95,7 +95,7 @@ class CompiledTicks:
 
     def take_over(self) -> None:
         """Take the state of plant and controller."""
-        plant, law, track, at = self._plant, self._controller.law, self._controller.track, self._at
+        plant, law, track, at = self.plant, self._controller.law, self._controller.track, self._at
         at["q"][:], at["v"][:], at["effort"][:] = plant.q, plant.v, plant.joint_effort
         at["work"][...] = plant.work
         at["stamp_ns"][...] = plant.stamp_ns
@@ -110,7 +110,7 @@ class CompiledTicks:
 
     def give_back(self, steps: int) -> None:
         """Give plant and controller the state that the ticks have led to."""
-        plant, law, at = self._plant, self._controller.law, self._at
+        plant, law, at = self.plant, self._controller.law, self._at
         q, v, effort = (frozen(at[name].copy()) for name in ("q", "v", "effort"))
         plant.adopt(steps, q, v, effort, float(at["work"]), at["saturated"])
         if isinstance(law, PidLaw):

@@ -15,8 +15,8 @@ from sms_handover.configuration.field_specification import (
 UNIFORM_BOX = "uniform_box"
 
 _MASS = ValueSpec("mass", "kg", above=0.0)
-_COM = vector(3, "centre of mass in the frame of the body", "m")
-_MOMENTS = vector(6, "ixx, ixy, ixz, iyy, iyz, izz about the centre of mass, axes of the body", "kg m^2")
+COM = vector(3, "centre of mass in the frame of the body", "m")
+MOMENTS = vector(6, "ixx, ixy, ixz, iyy, iyz, izz about the centre of mass, axes of the body", "kg m^2")
 _EDGES = vector(3, "edges along x, y, z", "m", above=0.0)
 _LIMITS = {
     "position": vector(2, "lower and upper limit of the angle", "rad"),
@@ -31,6 +31,10 @@ def pose(description: str) -> MappingSpec:
     return MappingSpec(description, {"xyz": vector(3, f"{description}: position", "m"), "rpy": turned})
 
 
+BOX_OR_MOMENTS = EitherSpec(
+    text("moments of inertia; uniform_box: those of a box of this mass and size", (UNIFORM_BOX,)),
+    MOMENTS,
+)
 _PANEL = MappingSpec(
     "a box that is drawn on the spacecraft and has no mass",
     {"xyz": vector(3, "centre in base_link", "m"), "size": _EDGES},
@@ -40,11 +44,8 @@ _BASE = MappingSpec(
     {
         "mass": _MASS,
         "size": _EDGES,
-        "com": _COM,
-        "inertia": EitherSpec(
-            text("moments of inertia; uniform_box: those of a box of this mass and size", (UNIFORM_BOX,)),
-            _MOMENTS,
-        ),
+        "com": COM,
+        "inertia": BOX_OR_MOMENTS,
     },
     {"panels": ListSpec("solar panels", _PANEL)},
 )
@@ -52,8 +53,8 @@ _LINK = MappingSpec(
     "the body that the joint moves",
     {
         "mass": _MASS,
-        "com": _COM,
-        "inertia": _MOMENTS,
+        "com": COM,
+        "inertia": MOMENTS,
         "radius": ValueSpec("radius of the cylinder drawn for it", "m", above=0.0),
     },
 )

@@ -10,20 +10,32 @@ from sms_handover.configuration.field_specification import (
     text,
     vector,
 )
-from sms_handover.configuration.robot_fields import pose
+from sms_handover.configuration.robot_fields import BOX_OR_MOMENTS, COM, pose
 
 HOLD, TARGET_KINDS = "hold", ("joints", "tool_in_world", "grasp_frame")
 MOST_RETRIES = 100  # of one phase; more is a mistake rather than patience
 _SHORTEST = 1e-9  # [s]
+_HEAVIEST = 1e5  # [kg] beyond, the inertia of the arms is lost in rounding
 
 DEPUTY_FIELDS = MappingSpec(
     "the object that is handed over",
     {
-        "mass": ValueSpec("mass; only 0 yet", "kg", minimum=0.0),
+        "mass": ValueSpec("mass; 0: massless, as in the paper", "kg", minimum=0.0, maximum=_HEAVIEST),
         "size": vector(3, "edges along x, y, z", "m", above=0.0),
-        "in_world": pose("its pose at 0 s, at rest"),
+        "in_world": pose("its pose at 0 s"),
         "grasp_frames": NamedSpec(
             "frames that a tool which holds it coincides with", pose("grasp frame in the deputy")
+        ),
+    },
+    {
+        "com": COM,
+        "inertia": BOX_OR_MOMENTS,
+        "twist_in_world": MappingSpec(
+            "twist of its origin at 0 s, in axes of world; what is not given of it is zero",
+            optional={
+                "linear": vector(3, "velocity", "m/s"),
+                "angular": vector(3, "angular velocity", "rad/s"),
+            },
         ),
     },
 )

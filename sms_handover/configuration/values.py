@@ -21,7 +21,13 @@ _STEP = re.compile(r"[^.\[\]]+")
 
 def written(first: str, values: AnyMapping[str, object]) -> list[str]:
     """Return values below the first step of their path as texts that :func:`with_values` takes."""
-    return [f"{first}.{path}:={json.dumps(value, default=str)}" for path, value in values.items()]
+    texts = list[str]()
+    for path, value in values.items():
+        if first in ROLES and isinstance(value, AnyMapping):  # a document, which is never set as a whole
+            texts += written(f"{first}.{path}", value)
+        else:
+            texts.append(f"{first}.{path}:={json.dumps(value, default=str)}")
+    return texts
 
 
 def with_values(content: Mapping, document: str, values: Sequence[str], role: str = "") -> Mapping:

@@ -10,6 +10,7 @@ import numpy as np
 
 from sms_handover.control.computed_torque import ComputedTorque, TrackingEfforts
 from sms_handover.control.protocol import Controller
+from sms_handover.model.deputy import DeputyDescription
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import Array
 
@@ -39,7 +40,8 @@ class LawSetup(Generic[G]):
     """What a controller is made from; ``gains`` has one set per phase of the schedule, by phase index.
 
     A joint reference is extrapolated up to an age of ``longest_reference_ns``, without bound if None.
-    ``computed_torque`` makes the inverse dynamics of a robot, by Pinocchio or compiled.
+    ``computed_torque`` makes the inverse dynamics of a robot, by Pinocchio or compiled. ``deputy`` is the one
+    that is handed over, as the law knows it.
     """
 
     robot: RobotModel
@@ -47,6 +49,7 @@ class LawSetup(Generic[G]):
     tick_ns: int
     longest_reference_ns: int | None = None
     computed_torque: Callable[[RobotModel], TrackingEfforts] = ComputedTorque
+    deputy: DeputyDescription | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +85,9 @@ class JointLaw(ABC, Generic[G]):
 
         ``desired`` (3, n) has the rows q_d rad, q_d' rad/s and q_d'' rad/s^2.
         """
+
+    def carry(self, robot: RobotModel) -> None:
+        """Go on with the dynamics of a robot with another payload; a law without a model ignores it."""
 
     @property
     def memory(self) -> Array:

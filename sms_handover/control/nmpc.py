@@ -1,5 +1,6 @@
 """NMPC: closed-form nonlinear model predictive control of the reduced dynamics."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from sms_handover.configuration.parameters import parameter
 from sms_handover.control.computed_torque import ComputedTorque, TrackingEfforts
 from sms_handover.control.controller import JointController
-from sms_handover.control.law import JointLaw, Law, LawSetup, LinearFeedback
+from sms_handover.control.law import JointLaw, Law, LawSetup, LinearFeedback, Need
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import Array
 
@@ -43,11 +44,20 @@ class NmpcLaw(JointLaw[NmpcGains]):
     a perfect model and unlimited efforts.
     """
 
-    def __init__(self, robot: RobotModel, gains: NmpcGains, efforts: TrackingEfforts | None = None) -> None:
-        """Set up the law; ``efforts`` is the computed torque of the robot, by default by Pinocchio."""
-        self._robot = robot
-        self._efforts = efforts or ComputedTorque(robot)
+    def __init__(
+        self,
+        robot: RobotModel,
+        gains: NmpcGains,
+        computed_torque: Callable[[RobotModel], TrackingEfforts] = ComputedTorque,
+    ) -> None:
+        """Set up the law; ``computed_torque`` makes the inverse dynamics of a robot."""
+        self._robot, self._make = robot, computed_torque
+        self.carry(robot)
         self.use(gains)
+
+    def carry(self, robot: RobotModel) -> None:
+        """Go on with the inverse dynamics of a robot that carries something else."""
+        self._efforts = self._make(robot)
 
     @property
     def feedback(self) -> Array:
@@ -73,8 +83,15 @@ def linearised(gains: NmpcGains, inertia: Array) -> LinearFeedback:
 
 def _controller(setup: LawSetup[NmpcGains]) -> JointController[NmpcGains]:
     """Return the controller of a setup."""
-    law = NmpcLaw(setup.robot, setup.gains[0], setup.computed_torque(setup.robot))
+    law = NmpcLaw(setup.robot, setup.gains[0], setup.computed_torque)
     return JointController(law, setup)
 
 
-NMPC = Law("nmpc", "the paper's closed form, without constraints", NmpcGains, _controller, linearised)
+NMPC = Law(
+    "nmpc",
+    "the paper's closed form, without constraints",
+    NmpcGains,
+    _controller,
+    linearised,
+    frozenset({Need.PAYLOAD}),
+)

@@ -8,7 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from sms_handover.errors import ControllerError
-from sms_handover.types import Array, JointReference, Pose, TaskPhase, frozen
+from sms_handover.types import Array, GraspEvent, JointReference, Pose, TaskPhase, frozen
 from sms_handover.units import ns_to_seconds
 
 
@@ -63,6 +63,18 @@ class Resumable(Protocol):
         """Go back to a former :attr:`state`."""
 
 
+@runtime_checkable
+class Carrying(Protocol):
+    """What a controller has besides that takes account of the mass of the deputy.
+
+    It is declared by :attr:`~sms_handover.control.law.Need.PAYLOAD` of its law, which then is made with the
+    deputy as it is known.
+    """
+
+    def grasped(self, event: GraspEvent) -> None:
+        """Learn what came of a grasp command; the payload is another one from the next state on."""
+
+
 class CheckedController:
     """Checks the efforts of a user's controller before they reach the plant."""
 
@@ -77,6 +89,11 @@ class CheckedController:
     def guide(self, guidance: Guidance) -> None:
         """Guide the controller."""
         self.inner.guide(guidance)
+
+    def grasped(self, event: GraspEvent) -> None:
+        """Tell a controller that takes account of the payload."""
+        if isinstance(self.inner, Carrying):
+            self.inner.grasped(event)
 
     def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
         """Return the efforts (n,) N m, read-only; raises ControllerError unless they are n finite numbers."""

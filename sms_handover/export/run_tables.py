@@ -96,10 +96,13 @@ def _references(run: RunData, wanted: Wanted) -> RunTable:
         columns.add_pose(f"{arm}.target", run.target_pose[arm])
         columns.add_pose(f"{arm}.tool", run.tool_pose[arm])
     columns.add_pose("deputy", run.deputy_pose)
+    columns.add_all([f"deputy.linear_velocity.{axis}" for axis in _AXES], "m/s", run.deputy_twist[:, :3])
+    columns.add_all([f"deputy.angular_velocity.{axis}" for axis in _AXES], "rad/s", run.deputy_twist[:, 3:])
     columns.add_all([f"linear_momentum.{axis}" for axis in _AXES], "kg m/s", run.linear_momentum)
     columns.add_all([f"angular_momentum.{axis}" for axis in _AXES], "kg m^2/s", run.angular_momentum)
     columns.add("kinetic_energy", "J", run.kinetic_energy)
-    columns.add("work", "J", run.work)
+    for name, joules in (("work", run.work), ("external_work", run.external_work), ("lost", run.lost)):
+        columns.add(name, "J", joules)
     columns.add("ik_status", "", run.ik_status, INTEGER)
     phases = {phase.stamp_ns: phase for phase in run.phases}
     found = [phases.get(int(stamp_ns)) for stamp_ns in run.reference_ns]
@@ -115,8 +118,19 @@ def _events(run: RunData, wanted: Wanted) -> RunTable:
     columns.add("action", "", [event.command.action.value for event in events], TEXT)
     columns.add_attributes(events, "command.arm", "command.grasp_frame", "command.from_arm")
     columns.add("status", "", [event.status.value for event in events], TEXT)
-    for name, unit in (("position_error", "m"), ("angle_error", "rad"), ("relative_speed", "m/s")):
+    for name, unit in (
+        ("position_error", "m"),
+        ("angle_error", "rad"),
+        ("relative_speed", "m/s"),
+        ("relative_rate", "rad/s"),
+        ("energy_lost", "J"),
+    ):
         columns.add_attributes(events, name, unit=unit, kind=FLOAT)
+    for name, unit, rows in (
+        ("impulse", "N s", [event.impulse[:3] for event in events]),
+        ("angular_impulse", "N m s", [event.impulse[3:] for event in events]),
+    ):
+        columns.add_all([f"{name}.{axis}" for axis in _AXES], unit, np.array(rows).reshape(-1, 3))
     columns.add_attributes(events, "detail")
     return columns.table("grasp_events")
 

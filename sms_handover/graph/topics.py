@@ -67,6 +67,7 @@ JOINT_REFERENCE = "joint_reference"
 TASK_PHASE = "task/phase"
 GRASP_EVENT = "task/grasp_event"
 DEPUTY_POSE = "deputy/pose"
+DEPUTY_ODOMETRY = "deputy/odometry"
 CLEARANCE = "clearance"  # only where it is measured online
 LINEAR_MOMENTUM = "momentum/linear"
 ANGULAR_MOMENTUM = "momentum/angular"
@@ -112,7 +113,8 @@ def graph_topics(arms: Iterable[str], *, clearance: bool = False) -> tuple[Topic
         Topic(JOINT_REFERENCE, joints, (TRAJECTORY,), (CONTROLLER,), Rate.REFERENCE),
         Topic(TASK_PHASE, f"{_OURS}/TaskPhase", (TRAJECTORY,), (PLANT, CONTROLLER), Rate.REFERENCE),
         Topic(DEPUTY_POSE, pose, (PLANT,), (TRAJECTORY,), Rate.REFERENCE),
-        Topic(GRASP_EVENT, f"{_OURS}/GraspEvent", (PLANT,), (TRAJECTORY,), Rate.CHANGE),
+        Topic(DEPUTY_ODOMETRY, odometry, (PLANT,), (), Rate.REFERENCE),
+        Topic(GRASP_EVENT, f"{_OURS}/GraspEvent", (PLANT,), (TRAJECTORY, CONTROLLER), Rate.CHANGE),
         Topic(LINEAR_MOMENTUM, vector, (PLANT,), (), Rate.REFERENCE),
         Topic(ANGULAR_MOMENTUM, vector, (PLANT,), (), Rate.REFERENCE),
         Topic(ENERGY, f"{_OURS}/EnergyStamped", (PLANT,), (), Rate.REFERENCE),

@@ -29,8 +29,19 @@ def vector_values(message: Any) -> tuple[float, ...]:
 
 
 def energy_values(message: Any) -> tuple[float, ...]:
-    """Return kinetic energy and work of an EnergyStamped."""
-    return message.kinetic, message.work
+    """Return kinetic energy, work, external work and losses of an EnergyStamped; older ones have two."""
+    return (
+        message.kinetic,
+        message.work,
+        getattr(message, "external_work", 0.0),
+        getattr(message, "lost", 0.0),
+    )
+
+
+def twist_values(message: Any) -> tuple[float, ...]:
+    """Return the twist of an Odometry, linear then angular, in axes of the child frame."""
+    linear, angular = message.twist.twist.linear, message.twist.twist.angular
+    return linear.x, linear.y, linear.z, angular.x, angular.y, angular.z
 
 
 def status_values(message: Any) -> tuple[float, ...]:
@@ -66,7 +77,7 @@ def grasp_command(message: Any) -> GraspCommand:
 
 def grasp_event(message: Any) -> GraspEvent:
     """Return the value of a GraspEvent."""
-    return GraspEvent(
+    event = GraspEvent(
         stamp_ns=header_ns(message),
         command=grasp_command(message.command),
         status=member_of(GraspStatus, message.status),
@@ -75,6 +86,21 @@ def grasp_event(message: Any) -> GraspEvent:
         relative_speed=message.relative_speed,
         detail=message.detail,
     )
+    if not hasattr(message, "impulse"):
+        return event  # recorded before the deputy could have a mass
+    twist, impulse = message.relative_twist, message.impulse
+    return replace(
+        event,
+        relative_rate=message.relative_rate,
+        relative_twist=(*_components(twist.linear), *_components(twist.angular)),
+        impulse=(*_components(impulse.force), *_components(impulse.torque)),
+        energy_lost=message.energy_lost,
+    )
+
+
+def _components(vector: Any) -> tuple[float, float, float]:
+    """Return the components of a Vector3."""
+    return vector.x, vector.y, vector.z
 
 
 def collisions(message: Any) -> tuple[Collision, ...]:

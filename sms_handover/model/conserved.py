@@ -11,7 +11,7 @@ from sms_handover.types import Array, frozen
 
 @dataclass(frozen=True, eq=False)
 class ConservedQuantities:
-    """Momenta, kinetic energy and centre of mass of the whole robot at one instant.
+    """Momenta, kinetic energy and centre of mass of a body or of several together at one instant.
 
     ``linear_momentum`` (3,) kg m/s and ``angular_momentum`` (3,) kg m^2/s about the centre of mass
     are in ``world`` axes, ``centre_of_mass`` (3,) m in ``world``, ``kinetic_energy`` in J.
@@ -34,4 +34,22 @@ def conserved_quantities(robot: RobotModel, q: Array, v: Array) -> ConservedQuan
     centre = np.array(robot.data.com[0])
     inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.LOCAL)
     energy = 0.5 * float(v.dot(inertia).dot(v))
+    return ConservedQuantities(frozen(linear), frozen(angular), frozen(centre), energy)
+
+
+def together(
+    one: ConservedQuantities, mass: float, other: ConservedQuantities, other_mass: float
+) -> ConservedQuantities:
+    """Return the conserved quantities of two bodies of these masses in kg.
+
+    With r the place of each centre of mass relative to the common one: P = sum P_i,
+    L = sum L_i + r_i x P_i, E = sum E_i.
+    """
+    total = mass + other_mass
+    centre = (mass * one.centre_of_mass + other_mass * other.centre_of_mass) / total
+    angular = np.array(one.angular_momentum + other.angular_momentum)
+    for part in (one, other):
+        angular += np.cross(part.centre_of_mass - centre, part.linear_momentum)
+    linear = one.linear_momentum + other.linear_momentum
+    energy = one.kinetic_energy + other.kinetic_energy
     return ConservedQuantities(frozen(linear), frozen(angular), frozen(centre), energy)

@@ -44,6 +44,27 @@ def twist_of(motion: pin.Motion) -> Twist:
     return Twist(row[:3], row[3:])
 
 
+def twist_in_deputy(pose_in_world: Array, twist_in_world: Array) -> Array:
+    """Return twists (..., 6) of poses (..., 7) in ``world`` axes in the axes of the poses.
+
+    Each half x is turned by the inverse of the quaternion (u, w), x - 2 w (u x x) + 2 u x (u x x), by sums of
+    a fixed order, so that one row gives the same bits as many.
+    """
+    inverse, w = -pose_in_world[..., 3:6], pose_in_world[..., 6:7]
+    halves = []
+    for half in (twist_in_world[..., :3], twist_in_world[..., 3:]):
+        across = 2.0 * _across(inverse, half)
+        halves.append(half + w * across + _across(inverse, across))
+    return np.concatenate(halves, axis=-1)
+
+
+def _across(a: Array, b: Array) -> Array:
+    """Return a x b of rows (..., 3)."""
+    ax, ay, az = (a[..., i] for i in range(3))
+    bx, by, bz = (b[..., i] for i in range(3))
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+
+
 def pose_distance(a: Pose, b: Pose) -> tuple[float, float]:
     """Return the distance in m between two origins and the angle in rad between two orientations.
 

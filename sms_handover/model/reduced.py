@@ -5,8 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from sms_handover.model.robot_model import BASE_NV, RobotModel
-from sms_handover.types import Array
+from sms_handover.model.conserved import ConservedQuantities
+from sms_handover.model.poses import se3_of
+from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
+from sms_handover.types import Array, Pose, Twist
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +62,38 @@ def base_twist_per_joint_rate(robot: RobotModel, q: Array) -> Array:
     inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.LOCAL)
     reaction: Array = -np.linalg.solve(inertia[:BASE_NV, :BASE_NV], inertia[:BASE_NV, BASE_NV:])
     return reaction
+
+
+def drift_of_base(robot: RobotModel, q: Array, v: Array) -> Array:
+    """Return H_b^-1 h_b (6,): the base twist in ``base_link`` axes that is left with joints at rest.
+
+    h_b = H_b v_b + H_bm q_m' is the momentum about the base, so that v_b = H_b^-1 (h_b - H_bm q_m').
+    """
+    inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.LOCAL)
+    drift: Array = np.linalg.solve(inertia[:BASE_NV, :BASE_NV], inertia[:BASE_NV] @ v)
+    return drift
+
+
+def drift_of_momentum(robot: RobotModel, q: Array, momentum: ConservedQuantities) -> Array:
+    """Return H_b^-1 h_b (6,) in ``base_link`` axes for momenta P, L about the centre of mass c, in ``world``.
+
+    With R and p of the base, h_b = (R^T P, R^T (L + (c - p) x P)).
+    """
+    inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.LOCAL)
+    base = pin.XYZQUATToSE3(q[:BASE_NQ])
+    centre = pin.centerOfMass(robot.pin, robot.data, q)
+    linear = momentum.linear_momentum
+    angular = momentum.angular_momentum + np.cross(centre - base.translation, linear)
+    about_base = np.concatenate([base.rotation.T @ linear, base.rotation.T @ angular])
+    drift: Array = np.linalg.solve(inertia[:BASE_NV, :BASE_NV], about_base)
+    return drift
+
+
+def carried_twist(base_in_world: Pose, twist_base_in_base: Array, point_in_world: Array) -> Twist:
+    """Return the twist in ``world`` axes that a base gives to what moves with it at a point (3,) m."""
+    turn = se3_of(base_in_world).rotation
+    linear, angular = turn @ twist_base_in_base[:3], turn @ twist_base_in_base[3:]
+    return Twist(linear + np.cross(angular, point_in_world - base_in_world.position), angular)
 
 
 def tool_jacobian(robot: RobotModel, q: Array, arm: str) -> Array:

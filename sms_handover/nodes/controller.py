@@ -10,12 +10,13 @@ import numpy as np
 from sms_handover.configuration.scenario_file import LAW
 from sms_handover.control.law import Need
 from sms_handover.control.parameters import ControllerParameters, parameters_with
-from sms_handover.control.protocol import Controller
+from sms_handover.control.protocol import Carrying, Controller
 from sms_handover.control.registry import law_named
 from sms_handover.frames import BASE, WORLD
 from sms_handover.graph.topics import (
     BASE_ODOMETRY,
     CONTROLLER,
+    GRASP_EVENT,
     JOINT_COMMAND,
     JOINT_REFERENCE,
     JOINT_STATES,
@@ -23,7 +24,15 @@ from sms_handover.graph.topics import (
 )
 from sms_handover.nodes.parts.guidance_parts import GuidanceParts
 from sms_handover.nodes.parts.watchdogs import ReferenceWatchdog
-from sms_handover.ros.codecs.loop_messages import JointStateCodec, PoseCodec, Stamped, StateCodec, coordinates
+from sms_handover.ros.codecs.events import read_grasp_event
+from sms_handover.ros.codecs.loop_messages import (
+    JointStateCodec,
+    PoseCodec,
+    Stamped,
+    StateCodec,
+    coordinates,
+    stamped,
+)
 from sms_handover.ros.codecs.task_phase import PhaseCodec
 from sms_handover.ros.node.diagnostics import NodeReport
 from sms_handover.ros.node.graph_node import GraphNode, P
@@ -76,6 +85,9 @@ class AnsweringNode(GraphNode[P]):
         self._answer_bytes = b""
         for topic, read in {**guidance, **state}.items():
             self.inputs.subscribe(topic, partial(self._on_input, topic), read)
+        self._due_events = self._heard_events = 0
+        if isinstance(self._controller, Carrying):
+            self.inputs.subscribe(GRASP_EVENT, self._on_grasp, stamped)
         self._command = self.endpoints.publisher(JOINT_COMMAND)  # last: then all of an external node is there
 
     @property
@@ -96,6 +108,7 @@ class AnsweringNode(GraphNode[P]):
         """Go back to the start of a run."""
         self._controller.reset()
         self._parts.reset()
+        self._due_events = self._heard_events = 0
         for order in self._orders.values():
             order.reset()
 
@@ -118,6 +131,8 @@ class AnsweringNode(GraphNode[P]):
     @property
     def awaited(self) -> str:
         """The last of the inputs of the next state."""
+        if self._waits_for_grasps:
+            return GRASP_EVENT
         stamp = self._inputs.oldest_ns
         if stamp is None:
             stamp = self._answered_ns + self._tick_ns if self._command.count else 0
@@ -152,8 +167,24 @@ class AnsweringNode(GraphNode[P]):
         self._inputs.add(stamp, topic, content)
         self._answer(stamp)
 
+    @property
+    def _waits_for_grasps(self) -> bool:
+        """Whether the result of a grasp that was commanded is still to come (lock step)."""
+        return self._lockstep and self._heard_events < self._due_events
+
+    def _on_grasp(self, message: Stamped[bytes], sent_ns: int) -> None:
+        """Take the result of a grasp; the next state may have come before it."""
+        if isinstance(self._controller, Carrying):
+            self._controller.grasped(read_grasp_event(message[1]))
+        self._heard_events += 1
+        waiting = self._inputs.oldest_ns
+        if waiting is not None:
+            self._answer(waiting)
+
     def _answer(self, stamp: int) -> None:
         """Publish the command of a state as soon as everything that belongs to it has come."""
+        if self._waits_for_grasps:
+            return
         needed = self._needed(stamp)
         inputs = self._inputs.take(stamp, needed)
         if inputs is None:
@@ -161,6 +192,8 @@ class AnsweringNode(GraphNode[P]):
         if needed is self._everything:
             for topic in self._orders:
                 self._guide(topic, stamp, inputs[topic])
+            if isinstance(self._controller, Carrying):
+                self._due_events += len(inputs[TASK_PHASE].commands)
         q, v = coordinates(inputs[JOINT_STATES], inputs[BASE_ODOMETRY])
         effort = self._controller.effort(stamp, q, v) if self._parts.complete else self._no_effort
         self._answer_bytes = self._command_codec.pack(stamp, effort=effort)

@@ -1,31 +1,37 @@
 """The deputy: a CubeSat that floats or is held by one arm, and the tolerances of a grasp."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import inf
 
 import numpy as np
 import pinocchio as pin
 
 from sms_handover.model.poses import pose_distance, pose_of, se3_of
-from sms_handover.types import Array, DeputyState, Pose, Twist, read_only
+from sms_handover.types import Array, DeputyState, Pose, Twist, freeze, read_only
 
 
 @dataclass(frozen=True)
 class GraspTolerance:
-    """The largest errors at which a grasp holds: m, rad, m/s."""
+    """The largest errors at which a grasp holds: m, rad, m/s, rad/s.
+
+    Older versions did not judge the rate.
+    """
 
     position: float
     angle: float
     speed: float
+    rate: float = inf
 
 
 @dataclass(frozen=True)
 class GraspErrors:
-    """Errors of the tool with respect to the grasp frame: m, rad, m/s."""
+    """Errors of the tool with respect to the grasp frame: m, rad, m/s, rad/s."""
 
     position: float
     angle: float
     speed: float
+    rate: float
 
     def within(self, tolerance: GraspTolerance) -> bool:
         """Whether every error is within its tolerance."""
@@ -33,6 +39,7 @@ class GraspErrors:
             self.position <= tolerance.position
             and self.angle <= tolerance.angle
             and self.speed <= tolerance.speed
+            and self.rate <= tolerance.rate
         )
 
 
@@ -41,7 +48,8 @@ class DeputyMotion:
     """Free motion since the deputy was last placed, and how it is held.
 
     Matrices are homogeneous (4, 4): ``start`` is the pose then in ``world``, ``in_tool`` that in the tool of
-    ``holder``.
+    ``holder``. A deputy with mass floats at ``q`` (7,), position and quaternion, with the twist ``v`` (6,) in
+    its own axes; both are empty without mass.
     """
 
     start: Array
@@ -49,10 +57,11 @@ class DeputyMotion:
     drifted_s: float
     holder: str
     in_tool: Array
+    q: Array = field(default_factory=lambda: read_only([]))
+    v: Array = field(default_factory=lambda: read_only([]))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "start", read_only(self.start))
-        object.__setattr__(self, "in_tool", read_only(self.in_tool))
+        freeze(self, "start", "in_tool", "q", "v")
 
 
 class MasslessDeputy:
@@ -62,10 +71,13 @@ class MasslessDeputy:
     grasp freezes the relative pose of tool and deputy, so its position error persists and nothing jumps.
     """
 
-    def __init__(self, deputy_in_world: Pose, grasp_frames: Mapping[str, Pose]) -> None:
+    def __init__(
+        self, deputy_in_world: Pose, grasp_frames: Mapping[str, Pose], twist_in_world: Twist | None = None
+    ) -> None:
+        """Place it at time zero, at rest unless it is given a twist of its origin in ``world`` axes."""
         self._grasp_frames = {name: se3_of(pose) for name, pose in grasp_frames.items()}
         self._carried: Pose | None = None  # the pose as it was given
-        self._place(se3_of(deputy_in_world), Twist(np.zeros(3), np.zeros(3)))
+        self._place(se3_of(deputy_in_world), twist_in_world or Twist(np.zeros(3), np.zeros(3)))
         self._holder = ""
         self._deputy_in_tool = pin.SE3.Identity()
 
@@ -109,7 +121,15 @@ class MasslessDeputy:
         lever = frame.translation - deputy.translation
         frame_velocity = self._twist.linear + _cross(self._twist.angular, lever)
         speed = float(np.linalg.norm(tool_twist_in_world.linear - frame_velocity))
-        return GraspErrors(position, angle, speed)
+        rate = float(np.linalg.norm(tool_twist_in_world.angular - self._twist.angular))
+        return GraspErrors(position, angle, speed, rate)
+
+    def twist_relative_to(self, tool_in_world: Pose, tool_twist_in_world: Twist) -> tuple[float, ...]:
+        """Return its twist (6 numbers) relative to a hand, about its origin in ``world`` axes."""
+        hand, lever = tool_twist_in_world, self._pose().translation - tool_in_world.position
+        linear = self._twist.linear - (hand.linear + _cross(hand.angular, lever))
+        angular = self._twist.angular - hand.angular
+        return (*linear.tolist(), *angular.tolist())
 
     def attach(self, arm: str, tool_in_world: Pose) -> None:
         """Attach the deputy to a tool at their present relative pose."""

@@ -1,31 +1,36 @@
 """Free-floating plant: robot and deputy, advanced tick by tick under joint efforts."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
-from sms_handover.model.conserved import ConservedQuantities
+from sms_handover.model.conserved import ConservedQuantities, together
 from sms_handover.model.robot_model import BASE_NQ, RobotModel
 from sms_handover.plant.deputy import DeputyMotion, MasslessDeputy
+from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics, pinocchio_dynamics
 from sms_handover.plant.enforced_limits import EnforcedLimits
 from sms_handover.plant.grasping import execute_grasp
 from sms_handover.plant.integrators import TABLEAUS
 from sms_handover.plant.joint_limits import ENFORCE, Excess, JointLimitWatch
-from sms_handover.plant.kinematics import PinocchioKinematics, PlantKinematics
 from sms_handover.plant.parameters import PlantParameters
-from sms_handover.plant.stepper import PinocchioStepper, Stepper
+from sms_handover.plant.payload import Payload
+from sms_handover.plant.rigid_deputy import RigidDeputy
 from sms_handover.types import (
     Array,
     DeputyState,
+    GraspAction,
     GraspCommand,
     GraspEvent,
+    GraspStatus,
     Pose,
     RobotState,
     TickRows,
+    Twist,
     frozen,
     read_only,
 )
@@ -36,12 +41,18 @@ Counts = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class InitialState:
-    """Where a run starts, at rest: base pose in ``world``, joint angles (n,) rad, the deputy."""
+    """Where a run starts: base pose in ``world`` and joint angles (n,) rad, at rest, and the deputy.
+
+    The deputy floats with a twist of its origin in ``world`` axes; its inertia is in its own axes, None if
+    it has no mass.
+    """
 
     base_in_world: Pose
     joint_position: Array
     deputy_in_world: Pose
     deputy_grasp_frames: Mapping[str, Pose]
+    deputy_twist_in_world: Twist | None = None
+    deputy_inertia: pin.Inertia | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,22 +84,23 @@ class FreeFloatingPlant:
         parameters: PlantParameters,
         initial: InitialState,
         tick_ns: int,
-        stepper: Stepper | None = None,
-        kinematics: PlantKinematics | None = None,
+        make_dynamics: MakeDynamics | None = None,
     ) -> None:
-        """Place robot and deputy at rest; raises ConfigurationError on a joint outside its limits."""
+        """Place robot and deputy; raises ConfigurationError on a joint outside its limits.
+
+        ``make_dynamics`` is asked for every robot that comes about as the deputy changes hands, by default
+        for Pinocchio's.
+        """
         self._robot = robot
         self._tolerance = parameters.grasp_tolerance
         self._initial = initial
         self._tick_ns = tick_ns
         self._tick_s = ns_to_seconds(tick_ns)
-        self._stepper = stepper or PinocchioStepper(robot, TABLEAUS[parameters.integrator], self._tick_s)
-        self._kinematics = kinematics or PinocchioKinematics(robot)
+        self._make = make_dynamics or pinocchio_dynamics(TABLEAUS[parameters.integrator], self._tick_s)
         self._watch = JointLimitWatch(robot, tick_ns)
-        self._enforced: EnforcedLimits | None = None
-        if parameters.joint_limits == ENFORCE:
-            self._enforced = EnforcedLimits(robot, self._stepper, parameters.rated_speed, self._tick_s)
+        self._enforces, self._rated_speed = parameters.joint_limits == ENFORCE, parameters.rated_speed
         self._check_start()
+        self._bare = self._dynamics_of(robot)
         self.reset()
 
     def reset(self) -> None:
@@ -101,7 +113,16 @@ class FreeFloatingPlant:
         self._work = self._losses = 0.0
         self._watch.reset()
         self._saturated_ticks = np.zeros(robot.n_joints, dtype=np.int64)
-        self._deputy = MasslessDeputy(initial.deputy_in_world, initial.deputy_grasp_frames)
+        place = (initial.deputy_in_world, initial.deputy_grasp_frames)
+        self._payload: Payload | None = None
+        if initial.deputy_inertia is None:
+            self._deputy = MasslessDeputy(*place, initial.deputy_twist_in_world)
+        else:
+            body = RigidDeputy(*place, initial.deputy_inertia, self._tick_s, initial.deputy_twist_in_world)
+            self._deputy, self._payload = body, Payload(robot, body)
+        self._next_v: Array | None = None  # after the impulse of a grasp at this instant
+        self._next_losses = 0.0
+        self._load()
 
     def snapshot(self) -> PlantState:
         """Return the state to :meth:`restore`."""
@@ -129,11 +150,25 @@ class FreeFloatingPlant:
         self._saturated_ticks = np.array(state.saturated_ticks, dtype=np.int64)
         self._watch.restore(state.excesses)
         self._deputy.restore(state.deputy)
+        self._next_v, self._next_losses = None, 0.0
+        if self._payload:
+            self._payload.follow_holder()
+        self._load()
 
     @property
     def robot(self) -> RobotModel:
-        """The robot as it is."""
+        """The robot without what it carries."""
         return self._robot
+
+    @property
+    def loaded_robot(self) -> RobotModel:
+        """The robot with what it carries, whose equations of motion hold from this instant on."""
+        return self._payload.robot if self._payload else self._robot
+
+    @property
+    def jumps(self) -> bool:
+        """Whether the velocity jumps at this instant, by a grasp, before it is integrated."""
+        return self._next_v is not None
 
     @property
     def stamp_ns(self) -> int:
@@ -162,14 +197,14 @@ class FreeFloatingPlant:
         return self._work
 
     @property
-    def losses(self) -> float:
-        """Energy in J that has become heat since the start, in joint stops."""
-        return self._losses
+    def external_work(self) -> float:
+        """Work in J that wrenches from outside have done since the start; none act on this plant."""
+        return 0.0
 
     @property
-    def net_work(self) -> float:
-        """Work less losses in J: by how much the kinetic energy has grown since the start."""
-        return self._work - self._losses
+    def losses(self) -> float:
+        """Energy in J that has become heat since the start, in joint stops and in grips that close."""
+        return self._losses
 
     @property
     def saturated_ticks(self) -> dict[str, int]:
@@ -183,21 +218,42 @@ class FreeFloatingPlant:
 
     @property
     def conserved(self) -> ConservedQuantities:
-        """Return momenta, energy and centre of mass of the robot."""
-        return self._kinematics.conserved(self.q, self.v)
+        """Return momenta, energy and centre of mass of robot and deputy."""
+        of_robot = self._kinematics.conserved(self.q, self.v)
+        if not isinstance(self._deputy, RigidDeputy) or self._deputy.holder:
+            return of_robot
+        return together(of_robot, self._robot.mass, self._deputy.conserved, self._deputy.inertia.mass)
 
     def execute(self, commands: tuple[GraspCommand, ...]) -> tuple[GraspEvent, ...]:
-        """Execute grasp commands at this instant, in order, and return their events."""
-        if not commands:
-            return ()
+        """Execute grasp commands at this instant, in order, and return their events.
+
+        The state of this instant stays as it is: an impulse acts as its integration begins.
+        """
+        return tuple(self._carry_out(command) for command in commands)
+
+    def _carry_out(self, command: GraspCommand) -> GraspEvent:
+        """Execute one command; with a deputy that has mass its momentum changes hands too."""
         self._deputy_follow()
-        motions = {arm: self._kinematics.tool_motion(self.q, self.v, arm) for arm in self._robot.arms}
+        v = self.v if self._next_v is None else self._next_v
+        motions = {arm: self._kinematics.tool_motion(self.q, v, arm) for arm in self._robot.arms}
         tools = {arm: pose for arm, (pose, _) in motions.items()}
         twists = {arm: twist for arm, (_, twist) in motions.items()}
-        return tuple(
-            execute_grasp(command, self._deputy, tools, twists, self._tolerance, self.stamp_ns)
-            for command in commands
-        )
+        payload, deputy = self._payload, self._deputy
+        if payload is None or not isinstance(deputy, RigidDeputy):
+            return execute_grasp(command, deputy, tools, twists, self._tolerance, self.stamp_ns)
+        before = payload.twist_in_hand(self.q, v) if deputy.holder else deputy.twist_in_deputy
+        event = execute_grasp(command, deputy, tools, twists, self._tolerance, self.stamp_ns)
+        if event.status is not GraspStatus.SUCCEEDED:
+            return event
+        if command.action is GraspAction.RELEASE:
+            payload.let_go(before)
+            self._next_v = v
+            return event
+        taken = payload.taken(self.q, v, before)
+        self._next_v = taken.velocity
+        self._next_losses += taken.energy_lost
+        impulse = payload.in_world(taken.impulse)
+        return replace(event, impulse=impulse, energy_lost=taken.energy_lost)
 
     def take_excesses(self) -> tuple[RunEvent, ...]:
         """Return the excesses of joint limits that are over; to be asked once for every state."""
@@ -217,6 +273,8 @@ class FreeFloatingPlant:
         The work is u . (q_m(t + h) - q_m(t)), exact because u is constant over the tick.
         """
         effort = self._limited(asked)
+        if self._next_v is not None:
+            self._jump(self._next_v)
         before = self.q
         if self._enforced is None:
             q, v = self._stepper.step(before, self.v, effort)
@@ -243,6 +301,26 @@ class FreeFloatingPlant:
         if not self._deputy.holder:
             for _ in range(steps):  # a sum of ticks, as one after the other makes it
                 self._deputy.drift(self._tick_s)
+
+    def _jump(self, v: Array) -> None:
+        """Go on from the velocity after an impulse, with the payload that the robot then has."""
+        self.v, self._next_v = v, None
+        self._losses += self._next_losses
+        self._next_losses = 0.0
+        self._load()
+
+    def _load(self) -> None:
+        """Use the equations of motion of the robot with what it carries."""
+        loaded = self.loaded_robot
+        dynamics, self._enforced = self._bare if loaded is self._robot else self._dynamics_of(loaded)
+        self._stepper, self._kinematics = dynamics.stepper, dynamics.kinematics
+
+    def _dynamics_of(self, robot: RobotModel) -> tuple[PlantDynamics, EnforcedLimits | None]:
+        """Return the dynamics of a robot, and its enforced limits."""
+        dynamics = self._make(robot)
+        if not self._enforces:
+            return dynamics, None
+        return dynamics, EnforcedLimits(robot, dynamics.stepper, self._rated_speed, self._tick_s)
 
     def _limited(self, asked: Array) -> Array:
         """Return the efforts that act, and count those at their limit or beyond."""

@@ -18,8 +18,8 @@ def execute_grasp(
 ) -> GraspEvent:
     """Execute one grasp command on the deputy and return the event.
 
-    A grasp holds only if position, angle and relative speed are within tolerance; otherwise it is missed and
-    the holder stays the same. A command that contradicts the present holder is rejected.
+    A grasp holds only if position, angle, relative speed and rate are within tolerance; otherwise it is
+    missed and the holder stays the same. A command that contradicts the present holder is rejected.
     """
     rejection = _rejection(command, deputy.holder)
     if rejection:
@@ -28,11 +28,14 @@ def execute_grasp(
         deputy.detach()
         return _event(stamp_ns, command, GraspStatus.SUCCEEDED, None, f"{command.arm} let go")
     tool = tools_in_world[command.arm]
-    errors = deputy.errors_of(command.grasp_frame, tool, tool_twists_in_world[command.arm])
+    tool_twist = tool_twists_in_world[command.arm]
+    errors = deputy.errors_of(command.grasp_frame, tool, tool_twist)
+    relative = deputy.twist_relative_to(tool, tool_twist)
     if not errors.within(tolerance):
-        return _event(stamp_ns, command, GraspStatus.MISSED, errors, _miss(errors, tolerance))
+        return _event(stamp_ns, command, GraspStatus.MISSED, errors, _miss(errors, tolerance), relative)
     deputy.attach(command.arm, tool)
-    return _event(stamp_ns, command, GraspStatus.SUCCEEDED, errors, f"{command.arm} holds the deputy")
+    detail = f"{command.arm} holds the deputy"
+    return _event(stamp_ns, command, GraspStatus.SUCCEEDED, errors, detail, relative)
 
 
 def _rejection(command: GraspCommand, holder: str) -> str:
@@ -52,6 +55,7 @@ def _miss(errors: GraspErrors, tolerance: GraspTolerance) -> str:
         ("distance", errors.position, tolerance.position, MM_PER_M, "mm"),
         ("angle", errors.angle, tolerance.angle, DEG_PER_RAD, "deg"),
         ("speed", errors.speed, tolerance.speed, MM_PER_M, "mm/s"),
+        ("rate", errors.rate, tolerance.rate, DEG_PER_RAD, "deg/s"),
     )
     return "; ".join(
         f"{name} {value * scale:.4g} {unit}, allowed {limit * scale:.4g} {unit}"
@@ -61,8 +65,23 @@ def _miss(errors: GraspErrors, tolerance: GraspTolerance) -> str:
 
 
 def _event(
-    stamp_ns: int, command: GraspCommand, status: GraspStatus, errors: GraspErrors | None, detail: str
+    stamp_ns: int,
+    command: GraspCommand,
+    status: GraspStatus,
+    errors: GraspErrors | None,
+    detail: str,
+    relative_twist: tuple[float, ...] = (nan,) * 6,
 ) -> GraspEvent:
     """Return the event of a command; without errors their fields are NaN."""
-    position, angle, speed = (errors.position, errors.angle, errors.speed) if errors else (nan, nan, nan)
-    return GraspEvent(stamp_ns, command, status, position, angle, speed, detail)
+    found = errors or GraspErrors(nan, nan, nan, nan)
+    return GraspEvent(
+        stamp_ns,
+        command,
+        status,
+        found.position,
+        found.angle,
+        found.speed,
+        detail,
+        found.rate,
+        relative_twist,
+    )

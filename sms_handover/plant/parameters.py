@@ -24,6 +24,11 @@ class PlantParameters:
         unit="m/s",
         minimum=0.0,
     )
+    grasp_rate_tolerance: float = parameter(
+        "largest angular rate of the tool relative to the deputy at which a grasp holds",
+        unit="rad/s",
+        minimum=0.0,
+    )
     joint_limits: str = parameter(
         "report: joints may exceed their limits, and each excess is an event; enforce: motors drive no joint "
         "past the limit of its rate, and joints stop at the limits of their positions",
@@ -73,7 +78,10 @@ class PlantParameters:
 
     @property
     def grasp_tolerance(self) -> GraspTolerance:
-        """The three tolerances of a grasp."""
+        """The tolerances of a grasp."""
         return GraspTolerance(
-            self.grasp_position_tolerance, self.grasp_angle_tolerance, self.grasp_speed_tolerance
+            self.grasp_position_tolerance,
+            self.grasp_angle_tolerance,
+            self.grasp_speed_tolerance,
+            self.grasp_rate_tolerance,
         )

@@ -8,7 +8,7 @@ from sms_handover.clearance.monitor import PeriodClearance
 from sms_handover.compiled.periods import CompiledPeriods
 from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.control.law import Need
-from sms_handover.control.protocol import CheckedController, Controller, Guidance
+from sms_handover.control.protocol import Carrying, CheckedController, Controller, Guidance
 from sms_handover.control.registry import law_named
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
@@ -42,10 +42,10 @@ from sms_handover.types import (
 class Period:
     """What is worked out once per reference period, at the instant at which it begins.
 
-    Tool poses and targets are in ``world``; ``work`` J is that of the joint efforts since the start, less
-    what joint stops have taken; ``ik_status`` is None where no tool had a target. ``events`` has what came
-    of grasp commands, ``decisions`` what was decided about the task. ``clearance`` is None unless it is
-    measured online.
+    Tool poses and targets are in ``world``; since the start the joint efforts have done ``work`` J, wrenches
+    from outside ``external_work`` J, and ``lost`` J have become heat; ``ik_status`` is None where no tool had
+    a target. ``events`` has what came of grasp commands, ``decisions`` what was decided about the task.
+    ``clearance`` is None unless it is measured online.
     """
 
     phase: TaskPhase
@@ -55,6 +55,8 @@ class Period:
     deputy: DeputyState
     conserved: ConservedQuantities
     work: float
+    external_work: float
+    lost: float
     ik_status: IkStatus | None
     events: tuple[GraspEvent, ...]
     decisions: tuple[RunEvent, ...]
@@ -292,6 +294,9 @@ class Loop:
         self._controller.guide(self._guidance)
         events = plant.execute(phase.commands)
         generator.grasped(events)
+        if isinstance(self._controller, Carrying):
+            for event in events:
+                self._controller.grasped(event)
         clearance = None
         if self._monitor:
             pose, holder = deputy.deputy_in_world, plant.deputy.holder
@@ -309,7 +314,9 @@ class Loop:
             tools,
             deputy,
             conserved,
-            plant.net_work,
+            plant.work,
+            plant.external_work,
+            plant.losses,
             status,
             events,
             decisions,

@@ -1,6 +1,6 @@
 """Parameters that the whole loop shares."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from sms_handover.configuration.parameters import parameter
 from sms_handover.errors import ConfigurationError, UnknownNameError
@@ -18,6 +18,8 @@ AFTER, ONLINE = "after", "online"
 CLEARANCE = (AFTER, ONLINE)
 REPORT, ABORT = "report", "abort"
 ON_COLLISION = (REPORT, ABORT)
+FAIL = "fail"
+ON_TOUCH = (FAIL, REPORT)
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,11 @@ class CommonParameters:
         "what becomes of the task when bodies collide; report: it goes on; abort: its phase has failed; "
         "abort sets clearance online",
         choices=ON_COLLISION,
+    )
+    on_touch: str = parameter(
+        "what becomes of the task when the robot touches a deputy with mass that nobody holds, and would "
+        "push it away; fail: its phase has failed, and clearance is measured online; report: as on_collision",
+        choices=ON_TOUCH,
     )
     contact_depth: float = parameter(
         "depth to which gripper and deputy may enter each other where their contact is declared",
@@ -119,6 +126,17 @@ class CommonParameters:
     def aborts_on_collision(self) -> bool:
         """Whether the task fails when bodies collide."""
         return self.on_collision == ABORT
+
+    @property
+    def fails_on_touch(self) -> bool:
+        """Whether the task fails when the robot touches a deputy that floats."""
+        return self.on_touch == FAIL
+
+    def for_deputies(self, *masses: float) -> "CommonParameters":
+        """Return the same for a run with deputies of these masses in kg: touches matter only with mass."""
+        if not any(masses):
+            return replace(self, on_touch=REPORT)
+        return replace(self, clearance=ONLINE) if self.fails_on_touch else self
 
     @property
     def ticks_per_reference(self) -> int:

@@ -1,7 +1,7 @@
 """Quiet periods: reference periods in which nothing has to be decided, carried out together."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -64,12 +64,11 @@ class QuietRunner:
         failures = generator.ik_failures
         rows, periods, failed = self._periods.run(course, before, stamp_ns, deputy, failures)
         generator.failed_so_far(failed)
-        net: PeriodRows = replace(periods, work=periods.work - plant.losses)
-        phases = tuple(_at(course.phase, stamp) for stamp in net.stamp_ns.tolist())
+        phases = tuple(_at(course.phase, stamp) for stamp in periods.stamp_ns.tolist())
         latest = range(max(0, len(phases) - 2), len(phases))
         excesses = plant.take_excesses_of(first, rows)
-        told = tuple(_guidance(phases[index], net, index) for index in latest)
-        return QuietPeriods(rows, excesses, told, net, phases)
+        told = tuple(_guidance(phases[index], periods, index) for index in latest)
+        return QuietPeriods(rows, excesses, told, periods, phases)
 
 
 def _at(phase: TaskPhase, stamp_ns: int) -> TaskPhase:

@@ -7,15 +7,15 @@ import numpy as np
 
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.message_constants import CONSTANTS
-from sms_handover.model.poses import pose_row
+from sms_handover.model.poses import pose_row, twist_in_deputy
 from sms_handover.run_data import RunData
 from sms_handover.simulation.loop import Period, Ticks
 from sms_handover.simulation.quiet_periods import QuietPeriods
 from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, TaskPhase, TickRows
 
 _BY_PERIOD = (
-    *("reference_position", "reference_velocity", "deputy_pose", "linear_momentum", "angular_momentum"),
-    *("kinetic_energy", "work"),
+    *("reference_position", "reference_velocity", "deputy_pose", "deputy_twist"),
+    *("linear_momentum", "angular_momentum", "kinetic_energy", "work", "external_work", "lost"),
 )
 _NOT_ASKED = -1  # in place of a status where inverse kinematics was not asked
 
@@ -50,15 +50,19 @@ class RunRecorder:
     def _add_period(self, period: Period) -> None:
         """Add what a reference period begins with."""
         reference, conserved, status = period.reference, period.conserved, period.ik_status
+        deputy = pose_row(period.deputy.deputy_in_world)
         row = {
             "reference_ns": reference.stamp_ns,
             "reference_position": reference.position,
             "reference_velocity": reference.velocity,
-            "deputy_pose": pose_row(period.deputy.deputy_in_world),
+            "deputy_pose": deputy,
+            "deputy_twist": twist_in_deputy(deputy, period.deputy.twist_deputy_in_world.row),
             "linear_momentum": conserved.linear_momentum,
             "angular_momentum": conserved.angular_momentum,
             "kinetic_energy": conserved.kinetic_energy,
             "work": period.work,
+            "external_work": period.external_work,
+            "lost": period.lost,
             "ik_status": CONSTANTS[status] if status else _NOT_ASKED,
         }
         for name, value in row.items():

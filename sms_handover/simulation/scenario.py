@@ -1,7 +1,7 @@
 """A scenario: parameters of a run, and its robot and schedule as they are and as they are known."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TypeVar
@@ -11,7 +11,7 @@ from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.parameters import EVERY_NODE, build, read_parameter_files
 from sms_handover.configuration.scenario_file import COMMON, SHORT, ScenarioFile, load_scenario_file
 from sms_handover.configuration.sections import Section
-from sms_handover.configuration.values import DOCUMENTS, MODEL, ROLES, TRUTH, written
+from sms_handover.configuration.values import DEPUTY, DOCUMENTS, MODEL, ROLES, TRUTH, written
 from sms_handover.control.parameters import ControllerParameters, parameters_with
 from sms_handover.control.registry import law_named
 from sms_handover.errors import ConfigurationError, UnknownNameError
@@ -152,6 +152,8 @@ def load_scenario(
             f"truth has the joints {', '.join(truth.robot.joint_names)}, "
             f"the model has {', '.join(model.robot.joint_names)}: they must be the same"
         )
+    masses = (truth.schedule.deputy.mass, model.schedule.deputy.mass)
+    parameters = replace(parameters, common=parameters.common.for_deputies(*masses))
     return Scenario(parameters, truth, model, of_nodes)
 
 
@@ -164,6 +166,14 @@ def load_world(common: CommonParameters, role: str, scenario: ScenarioFile) -> W
     robot = RobotModel(robot_of(documents.robot))
     text = documents.schedule_text
     return World(robot, schedule_of(documents.schedule, text, robot, common.reference_ns))
+
+
+def deputy_masses(common: CommonParameters, scenario: ScenarioFile) -> tuple[float, ...]:
+    """Return the masses in kg of the deputy in truth and as it is known; raises ConfigurationError."""
+    given = _replacements(common)
+    roles = ROLES[:1] if truth_is_model(scenario, given) else ROLES
+    sections = [documents_of(scenario, given, role).schedule[DEPUTY] for role in roles]
+    return tuple(float(section["mass"]) for section in sections)
 
 
 def scenario_text(common: CommonParameters, scenario: ScenarioFile) -> str:

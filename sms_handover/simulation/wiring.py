@@ -17,19 +17,18 @@ from sms_handover.control.law import LawSetup, Need
 from sms_handover.control.parameters import ControllerParameters, gains_of
 from sms_handover.control.protocol import CheckedController, Controller
 from sms_handover.control.registry import SHIPPED, law_named, require_law
-from sms_handover.control.stability import check_stability
-from sms_handover.errors import ConfigurationError
+from sms_handover.errors import ConfigurationError, ScheduleError
 from sms_handover.ik.levenberg_marquardt import FindJoints, find_joints
 from sms_handover.ik.parameters import IkParameters
 from sms_handover.model.robot_model import RobotModel
+from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics, pinocchio_dynamics
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
 from sms_handover.plant.integrators import TABLEAUS, Tableau
 from sms_handover.plant.joint_limits import ENFORCE
-from sms_handover.plant.kinematics import PinocchioKinematics
 from sms_handover.plant.parameters import PlantParameters
-from sms_handover.plant.stepper import PinocchioStepper, Stepper
 from sms_handover.simulation.parameters import COMPILED, CommonParameters
 from sms_handover.simulation.period_runner import PeriodRunner, PythonRunner
+from sms_handover.simulation.stability import check_stability_by_phase
 from sms_handover.trajectory.generator import TrajectoryGenerator
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.schedule import Schedule
@@ -37,6 +36,7 @@ from sms_handover.trajectory.tool_motion import PinocchioToolMotion
 from sms_handover.types import Array
 from sms_handover.units import ns_to_seconds, seconds_to_ns
 
+_MOST_TURN = 0.1  # [rad] of a free deputy in a tick, where the integration still keeps its energy
 _LOG = logging.getLogger(__name__)
 
 
@@ -57,26 +57,32 @@ def make_plant(
         initial_joints(robot, schedule),
         schedule.deputy.deputy_in_world,
         dict(schedule.deputy.grasp_frames),
+        schedule.deputy.twist_in_world,
+        schedule.deputy.inertia,
     )
-    tableau = TABLEAUS[parameters.integrator]
-    stepper = make_stepper(robot, common.dynamics, tableau, ns_to_seconds(common.tick_ns))
-    kinematics = CompiledKinematics(robot) if common.dynamics == COMPILED else PinocchioKinematics(robot)
-    return FreeFloatingPlant(robot, parameters, initial, common.tick_ns, stepper, kinematics)
+    tableau, h = TABLEAUS[parameters.integrator], ns_to_seconds(common.tick_ns)
+    _check_deputy_twist(schedule, h)
+    return FreeFloatingPlant(
+        robot, parameters, initial, common.tick_ns, make_dynamics(common.dynamics, tableau, h)
+    )
 
 
-def make_stepper(robot: RobotModel, dynamics: str, tableau: Tableau, h: float) -> Stepper:
-    """Return the stepper for steps of ``h`` s; raises ConfigurationError."""
-    kind = CompiledStepper if dynamics == COMPILED else PinocchioStepper
-    return kind(robot, tableau, h)
+def make_dynamics(dynamics: str, tableau: Tableau, h: float) -> MakeDynamics:
+    """Return what makes the dynamics of the plant, by Pinocchio or compiled."""
+    if dynamics != COMPILED:
+        return pinocchio_dynamics(tableau, h)
+    return lambda robot: PlantDynamics(CompiledStepper(robot, tableau, h), CompiledKinematics(robot))
 
 
 def make_generator(
     robot: RobotModel, schedule: Schedule, common: CommonParameters, parameters: TrajectoryParameters
 ) -> TrajectoryGenerator:
     """Return the generator of the trajectory; raises ConfigurationError."""
-    motion = CompiledToolMotion(robot) if common.dynamics == COMPILED else PinocchioToolMotion(robot)
-    aborts = common.aborts_on_collision
-    return TrajectoryGenerator(robot, schedule, parameters, motion, abort_on_collision=aborts)
+    motion = CompiledToolMotion if common.dynamics == COMPILED else PinocchioToolMotion
+    aborts, fails = common.aborts_on_collision, common.fails_on_touch
+    return TrajectoryGenerator(
+        robot, schedule, parameters, motion, abort_on_collision=aborts, fail_on_touch=fails
+    )
 
 
 def make_ik(robot: RobotModel, common: CommonParameters, parameters: IkParameters) -> FindJoints:
@@ -116,14 +122,16 @@ def make_controller(
     The efforts of a law of another package are checked. Raises ConfigurationError.
     """
     law, gains = law_named(parameters.law), gains_by_phase(schedule, parameters)
-    missing = sorted(need.value for need in law.needs - {Need.TOOL_TARGETS})
+    missing = sorted(need.value for need in law.needs - {Need.TOOL_TARGETS, Need.PAYLOAD})
     if missing:
         raise ConfigurationError(f"control law {law.name!r} needs {missing[0]}, which the loop has not")
     start = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
-    check_stability(law, robot, gains, ns_to_seconds(common.tick_ns), start)
+    places = [(start, "at the start configuration")] * len(gains)
+    check_stability_by_phase(law, robot, schedule, gains, ns_to_seconds(common.tick_ns), places)
     computed_torque = CompiledComputedTorque if common.dynamics == COMPILED else ComputedTorque
     longest_ns = longest_reference_ns(common, parameters)
-    controller = law.make(LawSetup(robot, gains, common.tick_ns, longest_ns, computed_torque))
+    setup = LawSetup(robot, gains, common.tick_ns, longest_ns, computed_torque, schedule.deputy)
+    controller = law.make(setup)
     return controller if law.name in SHIPPED else CheckedController(controller, robot.joint_names)
 
 
@@ -152,3 +160,13 @@ def make_runner(
 def longest_reference_ns(common: CommonParameters, parameters: ControllerParameters) -> int:
     """Return the age in ns up to which the controller extrapolates a reference."""
     return common.reference_ns + seconds_to_ns(parameters.reference_hold)
+
+
+def _check_deputy_twist(schedule: Schedule, h: float) -> None:
+    """Raise ScheduleError where a deputy turns too far in one tick of ``h`` s for its integration."""
+    rate = float(np.linalg.norm(schedule.deputy.twist_in_world.angular))
+    if rate * h > _MOST_TURN:
+        raise ScheduleError(
+            f"deputy.twist_in_world turns it at {rate:g} rad/s, must be at most {_MOST_TURN / h:g} rad/s, "
+            f"{_MOST_TURN:g} rad in a tick of {h:g} s; use a shorter tick or a slower deputy"
+        )

@@ -1,6 +1,6 @@
 """Generator of the trajectory: schedule and current state to targets and joint reference."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -8,7 +8,9 @@ import numpy as np
 
 from sms_handover.graph.events import RunEvent
 from sms_handover.model.deputy import DeputyDescription
+from sms_handover.model.known_payload import EMPTY_HANDS, Grip, KnownPayload
 from sms_handover.model.poses import pose_of, se3_of
+from sms_handover.model.reduced import carried_twist, drift_of_base
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.schedule import (
@@ -80,11 +82,12 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class GeneratorState:
-    """Progress of the task, and where joints (n,) rad and tools were when the phase began."""
+    """Progress of the task, joints (n,) rad and tools as the phase began, and who holds the deputy."""
 
     progress: ProgressState
     joints_at_start: Array
     tools_at_start: Mapping[str, Pose]
+    grip: Grip = EMPTY_HANDS
 
 
 class TrajectoryGenerator:
@@ -98,15 +101,20 @@ class TrajectoryGenerator:
         robot: RobotModel,
         schedule: Schedule,
         parameters: TrajectoryParameters,
-        motion: ToolMotion | None = None,
+        make_motion: Callable[[RobotModel], ToolMotion] = PinocchioToolMotion,
         *,
         abort_on_collision: bool = False,
+        fail_on_touch: bool = False,
     ) -> None:
-        """Follow a schedule; ``motion`` leads the tools of the robot, by default by Pinocchio."""
+        """Follow a schedule; ``make_motion`` makes what leads the tools of a robot."""
         self._robot = robot
-        self._motion: ToolMotion = motion or PinocchioToolMotion(robot)
+        self._make_motion = make_motion
+        self._payload = KnownPayload(robot, schedule.deputy)
+        self._motion = make_motion(robot)
         self._schedule = schedule
-        self._progress = TaskProgress(schedule, parameters, abort_on_collision=abort_on_collision)
+        self._progress = TaskProgress(
+            schedule, parameters, abort_on_collision=abort_on_collision, fail_on_touch=fail_on_touch
+        )
         self._time_law = TIME_LAWS[parameters.time_law]
         self._damping = parameters.jacobian_damping
         self.reset()
@@ -114,18 +122,19 @@ class TrajectoryGenerator:
     def reset(self) -> None:
         """Return to the start of the schedule."""
         self._progress.reset()
+        self._hold(EMPTY_HANDS)
         self._joints_at_start: Array = np.zeros(self._robot.n_joints)
         self._tools_at_start: Mapping[str, Pose] = {}
 
     def snapshot(self) -> GeneratorState:
         """Return the state to :meth:`restore`."""
-        return GeneratorState(
-            self._progress.snapshot(), read_only(self._joints_at_start), dict(self._tools_at_start)
-        )
+        joints, tools = read_only(self._joints_at_start), dict(self._tools_at_start)
+        return GeneratorState(self._progress.snapshot(), joints, tools, self._payload.grip)
 
     def restore(self, state: GeneratorState) -> None:
         """Go back to a former state; raises ConfigurationError if it is that of another schedule."""
         self._progress.restore(state.progress)
+        self._hold(state.grip)
         self._joints_at_start, self._tools_at_start = state.joints_at_start, state.tools_at_start
 
     def targets(self, state: RobotState, deputy_in_world: Pose) -> tuple[TaskPhase, Targets]:
@@ -142,8 +151,11 @@ class TrajectoryGenerator:
         return self._progress.awaits_grasps
 
     def grasped(self, events: Iterable[GraspEvent]) -> None:
-        """Record outcomes of grasp commands."""
-        self._progress.grasped(events)
+        """Record outcomes of grasp commands; a payload counts from the next period on."""
+        told = tuple(events)
+        self._progress.grasped(told)
+        if any([self._payload.grasped(event) for event in told]):
+            self._motion = self._make_motion(self._payload.robot)
 
     def collided(self, collisions: Iterable[Collision]) -> None:
         """Record which bodies collide in this period."""
@@ -169,7 +181,7 @@ class TrajectoryGenerator:
     def quiet_until(self, stamp_ns: int, *, deputy_rests: bool) -> int | None:
         """Return up to when nothing has to be decided and goals stand still, None if not even now."""
         quiet = self._progress.quiet_from(stamp_ns)
-        if quiet is None:
+        if quiet is None or self._payload.has_mass:
             return None
         targets = self._progress.at(stamp_ns).targets.values()
         if not deputy_rests and any(isinstance(target, GraspFrameTarget) for target in targets):
@@ -212,18 +224,35 @@ class TrajectoryGenerator:
 
         For arms led by their joints that is the pose at these joints. The joint rates give the desired
         tool twists including the reaction of the base: the damped inverse of the generalised Jacobian
-        [Umetani1989].
+        [Umetani1989], of the robot with its payload, and less what its momentum gives the tools anyway.
         """
         robot, led = self._robot, targets.tool_in_world
         others = [arm for arm in robot.arms if arm not in led]
         at = robot.configuration(state.base_in_world, joint_position)
         by_joints = self._motion.tools_at(at, others) if others else {}
-        velocity = targets.joint_velocity
-        if any(_moves(twist) for twist in targets.tool_twist_in_world.values()):
-            twists = targets.tool_twist_in_world
+        velocity, twists = targets.joint_velocity, targets.tool_twist_in_world
+        if self._payload.has_mass:
+            twists = self._without_drift(state, twists)
+        if any(_moves(twist) for twist in twists.values()):
             velocity = self._motion.resolved(state.q, twists, velocity, self._damping)
         reference = JointReference(state.stamp_ns, joint_position, velocity)
         return reference, {arm: led[arm] if arm in led else by_joints[arm] for arm in robot.arms}
+
+    def _hold(self, grip: Grip) -> None:
+        """Go on with who holds the deputy."""
+        if grip != self._payload.grip:
+            self._payload.hold(grip)
+            self._motion = self._make_motion(self._payload.robot)
+
+    def _without_drift(self, state: RobotState, twists: Mapping[str, Twist]) -> Mapping[str, Twist]:
+        """Return the twists less those that tools have by the momentum of the robot with joints at rest."""
+        drift = drift_of_base(self._payload.robot, state.q, state.v)
+        tools = self._motion.tools_at(state.q, twists)
+        carried = {arm: carried_twist(state.base_in_world, drift, tools[arm].position) for arm in twists}
+        return {
+            arm: Twist(twist.linear - carried[arm].linear, twist.angular - carried[arm].angular)
+            for arm, twist in twists.items()
+        }
 
     def _targets_of(self, stage: Stage, state: RobotState, deputy_in_world: Pose) -> Targets:
         """Return the targets of every arm at the time of a state."""

@@ -72,8 +72,8 @@ def pose_stamped(stamp_ns: int, values: Array) -> Any:
     return TYPES.make("geometry_msgs/msg/PoseStamped", header=header(stamp_ns, "world"), pose=pose(values))
 
 
-def vector(values: Array) -> Any:
-    return TYPES.make("geometry_msgs/msg/Vector3", **dict(zip("xyz", values.tolist(), strict=True)))
+def vector(values: Sequence[float] | Array) -> Any:
+    return TYPES.make("geometry_msgs/msg/Vector3", **dict(zip("xyz", map(float, values), strict=True)))
 
 
 def vector_stamped(stamp_ns: int, values: Array) -> Any:
@@ -115,7 +115,17 @@ def grasp_event(event: GraspEvent) -> Any:
         position_error=event.position_error,
         angle_error=event.angle_error,
         relative_speed=event.relative_speed,
+        relative_rate=event.relative_rate,
         detail=event.detail,
+        relative_twist=TYPES.make(
+            "geometry_msgs/msg/Twist",
+            linear=vector(event.relative_twist[:3]),
+            angular=vector(event.relative_twist[3:]),
+        ),
+        impulse=TYPES.make(
+            "geometry_msgs/msg/Wrench", force=vector(event.impulse[:3]), torque=vector(event.impulse[3:])
+        ),
+        energy_lost=event.energy_lost,
     )
 
 
@@ -161,8 +171,9 @@ def ik_status(stamp_ns: int, status: int) -> Any:
     )
 
 
-def energy(stamp_ns: int, kinetic: float, work: float) -> Any:
-    return TYPES.make(f"{OURS}/EnergyStamped", header=header(stamp_ns), kinetic=kinetic, work=work)
+def energy(stamp_ns: int, kinetic: float, work: float, external_work: float, lost: float) -> Any:
+    values = {"kinetic": kinetic, "work": work, "external_work": external_work, "lost": lost}
+    return TYPES.make(f"{OURS}/EnergyStamped", header=header(stamp_ns), **values)
 
 
 def made_up_run(ticks: int = 101, seed: int = 0) -> RunData:
@@ -188,10 +199,13 @@ def made_up_run(ticks: int = 101, seed: int = 0) -> RunData:
         target_pose={arm: random.standard_normal((periods, 7)) for arm in ARMS},
         tool_pose={arm: random.standard_normal((periods, 7)) for arm in ARMS},
         deputy_pose=random.standard_normal((periods, 7)),
+        deputy_twist=random.standard_normal((periods, 6)),
         linear_momentum=random.standard_normal((periods, 3)),
         angular_momentum=random.standard_normal((periods, 3)),
         kinetic_energy=random.standard_normal(periods),
         work=random.standard_normal(periods),
+        external_work=random.standard_normal(periods),
+        lost=random.standard_normal(periods),
         ik_status=np.arange(periods, dtype=np.int64) % 4 - 1,
         phases=tuple(
             TaskPhase(int(stamp_ns), row // 2, f"phase {row // 2}", (grasp, transfer) if row == 2 else ())
@@ -251,7 +265,9 @@ def record_reference(receive: Any, run: RunData, row: int) -> None:
     receive(topics.DEPUTY_POSE, pose_stamped(stamp_ns, run.deputy_pose[row]))
     receive(topics.LINEAR_MOMENTUM, vector_stamped(stamp_ns, run.linear_momentum[row]))
     receive(topics.ANGULAR_MOMENTUM, vector_stamped(stamp_ns, run.angular_momentum[row]))
-    receive(topics.ENERGY, energy(stamp_ns, float(run.kinetic_energy[row]), float(run.work[row])))
+    receive(topics.DEPUTY_ODOMETRY, odometry(stamp_ns, run.deputy_pose[row], run.deputy_twist[row]))
+    account = (run.kinetic_energy, run.work, run.external_work, run.lost)
+    receive(topics.ENERGY, energy(stamp_ns, *(float(values[row]) for values in account)))
     for arm in run.arms:
         receive(topics.tool_pose(arm), pose_stamped(stamp_ns, run.tool_pose[arm][row]))
         receive(topics.target_pose(arm), pose_stamped(stamp_ns, run.target_pose[arm][row]))

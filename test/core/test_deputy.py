@@ -124,14 +124,15 @@ def test_errors_are_those_of_tool_and_grasp_frame(draw: Draw) -> None:
 @pytest.mark.parametrize(
     ("errors", "holds"),
     [
-        (GraspErrors(0.0, 0.0, 0.0), True),
-        (GraspErrors(0.01, 0.03, 0.02), True),
-        (GraspErrors(nextafter(0.01, 1.0), 0.0, 0.0), False),
-        (GraspErrors(0.0, nextafter(0.03, 1.0), 0.0), False),
-        (GraspErrors(0.0, 0.0, nextafter(0.02, 1.0)), False),
-        (GraspErrors(float("nan"), 0.0, 0.0), False),
+        (GraspErrors(0.0, 0.0, 0.0, 0.0), True),
+        (GraspErrors(0.01, 0.03, 0.02, 0.04), True),
+        (GraspErrors(nextafter(0.01, 1.0), 0.0, 0.0, 0.0), False),
+        (GraspErrors(0.0, nextafter(0.03, 1.0), 0.0, 0.0), False),
+        (GraspErrors(0.0, 0.0, nextafter(0.02, 1.0), 0.0), False),
+        (GraspErrors(0.0, 0.0, 0.0, nextafter(0.04, 1.0)), False),
+        (GraspErrors(float("nan"), 0.0, 0.0, 0.0), False),
     ],
 )
 def test_each_tolerance_counts_by_itself(errors: GraspErrors, holds: bool) -> None:
     """A grasp holds with every error at its tolerance, and with none beyond it."""
-    assert errors.within(GraspTolerance(0.01, 0.03, 0.02)) is holds
+    assert errors.within(GraspTolerance(0.01, 0.03, 0.02, 0.04)) is holds

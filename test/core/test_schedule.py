@@ -388,7 +388,24 @@ REFUSED: dict[str, tuple[str, str, str, str]] = {
         "arm_a_joint_2 is 2.5 rad, must be >= -2.24 and <= 2.24 rad",
         "2.5,",
     ),
-    "deputy with mass": ("mass: 0.0", "mass: 4.0", "deputy.mass is 4 kg, must be 0", "mass"),
+    "deputy with less mass than counts": (
+        "mass: 0.0",
+        "mass: 1.0e-12",
+        "deputy.mass is 1e-12 kg, must be 0 (massless) or at least 1e-09 kg",
+        "mass",
+    ),
+    "deputy with too much mass": (
+        "mass: 0.0",
+        "mass: 1.0e+6",
+        "deputy.mass is 1e+06 kg, must be >= 0 and <= 100000 kg",
+        "mass",
+    ),
+    "deputy with the inertia of no body": (
+        "mass: 0.0",
+        "mass: 4.0\n  inertia: [1.0, 0.0, 0.0, 1.0, 0.0, 2.1]",
+        "deputy: inertia has principal moments 1, 1, 2.1 kg m^2, none may exceed the sum of the other two",
+        "inertia",
+    ),
     "deputy with negative mass": (
         "mass: 0.0",
         "mass: -1.0",

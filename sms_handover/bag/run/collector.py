@@ -19,6 +19,7 @@ from sms_handover.messages.values import (
     run_event,
     status_values,
     task_phase,
+    twist_values,
     vector_values,
 )
 from sms_handover.types import GraspEvent, TaskPhase
@@ -47,7 +48,8 @@ class RunCollector:
             topics.DEPUTY_POSE: RowCollector(7, pose_values),
             topics.LINEAR_MOMENTUM: RowCollector(3, vector_values),
             topics.ANGULAR_MOMENTUM: RowCollector(3, vector_values),
-            topics.ENERGY: RowCollector(2, energy_values),
+            topics.DEPUTY_ODOMETRY: RowCollector(6, twist_values),
+            topics.ENERGY: RowCollector(4, energy_values),
             topics.IK_STATUS: RowCollector(1, status_values),
             **{topics.target_pose(arm): RowCollector(7, pose_values) for arm in self.arms},
             **{topics.tool_pose(arm): RowCollector(7, pose_values) for arm in self.arms},

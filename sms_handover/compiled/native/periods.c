@@ -9,7 +9,7 @@ typedef struct {
   double rates[N];                      /* rad/s of the reference of the period before */
   double in_tool[POSE];                 /* the deputy in the tool that holds it */
   double deputy[POSE_ROW];              /* its row: in world where nobody holds it, at the last period */
-  double deputy_twist[TWIST];           /* at the last period, where it is held */
+  double deputy_twist[TWIST];           /* at the last period */
   double damping, period_s;             /* of the generalised Jacobian; s */
   long long kind[ARMS], holder;         /* -1: nobody */
   long long failures, most_failures;    /* of inverse kinematics in a row; 0: any number */
@@ -17,6 +17,7 @@ typedef struct {
 
 typedef struct {
   double reference[N], rates[N], targets[ARMS * POSE_ROW], tools[ARMS * POSE_ROW], deputy[POSE_ROW];
+  double deputy_twist[TWIST];
   double conserved[10], work, status;   /* as in compiled/kinematics_functions.py; J; -1: not asked */
 } period_t;
 
@@ -29,6 +30,7 @@ static void observe(const ticks_t *t, quiet_t *quiet, period_t *p, double *w) {
   else
     sms_tool_rows(t->q, p->tools, w);
   memcpy(p->deputy, quiet->deputy, sizeof p->deputy);
+  memcpy(p->deputy_twist, quiet->deputy_twist, sizeof p->deputy_twist);
   const double *arguments[ARGUMENTS] = {t->q, t->v, t->true_parameters};
   double *results[ARGUMENTS] = {p->conserved};
   sms_conserved(arguments, results, 0, w, 0);

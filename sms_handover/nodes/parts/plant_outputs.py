@@ -5,12 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from sms_handover.frames import BASE, WORLD
+from sms_handover.frames import BASE, DEPUTY, WORLD
 from sms_handover.graph.topics import (
     ANGULAR_MOMENTUM,
     BASE_ODOMETRY,
     CLOCK,
     CLOCK_PERIOD_NS,
+    DEPUTY_ODOMETRY,
     DEPUTY_POSE,
     ENERGY,
     JOINT_STATES,
@@ -20,14 +21,20 @@ from sms_handover.graph.topics import (
     tool_pose,
 )
 from sms_handover.messages.layout import head
-from sms_handover.model.poses import pose_row
+from sms_handover.model.poses import pose_row, twist_in_deputy
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant
-from sms_handover.ros.codecs.loop_messages import PoseCodec, StateCodec, energy_codec, vector_codec
+from sms_handover.ros.codecs.loop_messages import (
+    OdometryCodec,
+    PoseCodec,
+    StateCodec,
+    energy_codec,
+    vector_codec,
+)
 from sms_handover.ros.node.endpoints import CountedPublisher
 
 _LOOP = (JOINT_STATES, BASE_ODOMETRY, SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
-_PERIOD = (LINEAR_MOMENTUM, ANGULAR_MOMENTUM, ENERGY)
+_PERIOD = (DEPUTY_ODOMETRY, LINEAR_MOMENTUM, ANGULAR_MOMENTUM, ENERGY)
 
 
 class PlantOutputs:
@@ -43,6 +50,7 @@ class PlantOutputs:
         self._state_codec = StateCodec(robot.joint_names, WORLD, BASE)
         self._pose_codec, self._vector_codec = PoseCodec(WORLD), vector_codec(WORLD)
         self._energy_codec = energy_codec(WORLD)
+        self._deputy_codec = OdometryCodec(WORLD, DEPUTY)
 
     def publish_loop(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
         """Publish what the other nodes of the loop wait for.
@@ -73,7 +81,10 @@ class PlantOutputs:
             conserved = plant.conserved
             for arm, pose in plant.tools_in_world.items():
                 publish[tool_pose(arm)](self._pose_codec.pack(now_ns, pose_row(pose)))
-            energy = np.array([conserved.kinetic_energy, plant.net_work])
+            energy = np.array([conserved.kinetic_energy, plant.work, plant.external_work, plant.losses])
+            deputy = plant.deputy
+            twist = twist_in_deputy(pose_row(deputy.deputy_in_world), deputy.twist_deputy_in_world.row)
+            publish[DEPUTY_ODOMETRY](self._deputy_codec.pack(now_ns, pose_row(deputy.deputy_in_world), twist))
             publish[LINEAR_MOMENTUM](self._vector_codec.pack(now_ns, conserved.linear_momentum))
             publish[ANGULAR_MOMENTUM](self._vector_codec.pack(now_ns, conserved.angular_momentum))
             publish[ENERGY](self._energy_codec.pack(now_ns, energy))

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Point
+from geometry_msgs.msg import Point, Twist, Vector3, Wrench
 from geometry_msgs.msg import Pose as PoseMessage
 from sensor_msgs.msg import JointState
 from sms_handover_interfaces.msg import BodyClearance
@@ -102,8 +102,20 @@ def event_message(event: GraspEvent) -> GraspEventMessage:
         position_error=event.position_error,
         angle_error=event.angle_error,
         relative_speed=event.relative_speed,
+        relative_rate=event.relative_rate,
         detail=event.detail,
+        relative_twist=Twist(
+            linear=_vector(event.relative_twist[:3]), angular=_vector(event.relative_twist[3:])
+        ),
+        impulse=Wrench(force=_vector(event.impulse[:3]), torque=_vector(event.impulse[3:])),
+        energy_lost=event.energy_lost,
     )
+
+
+def _vector(components: Sequence[float]) -> Vector3:
+    """Return three numbers as a message."""
+    x, y, z = components
+    return Vector3(x=x, y=y, z=z)
 
 
 def clearance_message(clearance: PeriodClearance) -> ClearanceMessage:

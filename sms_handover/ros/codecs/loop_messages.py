@@ -183,9 +183,9 @@ def vector_codec(frame: str) -> StampedCodec:
 
 
 def energy_codec(frame: str) -> StampedCodec:
-    """Return what packs EnergyStamped: kinetic energy, then work."""
-    name = "sms_handover_interfaces/msg/EnergyStamped"
-    return StampedCodec(name, frame, 2, lambda types, n: {"kinetic": float(n[0]), "work": float(n[1])})
+    """Return what packs EnergyStamped: kinetic energy, work, external work, losses."""
+    name, fields = "sms_handover_interfaces/msg/EnergyStamped", ("kinetic", "work", "external_work", "lost")
+    return StampedCodec(name, frame, 4, lambda types, n: dict(zip(fields, n.tolist(), strict=True)))
 
 
 class StateCodec:

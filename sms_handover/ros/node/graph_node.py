@@ -24,7 +24,7 @@ from sms_handover.ros.parameters import declare, named_scenario, reject_unknown
 from sms_handover.ros.process.main import EXIT_OK, WAIT_S, RunnableNode, Stop
 from sms_handover.ros.process.realtime import settle
 from sms_handover.simulation.parameters import DIRECT, EXECUTOR, LOCKSTEP, CommonParameters
-from sms_handover.simulation.scenario import load_world
+from sms_handover.simulation.scenario import deputy_masses, load_world
 from sms_handover.trajectory.schedule import Schedule
 
 P = TypeVar("P")
@@ -116,6 +116,7 @@ class GraphNode(LifecycleNode, Generic[P]):
             raise self._invalid
         role = TRUTH if self.get_name() in WITH_TRUTH else MODEL
         world = load_world(self.common, role, self.scenario)
+        self.common = self.common.for_deputies(*deputy_masses(self.common, self.scenario))
         self.robot: RobotModel = world.robot
         self.schedule: Schedule = world.schedule
         topics = graph_topics(self.robot.arms, clearance=self.common.measures_clearance)
