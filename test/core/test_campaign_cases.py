@@ -66,6 +66,8 @@ DRAWN: dict[str, float | str] = {
     "deputy.in_world.xyz[0]": 1.049,
     "truth.deputy.in_world.rpy[2]": 0.02,
     "deputy.size[0]": 0.11,
+    "deputy.mass": 4.0,
+    "truth.deputy.twist_in_world.angular[1]": 0.01,
     "schedule.phases.carry.duration": 21.0,
     "plant.grasp_position_tolerance": 0.02,
     "controller.rolling_period": 1.1,
@@ -77,7 +79,9 @@ DRAWN: dict[str, float | str] = {
 
 @pytest.mark.parametrize("path", DRAWN)
 def test_what_is_read_back_is_what_was_set(path: str) -> None:
-    loop, before = Loop(load_scenario("smooth", {path: DRAWN[path]})), Loop(load_scenario("smooth"))
+    at_rest = {"deputy.twist_in_world": {"linear": [0.0, 0.0, 0.0], "angular": [0.0, 0.0, 0.0]}}
+    loop = Loop(load_scenario("smooth", {**at_rest, path: DRAWN[path]}))
+    before = Loop(load_scenario("smooth", at_rest))
     assert is_same(DRAWN[path], read_back(loop, path))
     assert not is_same(DRAWN[path], read_back(before, path))
 
@@ -137,13 +141,13 @@ def test_numbers_that_are_not_finite_are_a_numeric_failure(
 
 
 def test_bad_cases_end_as_rows_with_their_causes(tmp_path: Path) -> None:
-    limits = {"wall_time": 1.0, "memory": 300.0, "retries": 1}
+    limits = {"wall_time": 3.0, "memory": 100.0, "retries": 1}
     file = written(tmp_path, name="bad", cases=5, limits=limits)
     run_here(file, tmp_path / "out", program=STUB)
     rows = {task.case: row for task, row in rows_of(tmp_path / "out").items()}
-    assert (rows[1].status, rows[1].cause) == (Status.LIMIT, "more than 1 s of wall time")
+    assert (rows[1].status, rows[1].cause) == (Status.LIMIT, "more than 3 s of wall time")
     assert (rows[2].status, rows[2].cause) == (Status.DIED, "its process ended by signal SIGKILL")
-    assert (rows[3].status, rows[3].cause) == (Status.LIMIT, "more than 300 MB of memory")
+    assert (rows[3].status, rows[3].cause) == (Status.LIMIT, "more than 100 MB of memory")
     assert [rows[case].run_digest for case in range(5)] == ["00", "", "", "", "00"]
 
 

@@ -118,13 +118,13 @@ def _of_limits(joint: Any, steps: Sequence[str]) -> float:
     return float(limits[steps[0]][int(steps[1])] if steps[0] == "position" else limits[steps[0]])
 
 
-def _of_inertia(inertia: Inertia, steps: Sequence[str]) -> float:
-    """Return a value of the inertia of a body."""
-    return (
-        inertia.mass
-        if steps[0] == "mass"
-        else {"com": inertia.com, "inertia": inertia.moments}[steps[0]][int(steps[1])]
-    )
+def _of_inertia(inertia: Inertia | None, steps: Sequence[str]) -> float:
+    """Return a value of the inertia of a body; raises ValueError if it has no mass."""
+    if inertia is None:
+        raise ValueError("no mass")
+    if steps[0] == "mass":
+        return inertia.mass
+    return {"com": inertia.com, "inertia": inertia.moments}[steps[0]][int(steps[1])]
 
 
 def _of_origin(origin: Origin, steps: Sequence[str]) -> float:
@@ -147,8 +147,12 @@ def _of_deputy(loop: Loop, world: World, steps: Sequence[str], *, of_plant: bool
         return _of_pose(loop.deputy.deputy_in_world if of_plant else deputy.deputy_in_world, steps[1:])
     if steps[0] == "grasp_frames":
         return _of_pose(deputy.grasp_frames[steps[1]], steps[2:])
-    value = getattr(deputy, steps[0])
-    return float(value[int(steps[1])]) if len(steps) > 1 else value
+    if steps[0] == "twist_in_world":
+        twist = loop.deputy.twist_deputy_in_world if of_plant else deputy.twist_in_world
+        return float({"linear": twist.linear, "angular": twist.angular}[steps[1]][int(steps[2])])
+    if steps[0] == "size":
+        return float(deputy.size[int(steps[1])])
+    return deputy.mass if steps[0] == "mass" else _of_inertia(deputy.body, steps)
 
 
 def _of_schedule(world: World, steps: Sequence[str]) -> Any:
