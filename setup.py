@@ -83,6 +83,13 @@ setup(
             "matplotlib>=3.10,<4",
             "plotly>=7,<8",  # of it only plotly.js is used
         ],
+        "campaign": [
+            "distributed>=2026.1,<2027",  # Dask's; pins dask to the same version
+            "pyarrow>=18,<27",
+            "SALib>=1.5.1,<2",
+            "scipy>=1.13,<2",
+            "statsmodels>=0.14.4,<0.16",
+        ],
         "compiled": ["casadi>=3.7,<4"],  # writes the equations of motion out as C
         "matlab": ["scipy>=1.13,<2"],
         "pandas": ["pandas>=2.2.2,<4"],
@@ -98,6 +105,7 @@ setup(
         "test": [
             "casadi>=3.7,<4",
             "daqp>=0.11,<0.12",
+            "distributed>=2026.1,<2027",
             "hypothesis>=6.140,<7",  # draws the inputs of the fuzzers
             "jsonschema>=4.26,<5",  # validates files against the schemas for editors
             "mcap-ros2-support>=0.5.7,<1",
@@ -110,7 +118,9 @@ setup(
             "pytest-xdist>=3.8,<4",
             "rerun-sdk>=0.41,<0.42",  # another reader of our bags
             "ruff>=0.6",
+            "SALib>=1.5.1,<2",
             "scipy>=1.13,<2",
+            "statsmodels>=0.14.4,<0.16",
             "types-PyYAML",
             "types-setuptools",
         ],

@@ -39,6 +39,7 @@ CORE = {
     "report",
     "export",
     "terminal",
+    "campaign",
 }
 EDGE = {"ros", "nodes", "external", "launcher", "cli"}
 
@@ -63,6 +64,7 @@ ALLOWED: dict[str, set[str]] = {
     "playback": {"messages", "bag"},
     "export": {"messages", "model", "clearance", "bag"},
     "report": {"plant", "clearance", "bag", "analysis", "engines", "scene"},
+    "campaign": {"model", "control", "trajectory", "simulation", "bag", "analysis", "report"},
     "ros": CORE,
     "nodes": CORE | {"ros"},
     "external": CORE | {"ros", "nodes"},
@@ -78,6 +80,7 @@ OPTIONAL = {
     "mujoco": "sms_handover.engines",
     "Basilisk": "sms_handover.engines",
     "daqp": "sms_handover.control.mpc",
+    "distributed": "sms_handover.campaign.engine",
 }  # who needs them
 ROS = re.compile(r"rclpy|ament_index_python|launch(_ros)?|tf2_\w+|rosidl_\w+|\w+_(msgs|srvs|interfaces)")
 
@@ -159,6 +162,8 @@ def test_imports_point_one_way(file: Path) -> None:
         ("sms_handover.analysis.metrics", "from matplotlib.figure import Figure"),
         ("sms_handover.cli.figure_files", "def draw():\n    import mpl_toolkits.mplot3d"),
         ("sms_handover.control.nmpc", "import casadi"),
+        ("sms_handover.campaign.record.journal", "import distributed"),
+        ("sms_handover.simulation.loop", "from sms_handover.campaign.cases import case"),
         ("sms_handover.compiled.step", "from sms_handover.simulation import loop"),
         ("sms_handover.__init__", "from sms_handover.nodes.plant import main"),
     ],
