@@ -105,14 +105,16 @@ def angular_momentum(run: RunData) -> Signal:
 
 
 def linear_momentum_change(run: RunData) -> Signal:
-    """Return P(t) - P(0) in kg m/s in ``world`` axes; zero up to rounding."""
-    change = run.linear_momentum - _first(run.linear_momentum)
+    """Return P(t) - P(0) in kg m/s less the impulse from outside, in ``world`` axes; zero up to rounding."""
+    own = run.linear_momentum - run.linear_impulse
+    change = own - _first(own)
     return _signal("change of linear momentum", "kg m/s", run.reference_ns, change, AXES)
 
 
 def angular_momentum_change(run: RunData) -> Signal:
     """Return L(t) - L(0) in kg m^2/s about the common centre of mass in ``world`` axes, likewise."""
-    change = run.angular_momentum - _first(run.angular_momentum)
+    own = run.angular_momentum - run.angular_impulse
+    change = own - _first(own)
     return _signal("change of angular momentum", "kg m^2/s", run.reference_ns, change, AXES)
 
 

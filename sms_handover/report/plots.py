@@ -94,7 +94,7 @@ _MOMENTA = (
     _Kind("linear_momentum", "Linear momentum", 1.0, "kg m/s", magnitude=True),
     _Kind("angular_momentum", "Angular momentum about the centre of mass", 1.0, "kg m²/s", magnitude=True),
 )
-_CHANGES = (  # other than the momenta themselves where a run begins with some
+_CHANGES = (  # by nothing from outside, other than the momenta themselves where a run begins with some
     _Kind("linear_momentum_change", "Change of the linear momentum", 1.0, "kg m/s", magnitude=True),
     _Kind("angular_momentum_change", "Change of the angular momentum", 1.0, "kg m²/s", magnitude=True),
 )
@@ -109,7 +109,7 @@ def plot_groups(runs: Sequence[RunData]) -> tuple[PlotGroup, ...]:
     found = [signals.signals_of(run) for run in runs]
     arms = tuple(dict.fromkeys(arm for run in runs for arm in run.arms))
     cuts = [cuts_of(run) for run in runs]
-    begun = any(_begins_with(of_run, kind.key) for of_run in found for kind in _MOMENTA)
+    with_changes = any(_departs(of_run, kind.key) for of_run in found for kind in _MOMENTA)
 
     def plots(kinds: Sequence[_Kind], names: Sequence[str]) -> tuple[Plot, ...]:
         return tuple(_plot(kind, name, found, cuts) for kind in kinds for name in names)
@@ -135,13 +135,13 @@ def plot_groups(runs: Sequence[RunData]) -> tuple[PlotGroup, ...]:
             "Without forces from outside the momenta of robot and deputy together stay what they were at the "
             "start, also as the deputy changes hands, and kinetic energy is work less heat; the residuals "
             "are rounding errors.",
-            plots((*_MOMENTA, *(_CHANGES if begun else ()), *_ENERGY), [""]),
+            plots((*_MOMENTA, *(_CHANGES if with_changes else ()), *_ENERGY), [""]),
         ),
     )
 
 
-def _begins_with(signals_of_run: Mapping[str, Signal], momentum: str) -> bool:
-    """Return whether a run begins with some of a momentum."""
+def _departs(signals_of_run: Mapping[str, Signal], momentum: str) -> bool:
+    """Return whether a momentum is not its change: it begins with some, or is given some from outside."""
     now, change = (signals_of_run[key].values for key in (momentum, f"{momentum}_change"))
     return bool(np.any(np.nan_to_num(now - change)))
 

@@ -12,6 +12,7 @@ from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.run.loop_record import LoopRecord, read_loop
 from sms_handover.bag.run.reader import read_run
 from sms_handover.clearance.contacts import CONTACT_DEPTH
+from sms_handover.engines.verdict import Verdict as EngineVerdict
 from sms_handover.errors import BagError, ConfigurationError
 from sms_handover.graph.topics import CONTROLLER, PLANT
 from sms_handover.plant.deputy import GraspTolerance
@@ -26,11 +27,12 @@ _RATE_TOLERANCE = "grasp_rate_tolerance"  # older versions did not judge the rat
 
 @dataclass(frozen=True, eq=False)
 class RecordedRun:
-    """The arrays of a run under a name, and the description of its bag."""
+    """The arrays of a run under a name, the description of its bag, and what a second engine says of it."""
 
     name: str
     data: RunData
     info: BagInfo
+    second_engine: EngineVerdict | None = None
 
     @cached_property
     def loop(self) -> LoopRecord:
