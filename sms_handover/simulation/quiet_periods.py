@@ -45,7 +45,7 @@ class QuietRunner:
     def run(self, guidance: Guidance, last_tick: int, room: Room | None = None) -> QuietPeriods | None:
         """Carry out the quiet periods from here on, after one with ``guidance``, None if there are none.
 
-        All their ticks are before ``last_tick``. The goals of the phase stand still, and no decision is due.
+        All their ticks are before ``last_tick``. No decision is due in them.
         The rows are written to ``room``, by default to a new array.
         """
         plant, generator, per_period = self._plant, self._generator, self._per_period
@@ -53,7 +53,7 @@ class QuietRunner:
         deputy = plant.deputy_body
         if not (deputy.holder or deputy.rests):
             return None  # it drifts, and C does not move it
-        until_ns = generator.quiet_until(stamp_ns, deputy_rests=deputy.rests)
+        until_ns = generator.quiet_until(stamp_ns)
         if until_ns is None:
             return None
         before = guidance.reference
@@ -61,7 +61,7 @@ class QuietRunner:
         count = min((until_ns - stamp_ns) // period_ns, (last_tick - first) // per_period)
         if count < 1:
             return None
-        course = generator.course(stamp_ns, period_ns, count, plant.deputy.deputy_in_world)
+        course = generator.course(stamp_ns, period_ns, count)
         failures = generator.ik_failures
         rows, periods, failed = self._periods.run(course, before, stamp_ns, deputy, failures, room)
         generator.failed_so_far(failed)

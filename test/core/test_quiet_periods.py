@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from sms_handover.compiled.c_function import CFunction, NativeFunction
 from sms_handover.control.controller import JointController
@@ -86,9 +87,14 @@ def require_same(one: RunData, other: RunData) -> None:
 
 
 def close_handover(folder: Path) -> dict[str, Any]:
-    """Return the values of a handover whose grasps all succeed, as everything is near its place at first."""
+    """Return the values of a handover whose grasps all succeed, as everything is near its place at first.
+
+    The second arm goes to its end of the deputy while the first one carries it.
+    """
     schedule = folder / "close.yaml"
-    schedule.write_text(short_handover(stretch=4.0), encoding="utf-8")
+    text = yaml.safe_load(short_handover(stretch=4.0))
+    text["phases"][1]["arms"]["arm_b"] = {"grasp_frame": "end_b"}
+    schedule.write_text(yaml.safe_dump(text, sort_keys=False), encoding="utf-8")
     return {"common": {"schedule": str(schedule)}}
 
 
@@ -244,7 +250,7 @@ def test_the_work_of_a_quiet_phase(time_law: str, monkeypatch: pytest.MonkeyPatc
 
         monkeypatch.setattr(kind, "__call__", counted)
     loop.advance_period()
-    assert entered.total() <= 7, entered  # tools, momenta, path, inverse kinematics, other arm, ticks
+    assert entered.total() <= 8, entered  # tools, momenta, goal, path, inverse kinematics, other arm, ticks
     entered.clear()
     _, calls = rest_of(loop)
     assert calls == 2  # the others, and the last state
