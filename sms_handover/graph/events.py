@@ -17,8 +17,9 @@ NO_ANSWER = "no_answer"
 RESYNCHRONISED = "resynchronised"
 GRASP_MISSED, PHASE_RETRIED, GRASP_FAILED = "grasp_missed", "phase_retried", "grasp_failed"
 IK_FAILED = "ik_failed"
-COLLISION = "collision"
+COLLISION, TOUCH = "collision", "touch"
 MESSAGE_REFUSED = "refused"
+PLAN_FAILED, PLAN_BACK = "plan_failed", "plan_back"
 POSITION_EXCEEDED, RATE_EXCEEDED = "position_exceeded", "rate_exceeded"
 
 

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from sms_handover.model.conserved import ConservedQuantities
 from sms_handover.model.poses import se3_of
-from sms_handover.model.robot_model import BASE_NV, RobotModel
+from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.types import Array, Pose, Twist
 
 
@@ -70,6 +71,21 @@ def drift_of_base(robot: RobotModel, q: Array, v: Array) -> Array:
     """
     inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.LOCAL)
     drift: Array = np.linalg.solve(inertia[:BASE_NV, :BASE_NV], inertia[:BASE_NV] @ v)
+    return drift
+
+
+def drift_of_momentum(robot: RobotModel, q: Array, momentum: ConservedQuantities) -> Array:
+    """Return H_b^-1 h_b (6,) in ``base_link`` axes for momenta P, L about the centre of mass c, in ``world``.
+
+    With R and p of the base, h_b = (R^T P, R^T (L + (c - p) x P)).
+    """
+    inertia = pin.crba(robot.pin, robot.data, q, pin.Convention.LOCAL)
+    base = pin.XYZQUATToSE3(q[:BASE_NQ])
+    centre = pin.centerOfMass(robot.pin, robot.data, q)
+    linear = momentum.linear_momentum
+    angular = momentum.angular_momentum + np.cross(centre - base.translation, linear)
+    about_base = np.concatenate([base.rotation.T @ linear, base.rotation.T @ angular])
+    drift: Array = np.linalg.solve(inertia[:BASE_NV, :BASE_NV], about_base)
     return drift
 
 

@@ -1,10 +1,10 @@
 """Check of a whole scenario before anything moves."""
 
 from sms_handover.control.registry import law_named
-from sms_handover.control.stability import check_stability
 from sms_handover.graph.topics import CONTROLLER
 from sms_handover.simulation.feasibility import PhasePrediction, check_feasibility
 from sms_handover.simulation.scenario import Scenario
+from sms_handover.simulation.stability import check_stability_by_phase
 from sms_handover.simulation.wiring import gains_by_phase, make_controller, make_plant
 from sms_handover.units import ns_to_seconds
 
@@ -19,7 +19,7 @@ def check_scenario(scenario: Scenario) -> tuple[PhasePrediction, ...]:
     """
     parameters, truth = scenario.parameters, scenario.truth
     robot, schedule = scenario.model.robot, scenario.model.schedule
-    make_plant(truth.robot, truth.schedule, parameters.common, parameters.plant)
+    make_plant(truth.robot, truth.schedule, parameters.common, parameters.plant, truth.conditions)
     ours = CONTROLLER not in parameters.common.external
     if ours:
         make_controller(robot, schedule, parameters.common, parameters.controller)
@@ -28,8 +28,9 @@ def check_scenario(scenario: Scenario) -> tuple[PhasePrediction, ...]:
         return predictions
     gains = gains_by_phase(schedule, parameters.controller)
     law = law_named(parameters.controller.law)
-    for one, end in zip(gains, predictions, strict=True):
-        q = robot.configuration(end.base_in_world, end.joint_position)
-        where = f"where phase {end.phase!r} ends"
-        check_stability(law, robot, (one,), ns_to_seconds(parameters.common.tick_ns), q, where)
+    places = [
+        (robot.configuration(end.base_in_world, end.joint_position), f"where phase {end.phase!r} ends")
+        for end in predictions
+    ]
+    check_stability_by_phase(law, robot, schedule, gains, ns_to_seconds(parameters.common.tick_ns), places)
     return predictions

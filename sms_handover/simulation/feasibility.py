@@ -1,7 +1,7 @@
 """Feasibility of a schedule, checked before anything moves."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
 
@@ -12,18 +12,20 @@ from sms_handover.clearance.distances import ClearanceModel
 from sms_handover.errors import ScheduleError
 from sms_handover.ik.levenberg_marquardt import solve_ik
 from sms_handover.ik.parameters import IkParameters
+from sms_handover.model.known_payload import KnownPayload
 from sms_handover.model.poses import pose_distance
-from sms_handover.model.reduced import base_twist_per_joint_rate
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.deputy import GraspTolerance, MasslessDeputy
 from sms_handover.plant.grasping import execute_grasp
+from sms_handover.plant.rigid_deputy import RigidDeputy
+from sms_handover.simulation.predicted_momentum import PredictedMomentum, base_after
 from sms_handover.simulation.wiring import initial_joints, make_clearance
 from sms_handover.trajectory.generator import goal_in_world
 from sms_handover.trajectory.schedule import GraspFrameTarget, JointTarget, Phase, Schedule, ToolTarget
 from sms_handover.types import Array, GraspStatus, IkRequest, Pose, Twist, freeze
-from sms_handover.units import DEG_PER_RAD, MM_PER_M
+from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
 
-_PATH_STEPS = 64  # [-] midpoint steps along a joint path; their error is far below a grasp tolerance
+_DRIFT_STEP_S = 0.005  # [s] of a free deputy; its error is far below a grasp tolerance
 _MAX_SETTLE = 40  # [-] each round shrinks the error by about the arms' share of the mass
 _SETTLED = 1e-9  # [m, rad] change of the base pose in a round
 _SETTLED_OUT_OF_REACH = 1e-4  # [m, rad] the same where only the size of a miss is wanted
@@ -74,25 +76,13 @@ def check_feasibility(
 ) -> tuple[PhasePrediction, ...]:
     """Return where each phase will end; raises ScheduleError where a target or a grasp is out of reach.
 
-    Assumes that a phase ends at rest, at its targets, on a straight path in joint space, at zero
-    momentum: the base's displacement then follows from the joint path alone, whatever its timing.
-    A grasp is checked at the tool pose that the phase before ends at. Poses on the way to a target
-    are not checked. Without a ``tolerance`` every grasp holds.
+    Assumes that a phase ends with its joints at rest, at its targets, on a straight path in joint space. At
+    zero momentum the base's displacement follows from the joint path alone, whatever its timing; a deputy
+    with mass, as it is known, is carried, and what momentum it brings turns and moves the whole for the rest
+    of the task. A grasp is checked at the tool pose that the phase before ends at, at no relative speed.
+    Poses on the way to a target are not checked. Without a ``tolerance`` every grasp holds.
     """
     return _Walk(robot, schedule, ik, tolerance).predictions()
-
-
-def base_after(robot: RobotModel, base_in_world: Pose, start: Array, end: Array) -> Pose:
-    """Return the base pose after a straight joint path from ``start`` to ``end`` (n,) at zero momentum.
-
-    Midpoint rule on SE(3); the twist per joint rate depends on the joints only, not on the base pose.
-    """
-    stride = (end - start) / _PATH_STEPS
-    pose = base_in_world
-    for index in range(_PATH_STEPS):
-        q = robot.configuration(base_in_world, start + (index + 0.5) * stride)
-        pose = robot.integrate_base(pose, base_twist_per_joint_rate(robot, q) @ stride, 1.0)
-    return pose
 
 
 class _Walk:
@@ -102,9 +92,10 @@ class _Walk:
         self, robot: RobotModel, schedule: Schedule, ik: IkParameters, tolerance: GraspTolerance
     ) -> None:
         """Begin at the start of the schedule."""
-        self._robot, self._schedule, self._ik, self._tolerance = robot, schedule, ik, tolerance
-        deputy = schedule.deputy
-        self._deputy = MasslessDeputy(deputy.deputy_in_world, deputy.grasp_frames)
+        self._robot, self._schedule, self._ik = robot, schedule, ik
+        self._tolerance = replace(tolerance, speed=inf, rate=inf)
+        self._deputy = _deputy(schedule)
+        self._momentum = PredictedMomentum(KnownPayload(robot, schedule.deputy))
         self._base, self._joints = schedule.base_in_world, initial_joints(robot, schedule)
 
     def predictions(self) -> tuple[PhasePrediction, ...]:
@@ -112,6 +103,8 @@ class _Walk:
         found = []
         for phase in self._schedule.phases:
             self._grasp(phase)
+            if not self._deputy.holder:
+                self._drift(ns_to_seconds(phase.end_ns - phase.start_ns))
             rest, restarts = self._reach(phase)
             self._base, self._joints = rest.base_in_world, rest.joint_position
             turned = pose_distance(self._schedule.base_in_world, self._base)[1]
@@ -131,6 +124,16 @@ class _Walk:
                 )
             if event.status is GraspStatus.REJECTED:
                 raise ScheduleError(f"phase {phase.name!r}: {event.detail}")
+            if isinstance(self._deputy, RigidDeputy):
+                self._momentum.handed_over(event, self._deputy, self._base, self._joints)
+
+    def _drift(self, duration: float) -> None:
+        """Let a deputy that nobody holds move to where it is at the end of a phase."""
+        if isinstance(self._deputy, RigidDeputy):
+            for _ in range(round(duration / _DRIFT_STEP_S)):
+                self._deputy.drift(_DRIFT_STEP_S)
+        else:
+            self._deputy.drift(duration)
 
     def _reach(self, phase: Phase) -> tuple[_Rest, int]:
         """Return where a phase ends and after how many restarts; raises ScheduleError where it cannot."""
@@ -198,11 +201,17 @@ class _Walk:
         for _ in range(_MAX_SETTLE):
             rest = self._solve(base, joints, self._targets(phase, base, joints))
             joints = rest.joint_position
-            settled = base_after(self._robot, self._base, self._joints, joints)
+            settled = self._base_after(phase, joints)
             if max(pose_distance(base, settled)) <= (_SETTLED_OUT_OF_REACH if rest.missed else _SETTLED):
                 break
             base = settled
         return rest
+
+    def _base_after(self, phase: Phase, joints: Array) -> Pose:
+        """Return the base pose at the end of a phase that ends with these joints (n,)."""
+        momentum, robot = self._momentum.total, self._momentum.payload.robot
+        duration = ns_to_seconds(phase.end_ns - phase.start_ns)
+        return base_after(robot, self._base, self._joints, joints, momentum, duration)
 
     def _solve(self, base_in_world: Pose, seed: Array, targets: Mapping[str, Pose]) -> _Rest:
         """Return the rest with the joints that inverse kinematics finds, and which arms miss."""
@@ -237,3 +246,12 @@ class _Walk:
         if self._deputy.holder:
             self._deputy.follow(tools[self._deputy.holder], _AT_REST)
         return tools
+
+
+def _deputy(schedule: Schedule) -> MasslessDeputy:
+    """Return the deputy of a schedule at time zero."""
+    known = schedule.deputy
+    place = (known.deputy_in_world, known.grasp_frames)
+    if known.inertia is None:
+        return MasslessDeputy(*place, known.twist_in_world)
+    return RigidDeputy(*place, known.inertia, _DRIFT_STEP_S, known.twist_in_world)

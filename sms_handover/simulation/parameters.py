@@ -1,6 +1,6 @@
 """Parameters that the whole loop shares."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from sms_handover.configuration.parameters import parameter
 from sms_handover.errors import ConfigurationError, UnknownNameError
@@ -18,6 +18,8 @@ AFTER, ONLINE = "after", "online"
 CLEARANCE = (AFTER, ONLINE)
 REPORT, ABORT = "report", "abort"
 ON_COLLISION = (REPORT, ABORT)
+FAIL = "fail"
+ON_TOUCH = (FAIL, REPORT)
 
 
 @dataclass(frozen=True)
@@ -34,8 +36,11 @@ class CommonParameters:
     scenario: str = parameter("name of a shipped scenario, or path of a scenario file")
     robot: str = parameter("path of a robot description; empty: that of the scenario")
     schedule: str = parameter("path of a task schedule; empty: that of the scenario")
+    conditions: str = parameter(
+        "name of shipped conditions, or path of a file of them; empty: those of the scenario"
+    )
     values: tuple[str, ...] = parameter(
-        "values of robot, deputy and schedule by dotted path on top of the files, such as "
+        "values of robot, deputy, schedule and conditions by dotted path on top of the files, such as "
         "robot.base.mass:=300 or schedule.phases.carry.duration:=30; those of the plant alone begin with "
         "truth, as in truth.robot.base.mass:=264, those of every other node with model"
     )
@@ -58,6 +63,11 @@ class CommonParameters:
         "abort sets clearance online",
         choices=ON_COLLISION,
     )
+    on_touch: str = parameter(
+        "what becomes of the task when the robot touches a deputy with mass that nobody holds, and would "
+        "push it away; fail: its phase has failed, and clearance is measured online; report: as on_collision",
+        choices=ON_TOUCH,
+    )
     contact_depth: float = parameter(
         "depth to which gripper and deputy may enter each other where their contact is declared",
         unit="m",
@@ -68,6 +78,13 @@ class CommonParameters:
         "how a node takes its inputs; direct: from rcl; executor: by the executor of rclpy, which is slower "
         "and uses public interfaces only",
         choices=TRANSPORTS,
+    )
+    spin: float = parameter(
+        "wall time for which plant and controller look for what they await in lock step before they sleep; "
+        "it gives way to others, and stops where it does not pay; 0: never",
+        unit="s",
+        minimum=0.0,
+        maximum=0.1,
     )
     cpu: int = parameter("CPU core of the nodes of the loop; -1: any", minimum=-1, maximum=4095)
     priority: int = parameter(
@@ -119,6 +136,17 @@ class CommonParameters:
     def aborts_on_collision(self) -> bool:
         """Whether the task fails when bodies collide."""
         return self.on_collision == ABORT
+
+    @property
+    def fails_on_touch(self) -> bool:
+        """Whether the task fails when the robot touches a deputy that floats."""
+        return self.on_touch == FAIL
+
+    def for_deputies(self, *masses: float) -> "CommonParameters":
+        """Return the same for a run with deputies of these masses in kg: touches matter only with mass."""
+        if not any(masses):
+            return replace(self, on_touch=REPORT)
+        return replace(self, clearance=ONLINE) if self.fails_on_touch else self
 
     @property
     def ticks_per_reference(self) -> int:

@@ -10,7 +10,7 @@ from sms_handover.control.protocol import Guidance
 from sms_handover.graph.events import RunEvent
 from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.trajectory.generator import TrajectoryGenerator
-from sms_handover.types import JointReference, PeriodRows, TaskPhase, TickRows
+from sms_handover.types import JointReference, PeriodRows, Pose, TaskPhase, TickRows
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,8 @@ class QuietRunner:
         course = generator.course(stamp_ns, period_ns, count)
         failures = generator.ik_failures
         rows, periods, failed = self._periods.run(course, before, stamp_ns, deputy, failures, room)
-        generator.failed_so_far(failed)
+        last, deputy_row = int(periods.stamp_ns[-1]), periods.deputy_pose[-1]
+        generator.went_quietly(last, Pose(deputy_row[:3], deputy_row[3:]), failed)
         phases = tuple(_at(course.phase, stamp) for stamp in periods.stamp_ns.tolist())
         latest = range(max(0, len(phases) - 2), len(phases))
         excesses = plant.take_excesses_of(first, rows)

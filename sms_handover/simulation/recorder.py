@@ -12,12 +12,13 @@ from sms_handover.model.poses import pose_row, twist_in_deputy
 from sms_handover.run_data import RunData
 from sms_handover.simulation.loop import Period, Ticks
 from sms_handover.simulation.quiet_periods import QuietPeriods
-from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, TaskPhase, TickRows
+from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, PlanReport, TaskPhase, TickRows
 
 _BY_PERIOD = (
     *("reference_position", "reference_velocity", "deputy_pose", "deputy_twist"),
     *("linear_momentum", "angular_momentum", "kinetic_energy", "work", "external_work", "lost"),
 )
+_NONE = np.zeros(3)  # [N s], [N m s]
 _NOT_ASKED = -1  # in place of a status where inverse kinematics was not asked
 _GROWTH = 1.5  # [-] of the room for rows, where a run is longer than it was told
 
@@ -41,6 +42,7 @@ class RunRecorder:
         self._phases: list[TaskPhase] = []
         self._events: list[GraspEvent] = []
         self._decisions: list[RunEvent] = []
+        self._plans: list[PlanReport] = []
 
     def add(self, ticks: Ticks | QuietPeriods) -> None:
         """Add some ticks, and the reference periods that begin with them."""
@@ -50,6 +52,8 @@ class RunRecorder:
             self._add_periods(ticks)
         elif ticks.period:
             self._add_period(ticks.period)
+        if isinstance(ticks, Ticks) and ticks.plan:
+            self._plans.append(ticks.plan)
         for index, events in ticks.excesses.items():
             self._decisions.extend(events if index else ())
 
@@ -78,6 +82,7 @@ class RunRecorder:
     def _add_period(self, period: Period) -> None:
         """Add what a reference period begins with."""
         reference, conserved, status = period.reference, period.conserved, period.ik_status
+        given = period.external_impulse
         deputy = pose_row(period.deputy.deputy_in_world)
         row = {
             "reference_ns": reference.stamp_ns,
@@ -91,6 +96,8 @@ class RunRecorder:
             "work": period.work,
             "external_work": period.external_work,
             "lost": period.lost,
+            "linear_impulse": _NONE if given is None else given.linear_impulse,
+            "angular_impulse": _NONE if given is None else given.angular_impulse,
             "ik_status": CONSTANTS[status] if status else _NOT_ASKED,
         }
         for name, value in row.items():
@@ -108,6 +115,8 @@ class RunRecorder:
         for name in _BY_PERIOD:
             self._periods[name].append(getattr(rows, name))
         self._periods["reference_ns"].append(rows.stamp_ns)
+        for name in ("linear_impulse", "angular_impulse"):  # in C nothing acts from outside
+            self._periods[name].append(np.zeros((len(rows.stamp_ns), 3)))
         status = [CONSTANTS[status] if status else _NOT_ASKED for status in rows.ik_status]
         self._periods["ik_status"].append(np.array(status))
         for arm in self._arms:
@@ -133,5 +142,6 @@ class RunRecorder:
             phases=tuple(self._phases),
             grasp_events=tuple(self._events),
             run_events=tuple(self._decisions),
+            plans=tuple(self._plans),
             **{name: np.concatenate(rows) for name, rows in self._periods.items()},
         )

@@ -12,7 +12,9 @@ from sms_handover.model.deputy import DeputyDescription
 from sms_handover.model.known_payload import EMPTY_HANDS, Grip, KnownPayload
 from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.model.robot_model import RobotModel
+from sms_handover.trajectory.deputy_twist import Before, DeputyTwist, twist_at
 from sms_handover.trajectory.parameters import TrajectoryParameters
+from sms_handover.trajectory.pose_path import PosePath
 from sms_handover.trajectory.schedule import (
     GraspFrameTarget,
     Hold,
@@ -85,12 +87,16 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class GeneratorState:
-    """Progress of the task, joints (n,) rad and tools as the phase began, and who holds the deputy."""
+    """Progress of the task, joints (n,) rad and tools as the phase began, who holds the deputy, where it was.
+
+    ``deputy_before`` is None unless the motion of the deputy is followed.
+    """
 
     progress: ProgressState
     joints_at_start: Array
     tools_at_start: Mapping[str, Pose]
     grip: Grip = EMPTY_HANDS
+    deputy_before: Before | None = None
 
 
 class TrajectoryGenerator:
@@ -107,14 +113,18 @@ class TrajectoryGenerator:
         make_motion: Callable[[RobotModel], ToolMotion] = PinocchioToolMotion,
         *,
         abort_on_collision: bool = False,
+        fail_on_touch: bool = False,
     ) -> None:
         """Follow a schedule; ``make_motion`` makes what leads the tools of a robot."""
         self._robot = robot
         self._make_motion = make_motion
         self._payload = KnownPayload(robot, schedule.deputy)
         self._motion = make_motion(robot)
+        self._deputy_twist = DeputyTwist(schedule.deputy)
         self._schedule = schedule
-        self._progress = TaskProgress(schedule, parameters, abort_on_collision=abort_on_collision)
+        self._progress = TaskProgress(
+            schedule, parameters, abort_on_collision=abort_on_collision, fail_on_touch=fail_on_touch
+        )
         self._time_law = TIME_LAWS[parameters.time_law]
         self._damping = parameters.jacobian_damping
         self.reset()
@@ -123,18 +133,21 @@ class TrajectoryGenerator:
         """Return to the start of the schedule."""
         self._progress.reset()
         self._hold(EMPTY_HANDS)
+        self._deputy_twist.before = None
         self._joints_at_start: Array = np.zeros(self._robot.n_joints)
         self._tools_at_start: Mapping[str, Pose] = {}
 
     def snapshot(self) -> GeneratorState:
         """Return the state to :meth:`restore`."""
         joints, tools = read_only(self._joints_at_start), dict(self._tools_at_start)
-        return GeneratorState(self._progress.snapshot(), joints, tools, self._payload.grip)
+        before = self._deputy_twist.before
+        return GeneratorState(self._progress.snapshot(), joints, tools, self._payload.grip, before)
 
     def restore(self, state: GeneratorState) -> None:
         """Go back to a former state; raises ConfigurationError if it is that of another schedule."""
         self._progress.restore(state.progress)
         self._hold(state.grip)
+        self._deputy_twist.before = state.deputy_before
         self._joints_at_start, self._tools_at_start = state.joints_at_start, state.tools_at_start
 
     def targets(self, state: RobotState, deputy_in_world: Pose) -> tuple[TaskPhase, Targets]:
@@ -174,13 +187,24 @@ class TrajectoryGenerator:
         """The latest targets in a row that inverse kinematics has not reached, and the number that fails."""
         return self._progress.ik_failures
 
-    def failed_so_far(self, ik_failures: int) -> None:
-        """Record how many of the latest targets in a row were not reached."""
+    def went_quietly(self, stamp_ns: int, deputy_in_world: Pose, ik_failures: int) -> None:
+        """Go on after quiet periods, of which the last began at a time.
+
+        The deputy was at a pose then, and so many of the latest targets in a row were not reached.
+        """
+        self._deputy_twist.at(stamp_ns, deputy_in_world)
         self._progress.failed_so_far(ik_failures)
 
     def quiet_until(self, stamp_ns: int) -> int | None:
-        """Return up to when nothing has to be decided, None if not even now."""
-        return self._progress.quiet_from(stamp_ns)
+        """Return up to when nothing has to be decided, None if not even now.
+
+        A deputy that moves by itself is followed by its twist, which is worked out period by period.
+        """
+        quiet = self._progress.quiet_from(stamp_ns)
+        if quiet is None or not self._deputy_twist.follows:
+            return quiet
+        targets = self._progress.at(stamp_ns).targets.values()
+        return None if any(isinstance(target, GraspFrameTarget) for target in targets) else quiet
 
     def course(self, stamp_ns: int, period_ns: int, count: int) -> Course:
         """Return what leads the arms in some quiet periods from a time on, the first of ``count``."""
@@ -263,6 +287,7 @@ class TrajectoryGenerator:
         )
         poses: dict[str, Pose] = {}
         twists: dict[str, Twist] = {}
+        deputy_twist = self._deputy_twist.at(state.stamp_ns, deputy_in_world)
         position = np.array(state.joint_position)
         velocity = np.zeros(self._robot.n_joints)
         for arm, target in stage.targets.items():
@@ -271,7 +296,12 @@ class TrajectoryGenerator:
             match target:
                 case ToolTarget() | GraspFrameTarget():
                     goal = self._goal(target, deputy_in_world)
-                    poses[arm], twists[arm] = self._motion.on_path(self._tools_at_start[arm], goal, progress)
+                    tool = self._tools_at_start[arm]
+                    if deputy_twist and isinstance(target, GraspFrameTarget):
+                        moves = twist_at(deputy_twist, deputy_in_world.position, goal.position)
+                        poses[arm], twists[arm] = PosePath(tool, goal, moves).at(progress)
+                    else:
+                        poses[arm], twists[arm] = self._motion.on_path(tool, goal, progress)
                 case JointTarget():
                     position[joints], velocity[joints] = _joint_motion(start, target.position, progress)
                 case Hold():

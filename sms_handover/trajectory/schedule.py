@@ -6,7 +6,8 @@ from enum import Enum
 from types import MappingProxyType
 
 from sms_handover.model.deputy import DeputyDescription
-from sms_handover.types import Array, GraspCommand, Pose, freeze, read_only
+from sms_handover.model.known_payload import EMPTY_HANDS, Grip
+from sms_handover.types import Array, GraspAction, GraspCommand, Pose, freeze, read_only
 
 
 @dataclass(frozen=True)
@@ -109,6 +110,17 @@ class Schedule:
             frozenset(arm for arm, target in phase.targets.items() if isinstance(target, GraspFrameTarget))
             for phase in self.phases
         )
+
+    @property
+    def grips(self) -> tuple[Grip, ...]:
+        """Phase by phase, who holds the deputy if every command succeeds."""
+        found, grip = [], EMPTY_HANDS
+        for phase in self.phases:
+            for command in phase.commands:
+                released = command.action is GraspAction.RELEASE
+                grip = EMPTY_HANDS if released else Grip(command.arm, command.grasp_frame)
+            found.append(grip)
+        return tuple(found)
 
     def phase_index(self, stamp_ns: int) -> int:
         """Return the index of the phase at a time; after the end it is the last one."""

@@ -5,19 +5,29 @@ from dataclasses import dataclass, field
 from math import nan
 
 from sms_handover.errors import ConfigurationError
+from sms_handover.frames import DEPUTY
 from sms_handover.graph.events import (
     COLLISION,
     GRASP_FAILED,
     GRASP_MISSED,
     IK_FAILED,
     PHASE_RETRIED,
+    TOUCH,
     RunEvent,
     Severity,
 )
 from sms_handover.graph.topics import TRAJECTORY
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.schedule import ArmTarget, Hold, MissAction, Phase, Schedule
-from sms_handover.types import Collision, GraspCommand, GraspEvent, GraspStatus, PhaseState, TaskPhase
+from sms_handover.types import (
+    Collision,
+    GraspAction,
+    GraspCommand,
+    GraspEvent,
+    GraspStatus,
+    PhaseState,
+    TaskPhase,
+)
 from sms_handover.units import seconds_to_ns
 
 Figures = tuple[float, float, str]  # value, limit, unit
@@ -59,7 +69,7 @@ class ProgressState:
 
     Per phase: the commands ``due``, how often it has ``begun``, its ``retries``. ``issues`` has the phase
     index, the commands and the answers of every issue; ``colliding`` the groups of bodies that collided in
-    the period before that of ``collisions``.
+    the period before that of ``collisions``; ``held`` tells whether an arm holds the deputy.
     """
 
     shift_ns: int
@@ -73,6 +83,7 @@ class ProgressState:
     ik_failures: int
     collisions: tuple[Collision, ...]
     colliding: tuple[str, ...]
+    held: bool = False
 
 
 class TaskProgress:
@@ -86,9 +97,15 @@ class TaskProgress:
     """
 
     def __init__(
-        self, schedule: Schedule, parameters: TrajectoryParameters, *, abort_on_collision: bool = False
+        self,
+        schedule: Schedule,
+        parameters: TrajectoryParameters,
+        *,
+        abort_on_collision: bool = False,
+        fail_on_touch: bool = False,
     ) -> None:
         self._schedule, self._abort_on_collision = schedule, abort_on_collision
+        self._fail_on_touch = fail_on_touch
         self._most_ik_failures = parameters.ik_failures
         self._failure_hold_ns = seconds_to_ns(parameters.failure_hold)
         self.reset()
@@ -107,6 +124,7 @@ class TaskProgress:
         self._ik_failures = 0
         self._collisions: tuple[Collision, ...] = ()
         self._colliding: tuple[str, ...] = ()
+        self._held = False
         self._decisions: list[RunEvent] = []
 
     def snapshot(self) -> ProgressState:
@@ -123,6 +141,7 @@ class TaskProgress:
             self._ik_failures,
             self._collisions,
             self._colliding,
+            self._held,
         )
 
     def restore(self, state: ProgressState) -> None:
@@ -133,7 +152,7 @@ class TaskProgress:
             )
         self._shift_ns, self._end_ns, self._failed = state.shift_ns, state.end_ns, state.failed
         self._now, self._ik_failures = state.now, state.ik_failures
-        self._collisions, self._colliding = state.collisions, state.colliding
+        self._collisions, self._colliding, self._held = state.collisions, state.colliding, state.held
         self._due, self._begun, self._retries = list(state.due), list(state.begun), list(state.retries)
         self._issues = [
             _Issue(index, commands, {event.command: event for event in answers})
@@ -176,6 +195,8 @@ class TaskProgress:
             issue = next((i for i in self._issues if event.command in i.commands and not i.answered), None)
             if issue is not None:
                 issue.answers[event.command] = event
+            if event.status is GraspStatus.SUCCEEDED:
+                self._held = event.command.action is not GraspAction.RELEASE
 
     def solved(self, *, converged: bool) -> None:
         """Record whether IK converged for the latest targets."""
@@ -232,11 +253,19 @@ class TaskProgress:
             self._fail(stamp_ns, index, IK_FAILED, detail, figures)
 
     def _on_collisions(self, stamp_ns: int, index: int) -> None:
-        """Report collisions that have begun, or give the task up at the first."""
+        """Report collisions that have begun, or give the task up at the first, or at the first touch.
+
+        A touch is a collision with a deputy that floats: it would push the deputy away, which the plant does
+        not model.
+        """
         for collision in self._collisions:
             if self._failed or collision.group in self._colliding:
                 continue
             figures = (collision.distance, collision.allowed, "m")
+            if self._fail_on_touch and not self._held and DEPUTY in collision.bodies:
+                detail = f"{collision}, which would push the free deputy away; the joints are held"
+                self._fail(stamp_ns, index, TOUCH, detail, figures)
+                continue
             if self._abort_on_collision:
                 self._fail(stamp_ns, index, COLLISION, f"{collision}; the joints are held", figures)
             else:
