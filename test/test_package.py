@@ -39,7 +39,7 @@ KEYS = {
     "zstandard": "mcap-ros2-support",
 }
 # Extras that a user installs with pip: rosdep has no key for them.
-BY_PIP_ONLY = {"casadi", "pandas", "playwright", "plotly", "pyarrow"}
+BY_PIP_ONLY = {"Basilisk", "casadi", "mujoco", "pandas", "playwright", "plotly", "pyarrow"}
 ROS_PACKAGE = re.compile(r"rclpy|rosidl_\w+|ament_index_python|tf2_\w+|\w+_(msgs|srvs|interfaces)")
 
 
