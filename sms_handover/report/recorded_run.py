@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 from pathlib import Path
 
 from sms_handover.analysis.clearance import TaskTexts
@@ -21,6 +22,7 @@ UNKNOWN_LAW = "unknown"
 
 _CONTACT_DEPTH = "contact_depth"
 _TOLERANCES = ("grasp_position_tolerance", "grasp_angle_tolerance", "grasp_speed_tolerance")
+_RATE_TOLERANCE = "grasp_rate_tolerance"  # older versions did not judge the rate
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +58,7 @@ class RecordedRun:
     def tolerance(self) -> GraspTolerance | None:
         """Return the grasp tolerance, None if the bag lacks it."""
         plant = self.info.parameters.get(PLANT, {})
-        values = [plant.get(name) for name in _TOLERANCES]
+        values = [*(plant.get(name) for name in _TOLERANCES), plant.get(_RATE_TOLERANCE, inf)]
         numbers = [float(value) for value in values if isinstance(value, int | float)]
         return GraspTolerance(*numbers) if len(numbers) == len(values) else None
 
