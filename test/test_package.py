@@ -39,13 +39,12 @@ KEYS = {
     "zstandard": "mcap-ros2-support",
 }
 # Extras that a user installs with pip: rosdep has no key for them.
-<<<<<<< HEAD
-BY_PIP_ONLY = {"Basilisk", "casadi", "mujoco", "pandas", "playwright", "plotly", "pyarrow"}
-=======
 BY_PIP_ONLY = {
+    "Basilisk",
     "SALib",
     "casadi",
     "distributed",
+    "mujoco",
     "pandas",
     "playwright",
     "plotly",
@@ -53,7 +52,6 @@ BY_PIP_ONLY = {
     "scipy",
     "statsmodels",
 }
->>>>>>> main
 ROS_PACKAGE = re.compile(r"rclpy|rosidl_\w+|ament_index_python|tf2_\w+|\w+_(msgs|srvs|interfaces)")
 
 
