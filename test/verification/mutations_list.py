@@ -865,6 +865,13 @@ BREAKS: tuple[Break, ...] = (
         "test/verification/test_second_engine.py",
     ),
     Break(
+        "a torque from outside held in axes of the base",
+        "sms_handover/plant/external_wrenches.py",
+        "self._generalized[3:BASE_NV] = to_base @ self._wrench.torque",
+        "self._generalized[3:BASE_NV] = self._wrench.torque",
+        "test/verification/test_second_engine.py",
+    ),
+    Break(
         "a payload in MJCF at the origin of its link",
         "sms_handover/model/mjcf.py",
         "place = _at(self._payload.pose_in_link)",
