@@ -10,7 +10,6 @@ from sms_handover.graph.events import RunEvent
 from sms_handover.model.deputy import DeputyDescription
 from sms_handover.model.known_payload import EMPTY_HANDS, Grip, KnownPayload
 from sms_handover.model.poses import pose_of, se3_of
-from sms_handover.model.reduced import carried_twist, drift_of_base
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.trajectory.deputy_twist import Before, DeputyTwist, twist_at
 from sms_handover.trajectory.parameters import TrajectoryParameters
@@ -69,7 +68,7 @@ class Course:
     The tools of some arms go from ``starts`` to ``goals`` in ``world``; the joints (n,) rad of those in
     ``by_joints`` from ``joints`` to ``ends``; those of the others stay at ``joints``. ``progress`` (k, 2) has
     the fraction of the motion and its rate in 1/s for each period; ``damping`` is that of the generalised
-    Jacobian.
+    Jacobian. With ``has_momentum`` a deputy with mass may have given the robot some.
     """
 
     phase: TaskPhase
@@ -80,6 +79,7 @@ class Course:
     ends: Array
     progress: Array
     damping: float
+    has_momentum: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +191,7 @@ class TrajectoryGenerator:
     def quiet_until(self, stamp_ns: int, *, deputy_rests: bool) -> int | None:
         """Return up to when nothing has to be decided and goals stand still, None if not even now."""
         quiet = self._progress.quiet_from(stamp_ns)
-        if quiet is None or self._payload.has_mass:
+        if quiet is None:
             return None
         targets = self._progress.at(stamp_ns).targets.values()
         if not deputy_rests and any(isinstance(target, GraspFrameTarget) for target in targets):
@@ -215,9 +215,16 @@ class TrajectoryGenerator:
             elif isinstance(target, JointTarget):
                 moved.add(arm)
                 ends[self._robot.arm_joints[arm]] = target.position
-        starts = self._tools_at_start
         return Course(
-            stage.task, starts, goals, frozenset(moved), self._joints_at_start, ends, progress, self._damping
+            stage.task,
+            self._tools_at_start,
+            goals,
+            frozenset(moved),
+            self._joints_at_start,
+            ends,
+            progress,
+            self._damping,
+            self._payload.has_mass,
         )
 
     def ik_request(self, state: RobotState, targets: Targets) -> IkRequest:
@@ -242,7 +249,7 @@ class TrajectoryGenerator:
         by_joints = self._motion.tools_at(at, others) if others else {}
         velocity, twists = targets.joint_velocity, targets.tool_twist_in_world
         if self._payload.has_mass:
-            twists = self._without_drift(state, twists)
+            twists = self._motion.without_drift(state.q, state.v, twists)
         if any(_moves(twist) for twist in twists.values()):
             velocity = self._motion.resolved(state.q, twists, velocity, self._damping)
         reference = JointReference(state.stamp_ns, joint_position, velocity)
@@ -253,16 +260,6 @@ class TrajectoryGenerator:
         if grip != self._payload.grip:
             self._payload.hold(grip)
             self._motion = self._make_motion(self._payload.robot)
-
-    def _without_drift(self, state: RobotState, twists: Mapping[str, Twist]) -> Mapping[str, Twist]:
-        """Return the twists less those that tools have by the momentum of the robot with joints at rest."""
-        drift = drift_of_base(self._payload.robot, state.q, state.v)
-        tools = self._motion.tools_at(state.q, twists)
-        carried = {arm: carried_twist(state.base_in_world, drift, tools[arm].position) for arm in twists}
-        return {
-            arm: Twist(twist.linear - carried[arm].linear, twist.angular - carried[arm].angular)
-            for arm, twist in twists.items()
-        }
 
     def _targets_of(self, stage: Stage, state: RobotState, deputy_in_world: Pose) -> Targets:
         """Return the targets of every arm at the time of a state."""
