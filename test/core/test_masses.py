@@ -1,11 +1,11 @@
-"""The runs of the page on a deputy with mass: what they change of a scenario, and what the page says of them."""
+"""Masses of the deputy on their page: what its runs change of a scenario, and what it says of them."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from docs.mass_runs import MASSES, SIZES, Case, Outcome, cases, grown, load_of, scenario_of, size_of
+from docs.mass_runs import MASSES, SIZES, Case, Load, Outcome, cases, grown, load_of, scenario_of, size_of
 from docs.masses import page
 from sms_handover.model.poses import pose_distance, pose_of, se3_of
 from sms_handover.simulation.scenario import load_scenario
@@ -38,13 +38,11 @@ def test_what_is_believed_is_of_the_model_alone(belief: str, factor: float) -> N
 
 
 def test_a_wrist_feels_a_mass_most_of_all() -> None:
-    """About the axis of its last joint a mass off by a lever adds m r^2 + I_zz to a gripper, whatever else moves."""
+    """About the axis of its last joint the deputy adds m r^2 + I_zz to what a gripper has; the link adds some."""
     load, deputy = load_of(1.0), load_scenario("paper", {"deputy.mass": 1.0}).truth.schedule.deputy
     assert deputy.body is not None
-    (x, y, z) = deputy.grasp_frames["end_a"].position
-    gripper = (
-        0.5 * 0.6451 * 0.05**2
-    )  # kg m^2, a cylinder about its axis; the last link adds as much again at most
+    _, y, z = deputy.grasp_frames["end_a"].position
+    gripper = 0.5 * 0.6451 * 0.05**2  # kg m^2, a cylinder about its axis
     added = (deputy.size[1] ** 2 + deputy.size[2] ** 2) / 12.0 + y**2 + z**2
     assert 0.5 < load.growth / (1.0 + added / gripper) < 1.0
     assert load.decay == pytest.approx(2.0 * load.growth / 1.25)  # A_2 = 5 / (2 T_r), T_r = 2 s
@@ -52,7 +50,7 @@ def test_a_wrist_feels_a_mass_most_of_all() -> None:
 
 def test_the_page_has_every_case_and_keeps_what_was_run(tmp_path: Path) -> None:
     done = dict.fromkeys(cases(), Outcome("completes", (0.001, 0.002), 3.0, 1.5))
-    text = page(done)
+    text = page(done, {1.0: Load(1.0, 25.0, 40.0)})
     for mass in MASSES:
         assert f"| {mass:g} | {size_of(mass)} | known | completes | 0.001, 0.002 | 3.0 | 1.50 |" in text
     first = cases()[0]
