@@ -38,7 +38,7 @@ def test_what_is_believed_is_of_the_model_alone(belief: str, factor: float) -> N
 
 
 def test_a_wrist_feels_a_mass_most_of_all() -> None:
-    """About the axis of its last joint the deputy adds m r^2 + I_zz to what a gripper has; the link adds some."""
+    """About the axis of its last joint the deputy adds m r^2 + I_zz to the gripper; the link adds some."""
     load, deputy = load_of(1.0), load_scenario("paper", {"deputy.mass": 1.0}).truth.schedule.deputy
     assert deputy.body is not None
     _, y, z = deputy.grasp_frames["end_a"].position
