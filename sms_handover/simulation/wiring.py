@@ -18,6 +18,7 @@ from sms_handover.control.law import LawSetup, Need
 from sms_handover.control.parameters import ControllerParameters, gains_of
 from sms_handover.control.protocol import CheckedController, Controller
 from sms_handover.control.registry import SHIPPED, law_named, require_law
+from sms_handover.control.stability import check_stability
 from sms_handover.errors import ConfigurationError, ScheduleError
 from sms_handover.ik.levenberg_marquardt import FindJoints, find_joints
 from sms_handover.ik.parameters import IkParameters
@@ -31,7 +32,6 @@ from sms_handover.plant.parameters import PlantParameters
 from sms_handover.simulation.near_pairs import NearPairs
 from sms_handover.simulation.parameters import COMPILED, CommonParameters
 from sms_handover.simulation.period_runner import PeriodRunner, PythonRunner
-from sms_handover.simulation.stability import check_stability_by_phase
 from sms_handover.trajectory.generator import TrajectoryGenerator
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.preview import TargetPreview
@@ -137,8 +137,7 @@ def make_controller(
     if missing:
         raise ConfigurationError(f"control law {law.name!r} needs {missing[0]}, which the loop has not")
     start = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
-    places = [(start, "at the start configuration")] * len(gains)
-    check_stability_by_phase(law, robot, schedule, gains, ns_to_seconds(common.tick_ns), places)
+    check_stability(law, robot, gains, ns_to_seconds(common.tick_ns), start)  # nothing is carried there
     computed_torque = CompiledComputedTorque if common.dynamics == COMPILED else ComputedTorque
     longest_ns = longest_reference_ns(common, parameters)
     preview = TargetPreview(robot, schedule) if Need.PREVIEW in law.needs else None
