@@ -17,7 +17,7 @@ from sms_handover.control.law import LawSetup, Need
 from sms_handover.control.parameters import ControllerParameters, gains_of
 from sms_handover.control.protocol import CheckedController, Controller
 from sms_handover.control.registry import SHIPPED, law_named, require_law
-from sms_handover.errors import ConfigurationError, ScheduleError
+from sms_handover.errors import ScheduleError
 from sms_handover.ik.levenberg_marquardt import FindJoints, find_joints
 from sms_handover.ik.parameters import IkParameters
 from sms_handover.model.robot_model import RobotModel
@@ -124,10 +124,6 @@ def make_controller(
     The efforts of a law of another package are checked. Raises ConfigurationError.
     """
     law, gains = law_named(parameters.law), gains_by_phase(schedule, parameters)
-    have = {Need.TOOL_TARGETS, Need.PREVIEW, Need.CLEARANCE, Need.PAYLOAD}
-    missing = sorted(need.value for need in law.needs - have)
-    if missing:
-        raise ConfigurationError(f"control law {law.name!r} needs {missing[0]}, which the loop has not")
     start = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
     places = [(start, "at the start configuration")] * len(gains)
     check_stability_by_phase(law, robot, schedule, gains, ns_to_seconds(common.tick_ns), places)
