@@ -28,9 +28,10 @@ class RunData:
     in axes of the deputy; momentum (M, 3) of robot and deputy in ``world`` axes, the angular one about the
     common centre of mass; ``kinetic_energy`` (M,) J, which grows by ``work`` of the joint efforts and
     ``external_work`` of wrenches from outside, less ``lost`` to heat, each (M,) J since the start;
-    ``ik_status`` (M,) the number of the IkStatus message, -1 where none was asked. Bags of older versions
-    have no deputy twist (NaN), and their work is less what joint stops have taken. ``plans`` has the reports
-    of a predictive law, one per solve.
+    ``linear_impulse`` (M, 3) N s and ``angular_impulse`` (M, 3) N m s are what those have added to the
+    momenta, 0 where there were none; ``ik_status`` (M,) the number of the IkStatus message, -1 where none was
+    asked. Bags of older versions have no deputy twist (NaN), and their work is less what joint stops have
+    taken. ``plans`` has the reports of a predictive law, one per solve.
     """
 
     joint_names: tuple[str, ...]
@@ -55,6 +56,8 @@ class RunData:
     work: Array
     external_work: Array
     lost: Array
+    linear_impulse: Array
+    angular_impulse: Array
     ik_status: npt.NDArray[np.int64]
     phases: tuple[TaskPhase, ...]
     grasp_events: tuple[GraspEvent, ...]

@@ -39,7 +39,17 @@ KEYS = {
     "zstandard": "mcap-ros2-support",
 }
 # Extras that a user installs with pip: rosdep has no key for them.
-BY_PIP_ONLY = {"casadi", "pandas", "playwright", "plotly", "pyarrow"}
+BY_PIP_ONLY = {
+    "SALib",
+    "casadi",
+    "distributed",
+    "pandas",
+    "playwright",
+    "plotly",
+    "pyarrow",
+    "scipy",
+    "statsmodels",
+}
 ROS_PACKAGE = re.compile(r"rclpy|rosidl_\w+|ament_index_python|tf2_\w+|\w+_(msgs|srvs|interfaces)")
 
 
@@ -64,7 +74,8 @@ OUTSIDE = sorted(set(imported_modules()) - {"sms_handover"} - set(sys.stdlib_mod
 
 def test_every_file_names_the_same_version() -> None:
     assert declared_version(ROOT / "package.xml") == sms_handover.__version__
-    assert declared_version(ROOT / "interfaces" / "package.xml") == sms_handover.__version__
+    for folder in ("interfaces", "interfaces_tf2"):
+        assert declared_version(ROOT / folder / "package.xml") == sms_handover.__version__
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert citation["version"] == sms_handover.__version__
 
@@ -141,7 +152,7 @@ def test_the_lowest_versions_are_those_that_are_declared() -> None:
     lowest = dict(line.split("==") for line in lines if not line.startswith("#"))
     users = {
         name: bound
-        for extra in ("", "analysis", "compiled", "matlab", "pandas", "parquet")
+        for extra in ("", "analysis", "campaign", "compiled", "matlab", "pandas", "parquet")
         for name, bound in bounds[extra].items()
     }
     assert users.keys() <= lowest.keys()

@@ -1,5 +1,6 @@
 """Equality of two runs, bit for bit."""
 
+import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -45,6 +46,18 @@ def compare_runs(a: RunData, b: RunData) -> tuple[Difference, ...]:
     depend on what strangers sent.
     """
     return tuple(_differences(a, b))
+
+
+def run_digest(run: RunData) -> str:
+    """Return SHA-256 of all that :func:`compare_runs` compares, as hexadecimal digits."""
+    digest = hashlib.sha256()
+    for item in fields(RunData):
+        value = _compared(run, item.name)
+        if isinstance(value, Mapping):
+            value = [(arm, value[arm].tobytes()) for arm in sorted(value)]
+        parts = value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode()
+        digest.update(item.name.encode() + parts)
+    return digest.hexdigest()
 
 
 def before(run: RunData, end_ns: int) -> RunData:

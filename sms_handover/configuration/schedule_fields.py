@@ -31,8 +31,11 @@ DEPUTY_FIELDS = MappingSpec(
         "com": COM,
         "inertia": BOX_OR_MOMENTS,
         "twist_in_world": MappingSpec(
-            "twist of its origin at 0 s, in axes of world; by default it is at rest",
-            {"linear": vector(3, "velocity", "m/s"), "angular": vector(3, "angular velocity", "rad/s")},
+            "twist of its origin at 0 s, in axes of world; what is not given of it is zero",
+            optional={
+                "linear": vector(3, "velocity", "m/s"),
+                "angular": vector(3, "angular velocity", "rad/s"),
+            },
         ),
     },
 )

@@ -83,8 +83,9 @@ def _moments(section: Section, mass: float, size: Floats) -> Floats:
 
 
 def _read_twist(section: Section) -> Twist:
-    """Return the initial twist; at rest where the section says nothing of it."""
+    """Return the initial twist; zero where the section says nothing of it."""
     if "twist_in_world" not in section:
         return _AT_REST
     twist = section.section("twist_in_world")
-    return Twist(np.array(twist.vector("linear")), np.array(twist.vector("angular")))
+    linear, angular = (twist.vector(part) if part in twist else np.zeros(3) for part in ("linear", "angular"))
+    return Twist(np.array(linear), np.array(angular))

@@ -126,10 +126,10 @@ class MasslessDeputy:
 
     def twist_relative_to(self, tool_in_world: Pose, tool_twist_in_world: Twist) -> tuple[float, ...]:
         """Return its twist (6 numbers) relative to a hand, about its origin in ``world`` axes."""
-        lever = self._pose().translation - tool_in_world.position
-        hand = tool_twist_in_world.linear + _cross(tool_twist_in_world.angular, lever)
-        angular = self._twist.angular - tool_twist_in_world.angular
-        return (*(self._twist.linear - hand).tolist(), *angular.tolist())
+        hand, lever = tool_twist_in_world, self._pose().translation - tool_in_world.position
+        linear = self._twist.linear - (hand.linear + _cross(hand.angular, lever))
+        angular = self._twist.angular - hand.angular
+        return (*linear.tolist(), *angular.tolist())
 
     def attach(self, arm: str, tool_in_world: Pose) -> None:
         """Attach the deputy to a tool at their present relative pose."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from sms_handover.clearance.monitor import PeriodClearance
-from sms_handover.compiled.periods import CompiledPeriods
+from sms_handover.compiled.periods import CompiledPeriods, Room
 from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.control.law import Need
 from sms_handover.control.plan_events import PlanEvents
@@ -22,6 +22,7 @@ from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import CONTROLLER
 from sms_handover.model.conserved import ConservedQuantities
+from sms_handover.plant.external_wrenches import ExternalAccount
 from sms_handover.simulation.quiet_periods import QuietPeriods, QuietRunner
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.snapshot import Snapshot, controller_data, restore_controller
@@ -52,7 +53,8 @@ class Period:
     """What is worked out once per reference period, at the instant at which it begins.
 
     Tool poses and targets are in ``world``; since the start the joint efforts have done ``work`` J, wrenches
-    from outside ``external_work`` J, and ``lost`` J have become heat; ``ik_status`` is None where no tool had
+    from outside ``external_work`` J, and ``lost`` J have become heat;
+    ``external_impulse`` is None where no such wrenches act; ``ik_status`` is None where no tool had
     a target. ``events`` has what came of grasp commands, ``decisions`` what was decided about the task.
     ``clearance`` is None unless it is measured online.
     """
@@ -66,6 +68,7 @@ class Period:
     work: float
     external_work: float
     lost: float
+    external_impulse: ExternalAccount | None
     ik_status: IkStatus | None
     events: tuple[GraspEvent, ...]
     decisions: tuple[RunEvent, ...]
@@ -161,7 +164,9 @@ class Loop:
         parameters, truth = self.scenario.parameters, self.scenario.truth
         robot, schedule = self.scenario.model.robot, self.scenario.model.schedule
         self._common = parameters.common
-        self._plant = make_plant(truth.robot, truth.schedule, self._common, parameters.plant)
+        self._plant = make_plant(
+            truth.robot, truth.schedule, self._common, parameters.plant, truth.conditions
+        )
         self._generator = make_generator(robot, schedule, self._common, parameters.trajectory)
         self._find_joints = make_ik(robot, self._common, parameters.ik)
         measured = self._common.measures_clearance
@@ -196,6 +201,7 @@ class Loop:
         ``seed`` is that of every random stream, by default that of the scenario, and is kept by snapshots.
         """
         self.seed = self._common.seed if seed is None else seed
+        self._plant.seed(self.seed)
         self._plant.reset()
         self._generator.reset()
         self._controller.reset()
@@ -258,10 +264,13 @@ class Loop:
             excesses[last] = excesses.get(last, ()) + plant.end_excesses()
         return rows, excesses
 
-    def advance_quietly(self) -> Ticks | QuietPeriods:
-        """Carry out as many reference periods as there are without a decision, or the next one."""
+    def advance_quietly(self, room: Room | None = None) -> Ticks | QuietPeriods:
+        """Carry out as many reference periods as there are without a decision, or the next one.
+
+        The rows of quiet periods may be in the ``room`` for them that is returned for a number of ticks.
+        """
         if self._quiet and not self.finished and self._plant.tick % self._per_reference == 0:
-            quiet = self._quiet.run(self._guidance, self.last_tick)
+            quiet = self._quiet.run(self._guidance, self.last_tick, room)
             if quiet:
                 for self._guidance in quiet.guidance:
                     self._controller.guide(self._guidance)
@@ -286,6 +295,7 @@ class Loop:
         Under another law than that of the snapshot the controller begins here, with the guidance in force.
         Raises ConfigurationError if the snapshot is of another robot or schedule.
         """
+        self._plant.seed(snapshot.seed)
         self._plant.restore(snapshot.plant)
         self._generator.restore(snapshot.trajectory)
         if self._monitor and snapshot.clearance:
@@ -338,6 +348,7 @@ class Loop:
             plant.work,
             plant.external_work,
             plant.losses,
+            plant.external_impulse,
             status,
             events,
             decisions,

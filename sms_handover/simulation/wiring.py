@@ -12,6 +12,7 @@ from sms_handover.compiled.inverse_kinematics import CompiledIk
 from sms_handover.compiled.kinematics import CompiledKinematics
 from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.compiled.tool_motion import CompiledToolMotion
+from sms_handover.conditions.conditions import IDEAL, Conditions
 from sms_handover.control.computed_torque import ComputedTorque
 from sms_handover.control.law import LawSetup, Need
 from sms_handover.control.parameters import ControllerParameters, gains_of
@@ -22,6 +23,7 @@ from sms_handover.ik.levenberg_marquardt import FindJoints, find_joints
 from sms_handover.ik.parameters import IkParameters
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics, pinocchio_dynamics
+from sms_handover.plant.effects import PlantEffects
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
 from sms_handover.plant.integrators import TABLEAUS, Tableau
 from sms_handover.plant.joint_limits import ENFORCE
@@ -51,7 +53,11 @@ def initial_joints(robot: RobotModel, schedule: Schedule) -> Array:
 
 
 def make_plant(
-    robot: RobotModel, schedule: Schedule, common: CommonParameters, parameters: PlantParameters
+    robot: RobotModel,
+    schedule: Schedule,
+    common: CommonParameters,
+    parameters: PlantParameters,
+    conditions: Conditions = IDEAL,
 ) -> FreeFloatingPlant:
     """Return the plant at the start of the schedule; raises ConfigurationError."""
     initial = InitialState(
@@ -64,9 +70,11 @@ def make_plant(
     )
     tableau, h = TABLEAUS[parameters.integrator], ns_to_seconds(common.tick_ns)
     _check_deputy_twist(schedule, h)
-    return FreeFloatingPlant(
-        robot, parameters, initial, common.tick_ns, make_dynamics(common.dynamics, tableau, h)
-    )
+    effects = None
+    if not conditions.ideal:
+        effects = PlantEffects(conditions, robot.n_joints, common.tick_ns, common.seed)
+    dynamics = make_dynamics(common.dynamics, tableau, h)
+    return FreeFloatingPlant(robot, parameters, initial, common.tick_ns, dynamics, effects)
 
 
 def make_dynamics(dynamics: str, tableau: Tableau, h: float) -> MakeDynamics:
@@ -159,10 +167,11 @@ def make_runner(
     """
     if common.dynamics != COMPILED:
         return PythonRunner(plant, controller)
-    if parameters.joint_limits == ENFORCE or not CompiledTicks.fits(plant, controller, known):
+    has_all = parameters.joint_limits != ENFORCE and plant.is_ideal
+    if not has_all or not CompiledTicks.fits(plant, controller, known):
         _LOG.warning(
             "ticks are carried out by Python: C has only our own laws, joints that are alike in truth and "
-            "model, and limits that are not enforced"
+            "model, limits that are not enforced, and ideal conditions"
         )
         return PythonRunner(plant, controller)
     return CompiledTicks(plant, controller, known, parameters.integrator, common.tick_ns)

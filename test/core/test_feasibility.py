@@ -14,7 +14,7 @@ from sms_handover.ik.levenberg_marquardt import solve_ik
 from sms_handover.model.poses import pose_distance, pose_row, se3_of
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.run_data import RunData
-from sms_handover.simulation import feasibility
+from sms_handover.simulation import feasibility, predicted_momentum
 from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.feasibility import PhasePrediction, check_feasibility
 from sms_handover.simulation.predicted_momentum import base_after
@@ -70,7 +70,7 @@ def test_the_centre_of_mass_stays_where_it_is(
     before = _centre(robot, base, start)
     counts, errors = [16, 32, 64], []
     for count in counts:
-        monkeypatch.setattr(feasibility, "_PATH_STEPS", count)
+        monkeypatch.setattr(predicted_momentum, "_PATH_STEPS", count)
         after = base_after(robot, base, start, end)
         errors.append(float(np.linalg.norm(_centre(robot, after, end) - before)))
     assert slope([1.0 / count for count in counts], errors) == pytest.approx(2.0, abs=0.1)

@@ -101,6 +101,19 @@ def test_compiled_dynamics(schedule: Path, simulated: dict[str, RunData], tmp_pa
     assert run.joint_velocity.tobytes() != simulated["nmpc"].joint_velocity.tobytes()
 
 
+def test_a_run_under_harsh_conditions(schedule: Path, tmp_path: Path) -> None:
+    """With noise, delay, friction, wrenches and model error: twice the run in one process, and verified."""
+    given = ("--conditions", "harsh", "-p", "seed:=4", "-p", "conditions.command.delay:=0.003")
+    values = {"common": {"schedule": str(schedule), "conditions": "harsh", "seed": 4}}
+    expected = simulate(load_scenario(values={**values, "conditions.command.delay": 0.003}))
+    assert expected.linear_impulse[-1].any() and expected.lost[-1] > 0.0
+    for name, more in (("one", ()), ("two", ("--compose",))):
+        ended = sms_handover("run", *given, *more, "--schedule", schedule, "-o", name, cwd=tmp_path)
+        assert ended.code in (0, 4), ended  # grasps may miss
+        assert_same_bits(read_run(tmp_path / name / "bag"), expected)
+    assert sms_handover("verify", tmp_path / "one" / "bag", cwd=tmp_path).code == 0
+
+
 def test_a_collision_ends_the_run_in_the_same_tick(schedule: Path, tmp_path: Path) -> None:
     """The plant measures, the trajectory gives up a period later; the bag is whole, and names the bodies.
 

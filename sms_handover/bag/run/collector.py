@@ -49,6 +49,8 @@ class RunCollector:
             topics.DEPUTY_POSE: RowCollector(7, pose_values),
             topics.LINEAR_MOMENTUM: RowCollector(3, vector_values),
             topics.ANGULAR_MOMENTUM: RowCollector(3, vector_values),
+            topics.LINEAR_IMPULSE: RowCollector(3, vector_values),
+            topics.ANGULAR_IMPULSE: RowCollector(3, vector_values),
             topics.DEPUTY_ODOMETRY: RowCollector(6, twist_values),
             topics.ENERGY: RowCollector(4, energy_values),
             topics.IK_STATUS: RowCollector(1, status_values),
@@ -98,7 +100,7 @@ class RunCollector:
         return f"{self._prefix}/{name}"
 
     def _check_types(self) -> None:
-        for topic in topics.graph_topics(self.arms, clearance=True):
+        for topic in topics.graph_topics(self.arms, clearance=True, wrenches=True):
             recorded = self._info.topics.get(self.full_name(topic.name))
             if recorded is not None and (recorded.type, recorded.encoding) != (topic.type, "cdr"):
                 raise BagError(
