@@ -17,7 +17,7 @@ from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import Array, Pose, PreviewedTargets
 
-_OF_CONTACT = 0.001  # [m] that a gripper keeps from the deputy that it may touch
+_LEAST = 0.001  # [m] that links of one arm keep, and a gripper from the deputy that it may touch
 _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
@@ -86,7 +86,8 @@ class DistanceModel:
             carrier = self._robot.pin.frames[self._robot.tool_frame_id[target.holder]].parentJoint
             if carrier in pair.joints:
                 return -np.inf
-        return _OF_CONTACT if pair.contact in target.touching else self._least
+        touches = pair.one_arm or pair.contact in target.touching
+        return _LEAST if touches else self._least
 
     def _gradient(self, pair: NearPair, index: int, target: PreviewedTargets) -> Array:
         """Return the derivative (1, 6 + n) of the distance of a pair by v."""
