@@ -20,7 +20,6 @@ from sms_handover.control.mpc.prediction import Prediction, PredictionModel
 from sms_handover.control.mpc.quadratic_program import solve
 from sms_handover.control.mpc.sensitivity import Sensitivity
 from sms_handover.control.mpc.tool_errors import ToolErrorModel
-from sms_handover.control.protocol import inner_of
 from sms_handover.errors import ConfigurationError, MissingDependencyError
 from sms_handover.graph.events import PLAN_FAILED
 from sms_handover.model.conserved import conserved_quantities
@@ -49,9 +48,8 @@ def scenario_of(name: str, seconds: float, **controller: object) -> Scenario:
 
 def controller_of(loop: Loop) -> MpcController:
     """Return the predictive controller of a loop."""
-    inner = inner_of(loop._controller)
-    assert isinstance(inner, MpcController)
-    return inner
+    assert isinstance(loop.controller, MpcController)
+    return loop.controller
 
 
 @pytest.fixture
