@@ -128,9 +128,10 @@ def main() -> None:
             question="How long does a solve of the predictive law take?",
             tables=[Table([*heading, "solve over both"], rows)],
             notes=[
-                f"Processor time of one iteration at each of the first {STATES} reference periods of scenario "
-                "`tight`, with the base's rotation limited too; the shortest of 3 counts. Derivatives are "
-                "Pinocchio's, of dynamics, tools and distances; the program is DAQP with its checks. "
+                f"Processor time of one iteration at each of the first {STATES} reference periods of "
+                "scenario `tight`, with the base's rotation limited too; the shortest of 3 counts. "
+                "Derivatives are Pinocchio's, of dynamics, tools and distances; the program is DAQP with its "
+                "checks. "
                 f"Compared: {versions(('pin', 'daqp', 'numpy'))}.",
             ],
             values=values,
