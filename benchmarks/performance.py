@@ -14,6 +14,7 @@ SCRIPTS: tuple[str, ...] = (  # in the order of the document
     "engines",
     "compiled_loop",
     "inverse_kinematics",
+    "predictive_control",
     "growth",
     "clearance",
     "startup",
