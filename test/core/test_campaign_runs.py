@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from errno import ENOSPC
 from pathlib import Path
 
@@ -15,6 +16,8 @@ import psutil
 import pytest
 
 from sms_handover.campaign.cases.case import Cases
+from sms_handover.campaign.cases.case_process import Done
+from sms_handover.campaign.cases.case_row import Beside
 from sms_handover.campaign.definition.frozen import freeze
 from sms_handover.campaign.engine.choice import workers_for
 from sms_handover.campaign.engine.dask_workers import DaskWorkers
@@ -137,6 +140,14 @@ def test_folders_of_other_campaigns_do_not_mix(tmp_path: Path) -> None:
     run_here(written(tmp_path / "b", seed=4), tmp_path / "other", program=STUB)
     with pytest.raises(ConfigurationError, match="hold different campaigns"):
         merge(tmp_path / "merged", [tmp_path / "one", tmp_path / "other"])
+    frozen, number = freeze(written(tmp_path / "a"))
+    row = next(iter(rows_of(tmp_path / "one").values()))
+    with open_campaign(tmp_path / "lies", frozen, number, Shard()) as opened:
+        opened.add(Done(replace(row, seed=row.seed + 1), Beside(0.0, 0.0, "elsewhere")))
+    with pytest.raises(
+        ConfigurationError, match="case 0 of smooth under nmpc has another row than"
+    ):
+        merge(tmp_path / "merged", [tmp_path / "one", tmp_path / "lies"])
     (tmp_path / "one" / "campaign.yaml").write_text("name: forged\n", encoding="utf-8")
     with pytest.raises(ConfigurationError, match="the frozen campaign was changed"):
         CampaignFolder(tmp_path / "one")
