@@ -31,7 +31,7 @@ _FIGURES = {  # metric: its title, and the factor from its unit
     "rate_share": ("largest share of a rate limit", 1.0),
     "time_beyond_position_limit": ("time beyond position limits [s]", 1.0),
 }
-_SHARES = (0.5, 0.95)
+_LARGE, _SMALL = (0.5, 0.95), (0.5, 0.05)  # shares of figures that are bad where large, or where small
 _MOST_CAUSES = 10
 
 
@@ -97,7 +97,7 @@ def _outcomes(folder: CampaignFolder, columns: Mapping[Group, CaseColumns]) -> s
         successes = (f"{law}: {proportion(int(one.succeeded.sum()), len(one.case))}" for law, one in laws)
         rows = []
         for metric, (title, factor) in _FIGURES.items():
-            for share in _SHARES:
+            for share in _SMALL if metric == "clearance" else _LARGE:
                 label = f"{title}, {'median' if share == 0.5 else f'{100 * share:g} %'}"
                 rows.append((label, *(_percentile(one, metric, share, factor) for _, one in laws)))
         rows.append(("CPU time of a run [s], mean", *(number(float(one.cpu.mean())) for _, one in laws)))

@@ -144,9 +144,7 @@ def test_folders_of_other_campaigns_do_not_mix(tmp_path: Path) -> None:
     row = next(iter(rows_of(tmp_path / "one").values()))
     with open_campaign(tmp_path / "lies", frozen, number, Shard()) as opened:
         opened.add(Done(replace(row, seed=row.seed + 1), Beside(0.0, 0.0, "elsewhere")))
-    with pytest.raises(
-        ConfigurationError, match="case 0 of smooth under nmpc has another row than"
-    ):
+    with pytest.raises(ConfigurationError, match="case 0 of smooth under nmpc has another row than"):
         merge(tmp_path / "merged", [tmp_path / "one", tmp_path / "lies"])
     (tmp_path / "one" / "campaign.yaml").write_text("name: forged\n", encoding="utf-8")
     with pytest.raises(ConfigurationError, match="the frozen campaign was changed"):
@@ -225,14 +223,17 @@ def test_it_stops_at_a_look_whatever_the_order(tmp_path: Path) -> None:
     assert run_here(file, tmp_path / "out", program=STUB).done == 8, "the same command has nothing to do"
 
 
-def test_ctrl_c_leaves_within_seconds_and_says_how_to_go_on(tmp_path: Path) -> None:
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_ctrl_c_leaves_within_seconds_and_says_how_to_go_on(jobs: str, tmp_path: Path) -> None:
+    """As a terminal sends it: to the driver and to every process of its group."""
     file, out = written(tmp_path, cases=1000), tmp_path / "out"
-    child = command("campaign", "run", str(file), "-o", str(out), stderr=subprocess.PIPE)
+    words = ("campaign", "run", str(file), "-o", str(out), "-j", jobs)
+    child = command(*words, stderr=subprocess.PIPE, start_new_session=True)
     with ended_at_last(child) as below:
         until(lambda: journal_lines(out) >= 1, "a row")
         below.extend(family(child.pid))
         assert below
-        child.send_signal(signal.SIGINT)
+        os.killpg(child.pid, signal.SIGINT)
         _, said = child.communicate(timeout=PATIENCE_S)
     assert child.returncode == 130 and "interrupted: the same command goes on" in said
     assert "Traceback" not in said
