@@ -1,8 +1,9 @@
-"""Build this ament_cmake package with the rosidl wheels, so that ``pip install ./interfaces`` works.
+"""Build an ament_cmake package with the rosidl wheels, so that ``pip install ./interfaces`` works.
 
 CMakeLists.txt does the work, as in any ROS workspace (colcon never reads this file). Here it installs
 into a stage folder, whose parts go where the wheels' own packages are: the Python modules into
 site-packages, the libraries into ``<environment>/lib``, the definitions into ``<environment>/share``.
+The package is the one beside this file; ``interfaces_tf2/setup.py`` runs the same text for its own.
 """
 
 import os
@@ -19,8 +20,9 @@ from xml.etree import ElementTree
 from setuptools import Distribution, setup
 from setuptools.command.build_py import build_py
 
-PACKAGE = "sms_handover_interfaces"
 SOURCE = Path(__file__).resolve().parent
+MANIFEST = ElementTree.parse(SOURCE / "package.xml")
+PACKAGE = str(MANIFEST.findtext("name"))
 DATA = (  # CMake files and shell hooks are left out: who compiles against this package builds it with colcon
     "lib/*.so",
     "share/ament_index/resource_index/packages/*",
@@ -33,7 +35,7 @@ DATA = (  # CMake files and shell hooks are left out: who compiles against this 
 
 def package_version() -> str:
     """Return the version that package.xml declares."""
-    version = ElementTree.parse(SOURCE / "package.xml").findtext("version")
+    version = MANIFEST.findtext("version")
     if version is None:
         raise SystemExit(f"{PACKAGE}: package.xml has no <version>")
     return version

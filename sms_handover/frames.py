@@ -20,6 +20,16 @@ def mount_frame(arm: str) -> str:
     return f"{arm}_mount"
 
 
+def target_frame(arm: str) -> str:
+    """Return the name of the frame that the tool frame of an arm is to reach."""
+    return f"{arm}_target"
+
+
+def grasp_frame(name: str) -> str:
+    """Return the name of a grasp frame of the deputy among the frames of a graph."""
+    return f"{DEPUTY}_{name}"
+
+
 def joint_name(arm: str, number: int) -> str:
     """Return the name of joint ``number`` of an arm, counted from 1 at the mount."""
     return f"{arm}_joint_{number}"

@@ -1,5 +1,7 @@
 """Imports point one way: edge -> simulation -> {plant, trajectory, ik, control} -> model -> foundation.
 
+``conditions`` lies between plant and model.
+
 ``compiled``, which stands in for Pinocchio in plant, ik and control, lies between simulation and those.
 
 Read from the syntax trees, so an import inside a function or for type checking alone counts too.
@@ -24,12 +26,14 @@ MIDDLE = {"plant", "trajectory", "ik", "control"}
 CORE = {
     "messages",
     "model",
+    "conditions",
     *MIDDLE,
     "clearance",
     "compiled",
     "simulation",
     "bag",
     "analysis",
+    "engines",
     "scene",
     "playback",
     "report",
@@ -47,17 +51,20 @@ ALLOWED: dict[str, set[str]] = {
     "messages": set(),
     "terminal": set(),
     "model": set(),
-    **{layer: {"model"} for layer in MIDDLE},
+    "conditions": {"model"},
+    **{layer: {"model"} for layer in MIDDLE - {"plant"}},
+    "plant": {"model", "conditions"},
     "clearance": {"model"},
     "compiled": {"model", *MIDDLE},
-    "simulation": {"model", *MIDDLE, "compiled", "clearance"},
+    "simulation": {"model", "conditions", *MIDDLE, "compiled", "clearance"},
     "bag": {"messages", "model", "simulation"},
     "analysis": {"model", "trajectory", "clearance", "simulation", "bag", "scene"},
+    "engines": {"model", "plant", "simulation", "analysis"},
     "scene": {"messages", "model", "trajectory", "clearance", "bag"},
     "playback": {"messages", "bag"},
     "export": {"messages", "model", "clearance", "bag"},
-    "report": {"plant", "clearance", "bag", "analysis", "scene"},
-    "campaign": {"model", "control", "trajectory", "simulation", "bag", "analysis", "report"},
+    "report": {"plant", "clearance", "bag", "analysis", "engines", "scene"},
+    "campaign": {"conditions", "model", "control", "trajectory", "simulation", "bag", "analysis", "report"},
     "ros": CORE,
     "nodes": CORE | {"ros"},
     "external": CORE | {"ros", "nodes"},
@@ -70,6 +77,9 @@ OPTIONAL = {
     "matplotlib": FIGURES,
     "mpl_toolkits": FIGURES,
     "casadi": "sms_handover.compiled",
+    "mujoco": "sms_handover.engines",
+    "Basilisk": "sms_handover.engines",
+    "daqp": "sms_handover.control.mpc",
     "distributed": "sms_handover.campaign.engine",
 }  # who needs them
 ROS = re.compile(r"rclpy|ament_index_python|launch(_ros)?|tf2_\w+|rosidl_\w+|\w+_(msgs|srvs|interfaces)")

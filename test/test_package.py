@@ -74,7 +74,8 @@ OUTSIDE = sorted(set(imported_modules()) - {"sms_handover"} - set(sys.stdlib_mod
 
 def test_every_file_names_the_same_version() -> None:
     assert declared_version(ROOT / "package.xml") == sms_handover.__version__
-    assert declared_version(ROOT / "interfaces" / "package.xml") == sms_handover.__version__
+    for folder in ("interfaces", "interfaces_tf2"):
+        assert declared_version(ROOT / folder / "package.xml") == sms_handover.__version__
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert citation["version"] == sms_handover.__version__
 

@@ -18,7 +18,7 @@ from .workspace import ROOT
 pytestmark = pytest.mark.linter
 
 LICENCE = "BSD-3-Clause"
-PACKAGES = (ROOT, ROOT / "interfaces", ROOT / "examples" / "my_controller")
+PACKAGES = (ROOT, ROOT / "interfaces", ROOT / "interfaces_tf2", ROOT / "examples" / "my_controller")
 XML = sorted(
     path
     for pattern in ("*.xml", "*/package.xml", "examples/*/package.xml", "config/**/*.xml")
@@ -87,6 +87,7 @@ IN_JAZZY = set(
         "sensor_msgs",
         "std_msgs",
         "std_srvs",
+        "tf2_msgs",
         "visualization_msgs",
     ]
 )

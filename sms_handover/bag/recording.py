@@ -42,7 +42,7 @@ class Recording:
         self.writer = BagWriter(folder, types=types, split=split)
         self._types = self.writer.types
         self._keeper = LedgerKeeper()
-        self._stamped: dict[str, bool] = {}
+        self._stamp_places: dict[str, int | None] = {}
         self._reports: set[str] = set()
         self._periods: dict[str, str] = {}  # [ns] as texts, by topic
         self._now_ns = 0
@@ -72,7 +72,7 @@ class Recording:
         """Open a topic; ``period_ns`` is the fixed step of its stamps, 0 if it has none."""
         self.writer.add_topic(name, type_name, qos)
         self._keeper.add_topic(name, period_ns)
-        self._stamped[name] = self._types.stamped(type_name)
+        self._stamp_places[name] = self._types.stamp_place(type_name)
         self._periods[name] = str(period_ns)
         if type_name == PUBLISHED_COUNTS and not is_refused(name):
             self._reports.add(name)
@@ -104,8 +104,9 @@ class Recording:
 
     def receive(self, topic: str, data: bytes, wall_ns: int) -> None:
         """Record the CDR bytes of one message that arrived at ``wall_ns``."""
-        if self._stamped.get(topic):
-            time_ns = run_stamp_ns(data)
+        place = self._stamp_places.get(topic)
+        if place is not None:
+            time_ns = run_stamp_ns(data, place)
             if time_ns is not None:
                 if time_ns > self._now_ns:
                     self._now_ns = time_ns
@@ -118,11 +119,6 @@ class Recording:
             with suppress(BagError):  # a broken report is in the bag, but counts nothing
                 self._keeper.report(self._types.deserialize(data, PUBLISHED_COUNTS))
 
-    def receive_at(self, topic: str, data: bytes, time_ns: int, wall_ns: int) -> None:
-        """Record one message at a given simulation time, e.g. transforms of the caller's own."""
-        self.writer.write(topic, data, time_ns, wall_ns)
-        self._keeper.receive(topic, time_ns)
-
     def close(self) -> None:
         """Write the ledger and complete the bag; a second call does nothing."""
         if self.writer.closed:
@@ -133,10 +129,10 @@ class Recording:
             self.writer.close()
 
 
-def run_stamp_ns(data: bytes) -> int | None:
-    """Return the stamp of a message in ns, None if it is broken or not one of simulation time."""
+def run_stamp_ns(data: bytes, place: int) -> int | None:
+    """Return the stamp that begins at a byte of a message in ns, None if it is broken or of no run's time."""
     try:
-        time_ns = stamp_ns(data)
+        time_ns = stamp_ns(data, place)
     except BagError:
         return None
     return time_ns if 0 <= time_ns < LONGEST_RUN_NS else None

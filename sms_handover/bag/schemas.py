@@ -9,10 +9,10 @@ from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_
 
 from sms_handover.bag.mcap.scan import Source
 from sms_handover.errors import BagError
+from sms_handover.messages.stamps import stamp_place
 
 Field = tuple[str, Any]  # name, and what it holds as rosbags describes it
 
-_TIMES = ("builtin_interfaces/msg/Time", "std_msgs/msg/Header")
 _LONGEST_REASON = 200  # characters of a parser's complaint that are shown
 _PLAIN_CDR = (b"\x00\x00", b"\x00\x01")  # representations, big and little endian
 _DELIMITER = "=" * 80  # between the definitions in a schema
@@ -50,10 +50,10 @@ class SchemaTypes:
             raise BagError(f"the schema of {schema.name} is not understood: {reason}") from error
 
     @property
-    def stamped(self) -> bool:
-        """Whether a message begins with a time."""
+    def stamp_place(self) -> int | None:
+        """The byte at which the stamp of a message begins, None if it has none in front."""
         fields = self.fields(self.name)
-        return bool(fields) and fields[0][1][1] in _TIMES
+        return stamp_place(self.name, fields[0][1][1] if fields else None)
 
     def fields(self, type_name: str) -> list[Field]:
         """Return the fields of a type of the schema."""

@@ -30,6 +30,7 @@ class Rate(Enum):
     CLOCK = "every 10 ms of simulation time"
     CHANGE = "on change, latched"
     WALL = "every second of wall time"
+    SOLVE = "every solve of a predictive law"
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,16 @@ class Topic:
     def latched(self) -> bool:
         """Whether a late subscriber still gets the last message."""
         return self.rate is Rate.CHANGE
+
+    @property
+    def is_global(self) -> bool:
+        """Whether the topic is outside the namespace of the graph, where other graphs may publish too."""
+        return self.name.startswith("/")
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether others may publish on the topic too, by the conventions of ROS."""
+        return self.is_global or self.name in (TF, TF_STATIC)
 
 
 def target_pose(arm: str) -> str:
@@ -71,8 +82,11 @@ DEPUTY_ODOMETRY = "deputy/odometry"
 CLEARANCE = "clearance"  # only where it is measured online
 LINEAR_MOMENTUM = "momentum/linear"
 ANGULAR_MOMENTUM = "momentum/angular"
+LINEAR_IMPULSE = "impulse/linear"  # of wrenches from outside, only where there are any
+ANGULAR_IMPULSE = "impulse/angular"
 ENERGY = "energy"
 IK_STATUS = "ik/status"
+MPC_STATUS = "mpc/status"  # only where the law solves a program as it goes on
 ROBOT_DESCRIPTION = "robot_description"
 DEPUTY_MARKER = "deputy/marker"
 RUN_STATE = "run/state"
@@ -83,7 +97,9 @@ RUN_RECORDED = "run/recorded"  # up to which stamp everything is in the bag
 LOOP_TIMING = "loop_timing"
 CLOCK = "/clock"
 DIAGNOSTICS = "/diagnostics"
-TF = "/tf"  # written into the bag by the recorder; tf2_msgs cannot be imported everywhere
+TF = "tf"  # relative, so that the equal frames of two graphs stay apart; without a namespace it is /tf
+TF_STATIC = "tf_static"
+TF_TYPE = "tf2_msgs/msg/TFMessage"
 
 REFUSED_TOPIC = "/refused"  # ends the topic of a bag with what others published on a topic of one node
 
@@ -96,10 +112,16 @@ def is_refused(topic: str) -> bool:
 SOLVE_IK = "solve_ik"  # service of the ik node
 
 _OURS = "sms_handover_interfaces/msg"
+RUN_STATE_TYPE = f"{_OURS}/RunState"
 
 
-def graph_topics(arms: Iterable[str], *, clearance: bool = False) -> tuple[Topic, ...]:
-    """Return every topic of the graph for a robot with these arms; ``clearance`` if it is measured online."""
+def graph_topics(
+    arms: Iterable[str], *, clearance: bool = False, wrenches: bool = False
+) -> tuple[Topic, ...]:
+    """Return every topic of the graph for a robot with these arms.
+
+    ``clearance`` if it is measured online; ``wrenches`` if conditions have some from outside.
+    """
     everyone_else = (TRAJECTORY, IK, CONTROLLER)
     pose, vector = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/Vector3Stamped"
     odometry = "nav_msgs/msg/Odometry"
@@ -119,9 +141,12 @@ def graph_topics(arms: Iterable[str], *, clearance: bool = False) -> tuple[Topic
         Topic(ANGULAR_MOMENTUM, vector, (PLANT,), (), Rate.REFERENCE),
         Topic(ENERGY, f"{_OURS}/EnergyStamped", (PLANT,), (), Rate.REFERENCE),
         Topic(IK_STATUS, f"{_OURS}/IkStatus", (TRAJECTORY,), (), Rate.REFERENCE),
+        Topic(MPC_STATUS, f"{_OURS}/MpcStatus", (CONTROLLER,), (), Rate.SOLVE),
         Topic(ROBOT_DESCRIPTION, text, (PLANT,), (), Rate.CHANGE),
+        Topic(TF, TF_TYPE, (PLANT, TRAJECTORY), (), Rate.REFERENCE),
+        Topic(TF_STATIC, TF_TYPE, (PLANT,), (), Rate.CHANGE),
         Topic(DEPUTY_MARKER, "visualization_msgs/msg/Marker", (PLANT,), (), Rate.CHANGE),
-        Topic(RUN_STATE, f"{_OURS}/RunState", (PLANT,), everyone_else, Rate.CHANGE),
+        Topic(RUN_STATE, RUN_STATE_TYPE, (PLANT,), everyone_else, Rate.CHANGE),
         Topic(RUN_READY, text, everyone_else, (PLANT,), Rate.CHANGE),
         Topic(RUN_PUBLISHED, f"{_OURS}/PublishedCounts", LOOP_NODES, (), Rate.CHANGE),
         Topic(RUN_EVENTS, f"{_OURS}/RunEvent", LOOP_NODES, (), Rate.CHANGE),
@@ -130,6 +155,10 @@ def graph_topics(arms: Iterable[str], *, clearance: bool = False) -> tuple[Topic
         Topic(CLOCK, "rosgraph_msgs/msg/Clock", (PLANT,), (), Rate.CLOCK),
         Topic(DIAGNOSTICS, "diagnostic_msgs/msg/DiagnosticArray", LOOP_NODES, (), Rate.WALL),
     ]
+    if wrenches:
+        table += [
+            Topic(name, vector, (PLANT,), (), Rate.REFERENCE) for name in (LINEAR_IMPULSE, ANGULAR_IMPULSE)
+        ]
     if clearance:
         table.append(Topic(CLEARANCE, f"{_OURS}/Clearance", (PLANT,), (TRAJECTORY,), Rate.REFERENCE))
     for arm in arms:

@@ -14,10 +14,9 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
 from sms_handover.errors import BagError
+from sms_handover.messages.stamps import stamp_place
 
 _SOURCE_PACKAGE = "sms_handover_interfaces"
-_TIME = "builtin_interfaces/msg/Time"
-_HEADER = "std_msgs/msg/Header"
 _ROS2_SYNTAX = 2
 
 
@@ -44,11 +43,11 @@ class MessageTypes:
         text, _ = self._store.generate_msgdef(type_name, ros_version=_ROS2_SYNTAX)
         return Schema(type_name, text, self._store.hash_rihs01(type_name))
 
-    def stamped(self, type_name: str) -> bool:
-        """Whether a message of this type begins with a Header or a Time."""
+    def stamp_place(self, type_name: str) -> int | None:
+        """Return the byte at which the stamp of a message of this type begins, None if it has none."""
         self.require(type_name)
         fields = self._store.fielddefs[type_name][1]
-        return bool(fields) and fields[0][1][1] in (_TIME, _HEADER)
+        return stamp_place(type_name, fields[0][1][1] if fields else None)
 
     def make(self, type_name: str, **values: Any) -> Any:
         """Return a message object of a type with all its fields given."""

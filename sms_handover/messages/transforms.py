@@ -1,4 +1,4 @@
-"""Transforms as messages of ``/tf``, for viewers that do not know the robot model."""
+"""Transforms as messages of ``/tf`` and ``/tf_static``, for viewers that do not know the robot model."""
 
 import re
 import struct
@@ -6,15 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from sms_handover.graph.topics import TF_TYPE
 from sms_handover.messages.message_types import MessageTypes
-from sms_handover.types import Pose
+from sms_handover.types import Array, Pose
 from sms_handover.units import NS_PER_S
 
 _STAMP = struct.Struct("<iI")  # seconds, nanoseconds
-_NUMBERS = struct.Struct("<7d")  # translation, rotation
 _MARK_NS = 1_234_567_890_123_456_789  # [ns] a stamp unlike any name or number of the prototype
-
-TF_TYPE = "tf2_msgs/msg/TFMessage"
+_ORIGIN = 4  # [byte] size of the encapsulation, from behind which CDR aligns
+_INT, _DOUBLE = 4, 8  # [byte]
 
 Transform = tuple[str, str, Pose]  # parent frame, child frame, pose of the child in the parent
 
@@ -36,26 +36,29 @@ def transforms_cdr(types: MessageTypes, transforms: Sequence[Transform], stamp_n
 
 
 class TransformsCodec:
-    """Packs TFMessages for one list of frames: only stamps and numbers change."""
+    """Packs TFMessages for one list of frames, (parent, child): only stamps and numbers change."""
 
     def __init__(self, types: MessageTypes, frames: Sequence[tuple[str, str]]) -> None:
         rows = np.arange(1.0, 1.0 + 7 * len(frames)).reshape(-1, 7)
         marked = [Pose(row[:3], row[3:]) for row in rows]
         named = [(parent, child, pose) for (parent, child), pose in zip(frames, marked, strict=True)]
-        self._prototype = transforms_cdr(types, named, _MARK_NS)
-        self._numbers_at = [self._prototype.index(row.tobytes()) for row in rows]
-        mark = _STAMP.pack(*divmod(_MARK_NS, NS_PER_S))
-        self._stamps_at = [m.start() for m in re.finditer(re.escape(mark), self._prototype)]
+        prototype = transforms_cdr(types, named, _MARK_NS)
+        body = prototype[_ORIGIN:]
+        self._head = prototype[:_ORIGIN]
+        self._body = np.zeros(-(-len(body) // _DOUBLE) * _DOUBLE, np.uint8)
+        self._body[: len(body)] = np.frombuffer(body, np.uint8)
+        self._size = len(body)
+        doubles_at = np.array([body.index(row.tobytes()) // _DOUBLE for row in rows])
+        self._doubles_at = doubles_at[:, np.newaxis] + np.arange(7)
+        mark = re.escape(_STAMP.pack(*divmod(_MARK_NS, NS_PER_S)))
+        self._stamps_at = np.array([found.start() // _INT for found in re.finditer(mark, body)])
 
-    def pack(self, stamp_ns: int, poses: Sequence[Pose]) -> bytes:
-        """Return the bytes of one TFMessage with the poses of all frames at one stamp."""
-        buffer = bytearray(self._prototype)
-        stamp = divmod(stamp_ns, NS_PER_S)
-        for at in self._stamps_at:
-            _STAMP.pack_into(buffer, at, *stamp)
-        for at, pose in zip(self._numbers_at, poses, strict=True):
-            _NUMBERS.pack_into(buffer, at, *pose.position, *pose.quaternion_xyzw)
-        return bytes(buffer)
+    def pack(self, stamp_ns: int, poses: Array) -> bytes:
+        """Return the bytes of one TFMessage with the poses (N, 7) of all frames at one stamp."""
+        numbers = self._body.view("<u4")
+        numbers[self._stamps_at], numbers[self._stamps_at + 1] = divmod(stamp_ns, NS_PER_S)
+        self._body.view("<f8")[self._doubles_at] = poses
+        return self._head + self._body[: self._size].tobytes()
 
 
 def _transform(types: MessageTypes, pose: Pose) -> object:

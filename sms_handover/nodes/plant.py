@@ -13,21 +13,20 @@ from std_msgs.msg import String
 
 from sms_handover.errors import MessageError, Reason
 from sms_handover.graph.topics import (
-    DEPUTY_MARKER,
     GRASP_EVENT,
     JOINT_COMMAND,
     LOOP_TIMING,
     PLANT,
     RECORDER,
-    ROBOT_DESCRIPTION,
     RUN_READY,
     RUN_RECORDED,
     RUN_STATE,
     TASK_PHASE,
 )
-from sms_handover.nodes.parts.marker import deputy_marker
 from sms_handover.nodes.parts.plant_clearance import PlantClearance
+from sms_handover.nodes.parts.plant_description import PlantDescription
 from sms_handover.nodes.parts.plant_outputs import PlantOutputs
+from sms_handover.nodes.parts.plant_transforms import PlantTransforms
 from sms_handover.nodes.parts.run_control import RunControl
 from sms_handover.nodes.parts.watchdogs import AnswerWatchdog, CommandWatchdog, lag_skipped
 from sms_handover.plant.parameters import PlantParameters
@@ -66,8 +65,7 @@ class PlantNode(GraphNode[PlantParameters]):
     def prepare(self) -> None:
         """Place robot and deputy at the start of the schedule."""
         schedule = self.schedule
-        self._plant = make_plant(self.robot, schedule, self.common, self.parameters)
-        self._deputy_size = schedule.deputy.size
+        self._plant = make_plant(self.robot, schedule, self.common, self.parameters, self.conditions)
         self._end_ns = schedule.end_ns
         self.lockstep = self.common.mode == LOCKSTEP
         self._tick_ns, self._per_reference = self.common.tick_ns, self.common.ticks_per_reference
@@ -86,6 +84,8 @@ class PlantNode(GraphNode[PlantParameters]):
         self._wait_for_others()
         self._make_endpoints()
         self._clearance = PlantClearance(self.robot, schedule, self.common, self.endpoints.publisher)
+        self._description = PlantDescription(self.robot, schedule.deputy, self.endpoints.publisher)
+        self._transforms = PlantTransforms(self.robot, self.endpoints.publisher)
         self.create_timer(_TIMING_PERIOD_S, self._publish_timing)
         if self.lockstep:
             self.create_timer(self.parameters.resend_after, self._resend)
@@ -97,7 +97,7 @@ class PlantNode(GraphNode[PlantParameters]):
             self._reconfigured, self.membership.finished = False, True
             self.restart()  # the others may still know of a run before
         elif not self.runs:
-            self._describe()
+            self._description.publish()
         self._begin_if_ready()
 
     def report(self) -> NodeReport:
@@ -160,9 +160,12 @@ class PlantNode(GraphNode[PlantParameters]):
         return self._is_recorded and next_ns - self._recorded_ns > _MOST_UNRECORDED_NS
 
     def _make_endpoints(self) -> None:
-        names = [GRASP_EVENT, ROBOT_DESCRIPTION, DEPUTY_MARKER, RUN_STATE, LOOP_TIMING]
+        names = [GRASP_EVENT, RUN_STATE, LOOP_TIMING]
         self._publish = {name: self.endpoints.publisher(name) for name in names}
-        self._outputs = PlantOutputs(self.robot, self.endpoints.publisher, lockstep=self.lockstep)
+        wrenches = bool(self.conditions.wrenches)
+        self._outputs = PlantOutputs(
+            self.robot, self.endpoints.publisher, lockstep=self.lockstep, wrenches=wrenches
+        )
         for topic, codec in ((TASK_PHASE, self._phase_codec), (JOINT_COMMAND, self._command_codec)):
             self.inputs.subscribe(topic, partial(self._on_input, topic), codec.checked)
         self.inputs.subscribe(RUN_RECORDED, self._on_recorded, stamped)
@@ -182,17 +185,12 @@ class PlantNode(GraphNode[PlantParameters]):
         if self.endpoints.unmatched or not self._waiting_for <= self.endpoints.not_publishing(RUN_READY):
             return
         if self.runs:
-            self._describe()
+            self._description.publish()
         self.runs += 1
         self.enter(self._control.first_state, "reset" if self.runs > 1 else "")
         self._publish_state()
         if self._control.finish_asked:
             self.finish("stopped on request")
-
-    def _describe(self) -> None:
-        """Publish what robot and deputy these are."""
-        self._publish[ROBOT_DESCRIPTION].publish(String(data=self.robot.urdf))
-        self._publish[DEPUTY_MARKER].publish(deputy_marker(self._deputy_size))
 
     def _wait_for_others(self) -> None:
         """Wait at the start of a run until every other node is ready."""
@@ -220,6 +218,7 @@ class PlantNode(GraphNode[PlantParameters]):
             self.events.publish_all(excesses)
         if with_reference:
             self._clearance.state_published(self._plant)
+            self._transforms.publish(self._plant)
 
     def _resend(self) -> None:
         """Publish the state of this tick again if nothing has answered it for a while (lock step).

@@ -1,6 +1,6 @@
 """Recorder node: writes every message of the graph to a bag."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -18,36 +18,30 @@ from sms_handover.bag.provenance import provenance
 from sms_handover.bag.recording import Recording
 from sms_handover.bag.run_recordings import RunRecordings
 from sms_handover.errors import BagError, ConfigurationError, MessageError, SmsHandoverError
-from sms_handover.frames import BASE, DEPUTY, WORLD
 from sms_handover.graph.topics import (
     CLOCK_PERIOD_NS,
-    DEPUTY_POSE,
     JOINT_STATES,
     PLANT,
     RECORDER,
     REFUSED_TOPIC,
     RUN_PUBLISHED,
     RUN_RECORDED,
-    SAMPLED_BASE_ODOMETRY,
-    SAMPLED_JOINT_STATES,
-    TF,
+    RUN_STATE,
+    RUN_STATE_TYPE,
     Rate,
     Topic,
 )
-from sms_handover.messages.transforms import TF_TYPE, TransformsCodec
-from sms_handover.model.link_tree import LinkTree
 from sms_handover.nodes.parts.peer_parameters import PeerParameters
 from sms_handover.ros.codecs.convert import time_message
-from sms_handover.ros.codecs.loop_messages import PoseCodec, Stamped, StateCodec, decoded, stamped, state_of
+from sms_handover.ros.codecs.loop_messages import Stamped, decoded, stamped
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.node.diagnostics import NodeReport
 from sms_handover.ros.node.graph_node import GraphNode
 from sms_handover.ros.node.message_filter import Decode, OnMessage
 from sms_handover.ros.process.main import EXIT_LOSS, EXIT_OK, EXIT_STOPPED, Stop, run_node
-from sms_handover.ros.qos import LOSSLESS, profile_of, stored, weakest
+from sms_handover.ros.qos import profile_of, stored, weakest
 from sms_handover.ros.transport.inputs import OnSerialized
 from sms_handover.ros.transport.publisher_identity import PublisherIdentity
-from sms_handover.ros.transport.stamp_sync import StampSync
 from sms_handover.simulation.parameters import LOCKSTEP
 from sms_handover.simulation.scenario import scenario_text
 
@@ -55,10 +49,8 @@ _POLL_S = 0.005  # [s] of wall time between two batches: long enough to be cheap
 _LOCKSTEP_POLL_S = 0.002  # [s] where the plant would run out of what it may be ahead, and wait
 _QUIET_S = 0.05  # [s] of wall time without a message after which nothing is on the way any more
 _DRAIN_S = 1.0  # [s] of wall time at most to wait for that
-_BEHIND = 4096  # [reference periods] by which a recorder without a processor may be behind and make up for it
 _FLUSH_NS = 15_000_000  # [ns] of simulation time after which what has come is written to the file
 _DISCOVERY_PERIOD_S = 1.0  # [s] of wall time between two polls for topics beyond the graph
-_TF_INPUTS = (SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
 
 
 class RecorderNode(GraphNode[RecorderParameters]):
@@ -86,19 +78,11 @@ class RecorderNode(GraphNode[RecorderParameters]):
             self._poll_s = _LOCKSTEP_POLL_S
         self._others = [peer for peer in self.common.peers if peer != RECORDER]
         self._peer_parameters = PeerParameters(self, self.common.peers)
-        self._state_codec = StateCodec(self.robot.joint_names, WORLD, BASE)
-        self._pose_codec = PoseCodec(WORLD)
-        self._tf: StampSync[Any] = StampSync(_BEHIND)
-        self._links = LinkTree(self.robot)
-        frames = [*self._links.frames, (WORLD, DEPUTY)]
-        self._tf_codec = TransformsCodec(self._recordings.types, frames)
         self._topics: set[str] = set()
         self._recorded = self.endpoints.publisher(RUN_RECORDED)
         self._take_over(self._recordings.current)
         for topic in self.endpoints.topics:
             self._record(topic)
-        self._recordings.add_topic(TF, TF_TYPE, (stored(LOSSLESS),), self.common.reference_ns)
-        self._topics.add(TF)
         self._recording.begin()
         if self.parameters.record_all:
             self.create_timer(_DISCOVERY_PERIOD_S, self._discover_topics)
@@ -174,7 +158,6 @@ class RecorderNode(GraphNode[RecorderParameters]):
         self._run_is_over = self._described = False
         self._counted: set[str] = set()
         self._last_message = monotonic()
-        self._tf.reset()
         self._state_ns = self._flushed_ns = 0
 
     def _close(self) -> None:
@@ -219,7 +202,8 @@ class RecorderNode(GraphNode[RecorderParameters]):
             Rate.REFERENCE: self.common.reference_ns,
             Rate.CLOCK: CLOCK_PERIOD_NS,
         }
-        evenly = self.common.mode == LOCKSTEP or topic.publishers == (PLANT,)
+        alone = len(topic.publishers) == 1
+        evenly = alone and (self.common.mode == LOCKSTEP or topic.publishers == (PLANT,))
         self._open(name, topic.type, profile, periods.get(topic.rate, 0) if evenly else 0)
         self.endpoints.subscribe_serialized(topic.name, self.inputs.loop, self._on_serialized(topic, name))
 
@@ -228,17 +212,16 @@ class RecorderNode(GraphNode[RecorderParameters]):
 
         What others than the topic's own publishers send is recorded apart.
         """
-        add_to_tf = partial(self._add_to_tf, topic.name)
         uses: dict[str, tuple[OnMessage[Any], Decode[Any]]] = {
             JOINT_STATES: (self._on_state, stamped),
             RUN_PUBLISHED: (self._on_counts, lambda data: decoded(data, PublishedCounts)),
-            SAMPLED_JOINT_STATES: (add_to_tf, self._state_codec.joints.checked),
-            SAMPLED_BASE_ODOMETRY: (add_to_tf, self._state_codec.odometry.checked),
-            DEPUTY_POSE: (add_to_tf, self._pose_codec.checked),
         }
         use = self.message_filter.wrap(topic.name, *uses[topic.name]) if topic.name in uses else None
-        identity = None if topic.name.startswith("/") else self.endpoints.identity(topic.name)
-        of_run = topic.rate is not Rate.WALL  # others go on after the run: no sign that more is to come
+        if topic.is_global:
+            return self._on_global(name, self.endpoints.own_of_global(topic.name))
+        identity = None if topic.is_shared else self.endpoints.identity(topic.name)
+        # others go on after the run: no sign that more is to come
+        of_run = topic.rate is not Rate.WALL and not topic.is_shared
 
         def on_data(data: bytes, sent_ns: int, publisher: bytes) -> None:
             if identity is not None and not self._is_own(topic, identity, publisher, data):
@@ -249,6 +232,19 @@ class RecorderNode(GraphNode[RecorderParameters]):
             self._recording.receive(name, data, sent_ns)
             if use is not None:
                 use(data, sent_ns, b"")
+
+        return on_data
+
+    def _on_global(self, name: str, identity: PublisherIdentity) -> OnSerialized:
+        """Return what records the messages of this graph's nodes on a topic that graphs have in common."""
+
+        def on_data(data: bytes, sent_ns: int, publisher: bytes) -> None:
+            if publisher not in identity.own:
+                try:
+                    identity.require(publisher)
+                except MessageError:
+                    return
+            self._recording.receive(name, data, sent_ns)
 
         return on_data
 
@@ -285,25 +281,15 @@ class RecorderNode(GraphNode[RecorderParameters]):
     def _on_counts(self, message: PublishedCounts, sent_ns: int) -> None:
         self._counted.add(message.node)
 
-    def _add_to_tf(self, topic: str, message: Stamped[Any], sent_ns: int) -> None:
-        """Keep a message, and when its companions are there too record the transforms that follow."""
-        stamp, content = message
-        if self._tf.restarts_run(stamp):
-            self._tf.reset()
-        self._tf.add(stamp, topic, content)
-        inputs = self._tf.take(stamp, _TF_INPUTS)
-        if inputs is None:
-            return
-        state = state_of(stamp, inputs[SAMPLED_JOINT_STATES], inputs[SAMPLED_BASE_ODOMETRY])
-        poses = self._links.poses(state.base_in_world, state.joint_position)
-        poses.append(inputs[DEPUTY_POSE])
-        self._recording.receive_at(TF, self._tf_codec.pack(stamp, poses), stamp, sent_ns)
-
     def _discover_topics(self) -> None:
         """Record topics beyond the graph, with the quality of service that their publishers offer."""
-        for name, type_names in self.get_topic_names_and_types():
+        found = self.get_topic_names_and_types()
+        others = other_graphs(found, self.resolve_topic_name(RUN_STATE))
+        for name, type_names in found:
+            if name in self._topics or name.startswith(others):
+                continue
             publishers = self.get_publishers_info_by_topic(name)
-            if name in self._topics or not publishers:
+            if not publishers:
                 continue
             self._topics.add(name)
             offers = [publisher.qos_profile for publisher in publishers]
@@ -319,6 +305,15 @@ class RecorderNode(GraphNode[RecorderParameters]):
     def _on_other(self, name: str, data: bytes) -> None:
         """Record one message of a topic beyond the graph, which comes by the executor."""
         self._recording.receive(name, data, time_ns())
+
+
+def other_graphs(found: Iterable[tuple[str, Sequence[str]]], own: str) -> tuple[str, ...]:
+    """Return how the topics of other graphs begin, known by their run state, which ours has as ``own``.
+
+    ``found`` are topics with their types. They go into bags of their own.
+    """
+    states = (name for name, types in found if RUN_STATE_TYPE in types and name != own)
+    return tuple(name.removesuffix(RUN_STATE) for name in states if name not in (own, f"/{RUN_STATE}"))
 
 
 def main(args: Sequence[str] | None = None) -> int:

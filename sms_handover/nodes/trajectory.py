@@ -4,11 +4,12 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import Pose as PoseMessage
 from sms_handover_interfaces.srv import SolveIK
 
 from sms_handover.errors import GraphError
-from sms_handover.frames import BASE, WORLD
+from sms_handover.frames import BASE, WORLD, target_frame
 from sms_handover.graph.topics import (
     CLEARANCE,
     DEPUTY_POSE,
@@ -19,9 +20,12 @@ from sms_handover.graph.topics import (
     SAMPLED_JOINT_STATES,
     SOLVE_IK,
     TASK_PHASE,
+    TF,
     TRAJECTORY,
     target_pose,
 )
+from sms_handover.messages.message_types import MessageTypes
+from sms_handover.messages.transforms import TransformsCodec
 from sms_handover.messages.values import time_ns
 from sms_handover.model.poses import pose_row
 from sms_handover.ros.codecs.convert import joints_in_order, set_joint_positions, set_pose
@@ -79,6 +83,8 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         self._ik_status = self.endpoints.publisher(IK_STATUS)
         self._reference = self.endpoints.publisher(JOINT_REFERENCE)
         self._targets = {arm: self.endpoints.publisher(target_pose(arm)) for arm in self.robot.arms}
+        frames = [(WORLD, target_frame(arm)) for arm in self.robot.arms]
+        self._transforms, self._frames = self.endpoints.publisher(TF), TransformsCodec(MessageTypes(), frames)
         self.inputs.subscribe(GRASP_EVENT, self._on_grasp, stamped)
         self._unmeasured_ns: int | None = None  # the stamp of the clearance that decides on the next period
         if self.common.measures_clearance:
@@ -227,9 +233,11 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         position, velocity = reference.position, reference.velocity
         packed = self._reference_codec.pack(state.stamp_ns, position=position, velocity=velocity)
         self._outputs = [(self._phase, self._phase_codec.pack(phase)), (self._reference, packed)]
-        for arm, pose in targets_in_world.items():
-            data = self._pose_codec.pack(state.stamp_ns, pose_row(pose))
-            self._outputs.append((self._targets[arm], data))
+        rows = {arm: pose_row(pose) for arm, pose in targets_in_world.items()}
+        for arm, row in rows.items():
+            self._outputs.append((self._targets[arm], self._pose_codec.pack(state.stamp_ns, row)))
+        frames = self._frames.pack(state.stamp_ns, np.array([rows[arm] for arm in self.robot.arms]))
+        self._outputs.append((self._transforms, frames))
         if self.common.measures_clearance:
             self._unmeasured_ns = state.stamp_ns
         self._publish_again()

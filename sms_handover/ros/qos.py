@@ -38,9 +38,20 @@ LATCHED = QoSProfile(
 )
 
 
+PATIENT = QoSProfile(
+    history=QoSHistoryPolicy.KEEP_LAST,
+    depth=1000,  # [messages] 20 s of reference periods in real time, more than a recorder is ever behind
+    reliability=QoSReliabilityPolicy.RELIABLE,
+    durability=QoSDurabilityPolicy.VOLATILE,
+    **_UNTIMED,
+)  # a reader of others that hangs loses messages, and holds nobody back
+
+
 def profile_of(topic: Topic) -> QoSProfile:
     """Return the profile with which a topic of the graph is published and subscribed."""
-    return LATCHED if topic.latched else LOSSLESS
+    if topic.latched:
+        return LATCHED
+    return PATIENT if topic.is_shared and not topic.is_global else LOSSLESS
 
 
 def stored(profile: QoSProfile) -> Qos:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from sms_handover.bag.info import read_info
@@ -9,7 +10,9 @@ from sms_handover.bag.ledger import Ledger, TopicLedger, ledger_table
 from sms_handover.bag.ledger_keeper import LedgerKeeper
 from sms_handover.bag.recording import PUBLISHED_COUNTS, Recording
 from sms_handover.errors import BagError
-from sms_handover.messages.transforms import TF_TYPE
+from sms_handover.graph.topics import TF_TYPE
+from sms_handover.messages.transforms import transforms_cdr
+from sms_handover.types import Pose
 
 from .bag_messages import TICK_NS, TYPES, WALL_NS, joint_state, published_counts, text
 
@@ -113,8 +116,9 @@ def test_recording_keeps_the_ledger_and_the_clock(tmp_path: Path) -> None:
         recording.receive("/text", TYPES.serialize(text("at 3 ms")), WALL_NS)
         recording.receive("/walled", TYPES.serialize(joint_state(WALL_NS)), WALL_NS)
         for tick in (0, 2):
-            empty = TYPES.serialize(TYPES.make(TF_TYPE, transforms=[]))
-            recording.receive_at("/tf", empty, tick * TICK_NS, WALL_NS)
+            moved = ("world", "deputy", Pose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])))
+            recording.receive("/tf", transforms_cdr(TYPES, [moved], tick * TICK_NS), WALL_NS)
+        recording.receive("/tf", transforms_cdr(TYPES, [], 0), WALL_NS)  # of nothing, so without a stamp
         counts = TYPES.serialize(published_counts("plant", {TOPIC: 4, "/text": 2}))
         recording.receive("/run/published", counts, WALL_NS)
         assert recording.simulation_ns == 3 * TICK_NS
@@ -124,6 +128,7 @@ def test_recording_keeps_the_ledger_and_the_clock(tmp_path: Path) -> None:
     assert (topics[TOPIC].missing, topics[TOPIC].lost) == (1, 1)
     assert (topics["/text"].received, topics["/text"].lost, topics["/text"].first_ns) == (2, 0, None)
     assert topics["/walled"].first_ns is None
-    assert (topics["/tf"].received, topics["/tf"].complete) == (2, True)
+    tf = topics["/tf"]
+    assert (tf.received, tf.first_ns, tf.last_ns, tf.complete) == (3, 0, 2 * TICK_NS, True)
     assert not info.ledger.complete
     assert (info.start_ns, info.end_ns) == (0, 3 * TICK_NS)

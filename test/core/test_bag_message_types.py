@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from sms_handover.errors import BagError
+from sms_handover.graph.topics import TF_TYPE
 from sms_handover.messages.message_types import MessageTypes, definition_roots
 from sms_handover.messages.stamps import stamp_ns
-from sms_handover.messages.transforms import TF_TYPE, transforms_cdr
+from sms_handover.messages.transforms import TransformsCodec, transforms_cdr
 from sms_handover.types import Pose
 
 from .bag_messages import OURS, TYPES, joint_state, odometry, text
@@ -99,10 +100,14 @@ def test_wrong_bytes_do_not_decode() -> None:
 
 def test_types_that_begin_with_a_time_are_told_from_others() -> None:
     stamped = ("sensor_msgs/msg/JointState", "rosgraph_msgs/msg/Clock", f"{OURS}/RunState")
-    others = ("std_msgs/msg/String", TF_TYPE, "geometry_msgs/msg/Pose", f"{OURS}/PublishedCounts")
-    assert all(TYPES.stamped(name) for name in stamped)
-    assert not any(TYPES.stamped(name) for name in others)
-    assert not TYPES.stamped("std_msgs/msg/Empty")
+    others = (
+        "std_msgs/msg/String",
+        "geometry_msgs/msg/Pose",
+        f"{OURS}/PublishedCounts",
+        "std_msgs/msg/Empty",
+    )
+    assert {TYPES.stamp_place(name) for name in stamped} == {4}
+    assert {TYPES.stamp_place(name) for name in others} == {None}
 
 
 @pytest.mark.parametrize("little_endian", [True, False])
@@ -133,3 +138,16 @@ def test_transforms_decode_to_what_was_given() -> None:
     assert (second.header.frame_id, second.child_frame_id) == ("base_link", "camera")
     assert (second.header.stamp.sec, second.header.stamp.nanosec) == (61, 5)
     assert (first.transform.translation.z, first.transform.rotation.w) == (3.0, 0.9)
+    place = TYPES.stamp_place(TF_TYPE)
+    assert place is not None and stamp_ns(data, place) == 61 * 10**9 + 5
+
+
+@pytest.mark.parametrize("count", [1, 2, 17])
+def test_transforms_packed_by_their_layout_are_those_serialized(count: int) -> None:
+    """Names of any length, so that numbers stand at every distance from the last name."""
+    frames = [("world", "x" * (length + 1)) for length in range(count)]
+    rows = np.random.default_rng(count).normal(size=(count, 7))
+    poses = [(*names, Pose(row[:3], row[3:])) for names, row in zip(frames, rows, strict=True)]
+    codec = TransformsCodec(TYPES, frames)
+    for time_ns in (0, 61 * 10**9 + 5):
+        assert codec.pack(time_ns, rows) == transforms_cdr(TYPES, poses, time_ns)

@@ -62,10 +62,14 @@ def test_every_link_is_where_the_transform_tree_puts_it(
     tree = LinkTree(robot)
     for row, stamp in enumerate(scene.stamp_ns):
         tick = int(np.flatnonzero(run.tick_ns == stamp)[0])
-        in_parent = tree.poses(pose(run.base_pose[tick]), run.joint_position[tick])
+        q = robot.configuration(pose(run.base_pose[tick]), run.joint_position[tick])
         in_world = {WORLD: se3_of(Pose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])))}
-        for (parent, link), relative in zip(tree.frames, in_parent, strict=True):
-            in_world[link] = in_world[parent] * se3_of(relative)
+        moving = zip(tree.moving, map(pose, tree.moving_in_parent(q)), strict=True)
+        rest = [*((parent, link, at) for (parent, link), at in moving), *tree.fixed]
+        while rest:  # parents before their children
+            parent, link, at = next(item for item in rest if item[0] in in_world)
+            in_world[link] = in_world[parent] * se3_of(at)
+            rest = [item for item in rest if item[1] != link]
         assert set(scene.links) == in_world.keys() - {WORLD}
         for place, link in enumerate(scene.links):
             distance, angle = pose_distance(pose(scene.link_in_world[row, place]), pose_of(in_world[link]))

@@ -60,14 +60,14 @@ class Ear:
         self._ready = self._endpoints.publisher(RUN_READY)
         self._recorded = self._endpoints.publisher(RUN_RECORDED)
         self.recorded_ns: int | None = None  # how far a recorder that does not keep up has come
-        self._types = MessageTypes()
+        self.types = MessageTypes()
         for topic in TOPICS:
             self._endpoints.subscribe(topic.name, partial(self._hear, topic.name), raw=True)
 
     def _hear(self, topic: str, data: bytes) -> None:
         """Keep a message, and tell the plant that it need not wait."""
         self.heard[topic].append(data)
-        if topic == RUN_STATE and self._types.deserialize(data, _RUN_STATE).state == RunState.WAITING:
+        if topic == RUN_STATE and self.types.deserialize(data, _RUN_STATE).state == RunState.WAITING:
             self._ready.publish(String(data=RECORDER))
         if topic == JOINT_STATES and len(data) == len(self.heard[topic][0]):
             time_ns = stamp_ns(data)
@@ -152,7 +152,8 @@ class Graph:
         heard = {name.lstrip("/"): len(messages) for name, messages in self.heard.items()}
         if not all(heard[name] >= count for name, count in published.items()):
             return False
-        of_this_run = (topic for topic in TOPICS if topic.rate in (Rate.TICK, Rate.REFERENCE))
+        each_once = (topic for topic in TOPICS if len(topic.publishers) == 1)
+        of_this_run = (topic for topic in each_once if topic.rate in (Rate.TICK, Rate.REFERENCE))
         return self.plant.runs < 2 or all(  # in a second run what was heard of the first is left aside
             self._heard_since_zero(topic.name) >= published.get(topic.name, 0) for topic in of_this_run
         )
@@ -172,7 +173,10 @@ class Graph:
 
     def stamps(self, topic: str) -> list[int]:
         """Return the stamps heard on a topic, in ns."""
-        return [stamp_ns(data) for data in self.heard[topic]]
+        kind = next(item.type for item in TOPICS if item.name == topic)
+        place = self.ear.types.stamp_place(kind)
+        assert place is not None
+        return [stamp_ns(data, place) for data in self.heard[topic]]
 
 
 class Messages:

@@ -175,7 +175,8 @@ def test_quality_of_service_is_told_as_it_is() -> None:
     assert qos_text(table[CLOCK]) == "reliable, volatile, keep all"
     assert table[RUN_STATE].rate is Rate.CHANGE
     assert qos_text(table[RUN_STATE]) == "reliable, transient local, keep last 100"
-    assert TF not in table and set(NODES) <= set(OWN_GROUPS)
+    assert qos_text(table[TF]) == "reliable, volatile, keep last 1000"
+    assert set(NODES) <= set(OWN_GROUPS)
 
 
 def test_types_are_those_that_ros_gives() -> None:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 import yaml
 from mcap.reader import make_reader
@@ -19,14 +18,11 @@ from rosbags.highlevel import AnyReader
 from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.run.reader import read_run
 from sms_handover.bag.writer import BagWriter
-from sms_handover.frames import DEPUTY, WORLD
+from sms_handover.frames import DEPUTY, target_frame
 from sms_handover.graph.topics import LOOP_NODES, NODES, Rate, graph_topics
-from sms_handover.model.poses import pose_distance, pose_of
 from sms_handover.run_data import RunData
-from sms_handover.scene.links import DescribedRobot
 from sms_handover.scene.recorded_scene import read_scene
 from sms_handover.simulation.scenario import load_scenario
-from sms_handover.types import Pose
 
 from ..core.layout_paths import (
     foxglove_paths,
@@ -35,6 +31,7 @@ from ..core.layout_paths import (
     plotjuggler_curves,
     plotjuggler_value,
 )
+from ..transforms import TransformTree, matrix_of
 from .conftest import LAWS, TICKS, Command
 from .runs import Ended, sms_handover
 
@@ -56,7 +53,7 @@ def bag(request: pytest.FixtureRequest, recorded: Recorded) -> Path:
 def expected() -> dict[str, int]:
     """Return how many messages the topics of the loop must have."""
     counts = {f"/{t.name.lstrip('/')}": COUNTS[t.rate] for t in TOPICS if t.rate in COUNTS}
-    return {**counts, "/tf": PERIODS, "/task/grasp_event": 2, "/robot_description": 1}
+    return {**counts, "/tf": 2 * PERIODS, "/tf_static": 1, "/task/grasp_event": 2, "/robot_description": 1}
 
 
 def of_expected(counts: Counter[str]) -> dict[str, int]:
@@ -72,7 +69,7 @@ def test_no_message_is_missing(bag: Path) -> None:
     for topic in TOPICS:
         account = accounts[f"/{topic.name.lstrip('/')}"]
         if topic.rate in COUNTS:
-            assert account.received == account.published == COUNTS[topic.rate], topic.name
+            assert account.received == account.published == COUNTS[topic.rate] * len(topic.publishers), topic
             assert account.missing == account.duplicates == account.out_of_order == 0, topic.name
     assert info.topics["/run/published"].message_count == len(LOOP_NODES)
 
@@ -207,19 +204,23 @@ def test_real_time_ends_and_tells_how_it_kept_time(schedule: Path, tmp_path: Pat
 
 
 def test_the_transforms_in_the_bag_put_every_link_where_the_scene_has_it(bag: Path) -> None:
-    """/tf was written while the run went on, the scene is computed anew from description and state."""
+    """/tf was published while the run went on, the scene is computed anew from description and state."""
     scene = read_scene(bag)
-    rows = {int(stamp_ns): row for row, stamp_ns in enumerate(scene.stamp_ns)}
-    seen = set()
+    trees = {int(stamp_ns): TransformTree() for stamp_ns in scene.stamp_ns}
     with AnyReader([bag]) as reader:
-        for connection, log_ns, data in reader.messages([c for c in reader.connections if c.topic == "/tf"]):
-            if log_ns in rows:
-                in_world = chained(reader.deserialize(data, connection.msgtype))
-                for place, link in enumerate(scene.links):
-                    row = scene.link_in_world[rows[log_ns], place]
-                    assert max(pose_distance(Pose(row[:3], row[3:]), in_world[link])) < 1e-9, link
-                seen.add(log_ns)
-    assert seen == set(rows)
+        for connection, log_ns, data in reader.messages(
+            [c for c in reader.connections if c.topic in ("/tf", "/tf_static")]
+        ):
+            message: Any = reader.deserialize(data, connection.msgtype)
+            fixed = connection.topic == "/tf_static"
+            for tree in trees.values() if fixed else filter(None, [trees.get(log_ns)]):
+                tree.add(message)
+    for row, tree in enumerate(trees.values()):
+        shown = dict(zip(scene.links, scene.link_in_world[row], strict=True))
+        shown[DEPUTY] = scene.deputy_in_world[row]
+        shown.update((target_frame(arm), poses[row]) for arm, poses in scene.target_in_world.items())
+        for frame, pose in shown.items():
+            assert np.abs(tree.in_world(frame) - matrix_of(pose)).max() < 1e-12, frame
 
 
 def test_the_robot_is_latched_and_every_link_has_a_transform(bag: Path) -> None:
@@ -229,8 +230,8 @@ def test_the_robot_is_latched_and_every_link_has_a_transform(bag: Path) -> None:
     messages = last_messages(bag)
     urdf = messages["/robot_description"][1].data
     assert urdf == info.urdf_text
-    children = [item.child_frame_id for item in messages["/tf"][1].transforms]
-    assert sorted(children) == sorted([*DescribedRobot(urdf).links, DEPUTY])
+    (profile,) = yaml.safe_load(info.topics["/tf_static"].qos)
+    assert (profile["durability"], profile["reliability"]) == ("transient_local", "reliable")
     scale = messages["/deputy/marker"][1].scale
     assert (scale.x, scale.y, scale.z) == tuple(yaml.safe_load(info.schedule_text or "")["deputy"]["size"])
 
@@ -248,17 +249,7 @@ def test_rerun_opens_a_bag_with_robot_and_transforms(bag: Path, tmp_path: Path) 
     convert = [rerun, "mcap", "convert", str(bag / "bag_0.mcap"), "-o", str(tmp_path / "run.rrd")]
     done = subprocess.run(convert, capture_output=True, text=True, check=True)
     listed = done.stdout + done.stderr
-    assert "/tf," in listed
+    assert "/tf," in listed and "/tf_static," in listed
     for shape in read_scene(bag).shapes:
         assert f"/visual_geometries/{shape.link}/visual_0" in listed
     subprocess.run([rerun, "rrd", "verify", str(tmp_path / "run.rrd")], check=True)
-
-
-def chained(message: Any) -> dict[str, Pose]:
-    """Return the pose in ``world`` of every frame of one message; parents stand before their children."""
-    in_world = {WORLD: pin.SE3.Identity()}
-    for item in message.transforms:
-        at, turn = item.transform.translation, item.transform.rotation
-        relative = pin.SE3(pin.Quaternion(turn.w, turn.x, turn.y, turn.z), np.array([at.x, at.y, at.z]))
-        in_world[item.child_frame_id] = in_world[item.header.frame_id] * relative
-    return {name: pose_of(pose) for name, pose in in_world.items()}

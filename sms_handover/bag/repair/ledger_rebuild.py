@@ -18,7 +18,7 @@ class LedgerRebuild:
     def __init__(self) -> None:
         self._periods: dict[str, int] = {}  # [ns] fixed steps of the stamps, by topic
         self._keeper = LedgerKeeper()
-        self._stamped: dict[str, bool] = {}
+        self._stamp_places: dict[str, int | None] = {}
         self._reports: dict[str, SchemaTypes] = {}
 
     def expect(self, periods: Mapping[str, int]) -> None:
@@ -28,28 +28,25 @@ class LedgerRebuild:
     def open(self, source: Source) -> None:
         """Open the account of a topic unless it has one."""
         name = source.topic
-        if name in self._stamped:
+        if name in self._stamp_places:
             return
         self._keeper.add_topic(name, self._periods.get(name, 0))
         try:
             types = types_of(source)
         except BagError:  # not decodable: only counted
-            self._stamped[name] = False
+            self._stamp_places[name] = None
             return
-        self._stamped[name] = types.stamped
+        self._stamp_places[name] = types.stamp_place
         if source.schema.name == PUBLISHED_COUNTS and not is_refused(name):
             self._reports[name] = types
 
     def add(self, message: ScannedMessage) -> None:
         """Count one message; the topic must be open."""
         name = message.source.topic
-        if self._stamped[name]:
-            time_ns = run_stamp_ns(message.data)
-            if time_ns is not None:
-                self._keeper.receive(name, time_ns)
-                return
-        elif self._periods.get(name):
-            self._keeper.receive(name, message.log_time_ns)  # e.g. /tf, stamped by the recorder
+        place = self._stamp_places[name]
+        time_ns = None if place is None else run_stamp_ns(message.data, place)
+        if time_ns is not None:
+            self._keeper.receive(name, time_ns)
             return
         self._keeper.receive_unstamped(name)
         if name in self._reports:

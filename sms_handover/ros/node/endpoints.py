@@ -67,6 +67,11 @@ class Endpoints:
         self._identities[name] = PublisherIdentity(self._node, full_name, self._peers, several=several)
         return self._identities[name]
 
+    def own_of_global(self, name: str) -> PublisherIdentity:
+        """Return what knows the publishers of this graph on a global topic, where others may publish too."""
+        namespace = self._node.get_namespace()
+        return PublisherIdentity(self._node, name, self._peers, several=True, namespace=namespace)
+
     @property
     def other_publishers(self) -> list[str]:
         """Which other nodes publish where one alone is to, in words."""
@@ -106,8 +111,9 @@ class Endpoints:
 
     def _missing(self, kind: str, topic: Topic, matched: int, there: _Found, nodes: set[str]) -> list[str]:
         """Return how many of the endpoints of some nodes have matched, in words, unless all have."""
-        wanted = self._wanted(topic, nodes, there)
-        found = _found(matched, there, wanted)
+        names = [self._known_as(topic, endpoint) for endpoint in there]
+        wanted = self._wanted(topic, nodes, names)
+        found = _found(matched, names, wanted)
         return [f"{found} of {len(wanted)} {kind} of {topic.name}"] if found < len(wanted) else []
 
     def not_publishing(self, name: str) -> frozenset[str]:
@@ -125,7 +131,13 @@ class Endpoints:
             for name in sorted(self.not_publishing(topic.name).intersection(topic.publishers))
         ]
 
-    def _wanted(self, topic: Topic, nodes: set[str], there: _Found) -> frozenset[str]:
+    def _known_as(self, topic: Topic, endpoint: TopicEndpointInfo) -> str:
+        """Return the name of the node of an endpoint, with its namespace if it is of another graph."""
+        if topic.is_global and endpoint.node_namespace != self._node.get_namespace():
+            return f"{endpoint.node_namespace}/{endpoint.node_name}"
+        return str(endpoint.node_name)
+
+    def _wanted(self, topic: Topic, nodes: set[str], there: Collection[str]) -> frozenset[str]:
         """Return the nodes whose endpoint on a topic has to match.
 
         They are the peers among ``nodes``; of the external ones those that are ``there``, whatever the
@@ -134,7 +146,7 @@ class Endpoints:
         wanted = self._peers.intersection(nodes)
         if not self._external:
             return wanted
-        here = {endpoint.node_name for endpoint in there}
+        here = set(there)
         if topic.rate is Rate.TICK:
             here |= wanted
         return (wanted - self._external) | (self._external & here)
@@ -155,13 +167,12 @@ class Endpoints:
         return tuple(self._topics.values())
 
 
-def _found(matched: int, there: _Found, wanted: Collection[str]) -> int:
+def _found(matched: int, names: Collection[str], wanted: Collection[str]) -> int:
     """Return how many of the wanted nodes' endpoints have surely matched.
 
     The middleware tells only how many have matched, not which; so others that are there too, such as those of
     a display, are taken to have matched before the wanted ones.
     """
-    names = [endpoint.node_name for endpoint in there]
     others = sum(name not in wanted for name in names)
     return max(0, min(len(set(names).intersection(wanted)), matched - others))
 

@@ -6,6 +6,7 @@ from typing import Generic, TypeVar
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import Executor
 
+from sms_handover.conditions.conditions import Conditions
 from sms_handover.configuration.parameters import EVERY_NODE
 from sms_handover.configuration.scenario_file import COMMON
 from sms_handover.configuration.values import MODEL, TRUTH
@@ -23,6 +24,7 @@ from sms_handover.ros.node.run_membership import RunMembership
 from sms_handover.ros.parameters import declare, named_scenario, reject_unknown
 from sms_handover.ros.process.main import EXIT_OK, WAIT_S, RunnableNode, Stop
 from sms_handover.ros.process.realtime import settle
+from sms_handover.ros.transport.spinning import spin_of
 from sms_handover.simulation.parameters import DIRECT, EXECUTOR, LOCKSTEP, CommonParameters
 from sms_handover.simulation.scenario import deputy_masses, load_world
 from sms_handover.trajectory.schedule import Schedule
@@ -119,7 +121,9 @@ class GraphNode(LifecycleNode, Generic[P]):
         self.common = self.common.for_deputies(*deputy_masses(self.common, self.scenario))
         self.robot: RobotModel = world.robot
         self.schedule: Schedule = world.schedule
-        topics = graph_topics(self.robot.arms, clearance=self.common.measures_clearance)
+        self.conditions: Conditions = world.conditions
+        clearance, wrenches = self.common.measures_clearance, bool(world.conditions.wrenches)
+        topics = graph_topics(self.robot.arms, clearance=clearance, wrenches=wrenches)
         self.endpoints = Endpoints(self, topics, self.common.peers, self.common.external)
         self.message_filter = MessageFilter(self.get_logger().warning, self._on_first_rejected)
         self.inputs.connect(self.endpoints, self.message_filter)
@@ -130,6 +134,7 @@ class GraphNode(LifecycleNode, Generic[P]):
         self.create_timer(_DIAGNOSTICS_PERIOD_S, self.publish_diagnostics)
         if self.get_name() in LOOP_NODES:  # processor and priority are for those
             settle(self.common)
+        self.inputs.loop.spin = spin_of(self.get_name(), self.common)
 
     def activate(self) -> None:
         """Take part in the run: what has waited in lock step is worked on now."""

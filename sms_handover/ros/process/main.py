@@ -24,6 +24,8 @@ from sms_handover.ros.process.launcher_process import (
 )
 from sms_handover.ros.process.launcher_watch import LauncherWatch
 from sms_handover.ros.process.network_scope import apply_network_scope
+from sms_handover.ros.process.node_parameters import in_any_namespace
+from sms_handover.ros.process.realtime import stand_back
 from sms_handover.ros.process.shared_memory_check import avoid_full_shared_memory
 from sms_handover.terminal.streams import make_streams_safe
 
@@ -119,7 +121,7 @@ def run_nodes(makes: Sequence[Callable[[], RunnableNode]], arguments: list[str],
             first.accompany(others)
         else:
             name = first.get_name()
-        os.nice(first.niceness)
+        stand_back(first.niceness)
         gc.collect()
         gc.freeze()  # objects made at the start live to the end; no collection needs to visit them again
         return first.run(executor, stop)
@@ -175,7 +177,8 @@ def _init(args: list[str]) -> None:
     if scope.is_open and LAUNCHER_PID not in os.environ:  # else the launcher has said so
         print(f"this process is {scope}", file=sys.stderr)
     try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        with in_any_namespace(args) as words:
+            rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
     except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
         reason = str(error).split(", at /", 1)[0]  # the rest is a place in the sources of rcl
         raise ConfigurationError(" ".join(reason.split())) from error

@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+from contextlib import suppress
 from pathlib import Path
 
 from sms_handover.errors import ConfigurationError
@@ -32,6 +33,13 @@ def exact_timers() -> None:
     libc = ctypes.CDLL(None, use_errno=True)
     if hasattr(libc, "prctl"):
         libc.prctl(_PR_SET_TIMERSLACK, _SLACK_NS, 0, 0, 0)
+
+
+def stand_back(niceness: int) -> None:
+    """Let others of the same priority go first, as nice(1) does: for all threads, as each has a niceness."""
+    for thread in _threads() if niceness else ():
+        with suppress(OSError):  # it has ended
+            os.setpriority(os.PRIO_PROCESS, thread, os.getpriority(os.PRIO_PROCESS, thread) + niceness)
 
 
 def _stay_on(cpu: int) -> None:

@@ -93,8 +93,7 @@ class DirectInputs(Inputs):
             executor.spin_once(timeout_sec=min(timeout_s, _IDLE_S))
             return
         else:
-            self._slept = True
-            awaited.wait(min(timeout_s, _SERVE_S))
+            self._slept = not self._take_first(awaited, now + min(timeout_s, _SERVE_S))
         self.give_turn(executor)
 
     def spin_some(self, executor: Executor) -> None:
@@ -107,6 +106,36 @@ class DirectInputs(Inputs):
         if now >= self._serve_at:
             self._serve_at = now + _SERVE_S
             executor.spin_once(timeout_sec=0.0)
+
+    def _take_first(self, awaited: "_Source", until: float) -> bool:
+        """Wait for what is awaited and hand it over before anything else; return whether any of it has come.
+
+        What the node publishes then is what another process waits for. A loop that spins goes on like this
+        until a moment of monotonic time; another looks after its other inputs first.
+        """
+        came = False
+        spin = None if self._company else self.spin  # nodes of one process would wait for themselves
+        while True:
+            if spin is None or not spin.find(awaited.take_one):
+                self._sleep(awaited, max(until - monotonic(), 0.0))
+                if not awaited.take_one():
+                    return came
+            came = True
+            self.wakes += 1
+            while self._take_awaited() and monotonic() < until:
+                pass
+            now = monotonic()
+            self._hot_until = now + _HOT_S
+            following = self._sources.get(self.awaited())
+            if spin is None or self.closed or following is None or now >= until:
+                return came
+            awaited = following
+
+    def _sleep(self, awaited: "_Source", timeout_s: float) -> None:
+        """Sleep until what is awaited comes, or what another node of this process awaits."""
+        others = [other for other in self._company if other is not self and not other.closed]
+        theirs = [source for other in others if (source := other._sources.get(other.awaited()))]
+        awaited.wait(timeout_s, theirs)
 
     def _answer_each_other(self) -> bool:
         """Hand over one message that a node cannot go on without; return whether there was one.
@@ -139,14 +168,13 @@ class _Source(ABC):
 
     def __init__(self, node: Node, entity: Any) -> None:
         """Take an entity that the node no longer knows."""
-        subscriptions, clients, services = self._counts
-        self._entity = entity
-        self._wait_set = made = rclpy_implementation.WaitSet(
-            subscriptions, 0, 0, clients, services, 0, node.context.handle
-        )
-        self._add = (
-            made.add_subscription if subscriptions else made.add_client if clients else made.add_service
-        )
+        self._node, self._entity = node, entity
+        self._wait_set: Any = None
+        self._room: tuple[int, ...] = ()  # what the wait set has been made for
+
+    @abstractmethod
+    def _add_to(self, wait_set: Any) -> None:
+        """Let a wait set wait for this too."""
 
     @abstractmethod
     def take_one(self) -> bool:
@@ -163,10 +191,18 @@ class _Source(ABC):
         """Do what is due while the inputs are closed, and return how many there were: by default, nothing."""
         return 0
 
-    def wait(self, timeout_s: float) -> None:
-        """Sleep until something comes."""
+    def wait(self, timeout_s: float, others: Sequence["_Source"] = ()) -> None:
+        """Sleep until something comes, or something of ``others``."""
+        sources = (self, *others)
+        counts = tuple(map(sum, zip(*(source._counts for source in sources), strict=True)))
+        if counts != self._room:
+            self._room, (subscriptions, clients, services) = counts, counts
+            self._wait_set = rclpy_implementation.WaitSet(
+                subscriptions, 0, 0, clients, services, 0, self._node.context.handle
+            )
         self._wait_set.clear_entities()
-        self._add(self._entity.handle)
+        for source in sources:
+            source._add_to(self._wait_set)
         self._wait_set.wait(int(timeout_s * NS_PER_S))
 
     def destroy(self) -> None:
@@ -176,6 +212,9 @@ class _Source(ABC):
 
 class _Messages(_Source):
     """The messages of a topic."""
+
+    def _add_to(self, wait_set: Any) -> None:
+        wait_set.add_subscription(self._entity.handle)
 
     def __init__(self, node: Node, subscription: Subscription, on_data: OnSerialized) -> None:
         super().__init__(node, subscription)
@@ -211,6 +250,9 @@ class _Responses(_Source):
 
     _counts = (0, 1, 0)
 
+    def _add_to(self, wait_set: Any) -> None:
+        wait_set.add_client(self._entity.handle)
+
     def __init__(self, node: Node, client: Any, on_response: Callable[[Any], None]) -> None:
         super().__init__(node, client)
         self._response = client.srv_type.Response
@@ -229,6 +271,9 @@ class _Requests(_Source):
     """The requests of a service."""
 
     _counts = (0, 0, 1)
+
+    def _add_to(self, wait_set: Any) -> None:
+        wait_set.add_service(self._entity.handle)
 
     def __init__(self, node: Node, service: Any, on_request: OnRequest) -> None:
         super().__init__(node, service)

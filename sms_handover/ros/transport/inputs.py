@@ -17,6 +17,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
+from sms_handover.ros.transport.spinning import AdaptiveSpin
+
 # CDR bytes; wall time in ns at which they were sent, else received; global identifier of their publisher,
 # b"" if not known
 OnSerialized = Callable[[bytes, int, bytes], None]
@@ -37,12 +39,14 @@ class Inputs(ABC):
     ``wakes`` counts how often something awaited has ended a sleep: a loop that is woken more than once
     per tick loses time. ``awaited`` names the topic or service without which the loop cannot go on, "" if
     there is none; the node sets it. ``identifies`` is whether the publisher of a message is known.
+    ``spin`` looks for what is awaited before the loop sleeps, None if it does not.
     """
 
     wakes: int = 0
     awaited: Callable[[], str] = staticmethod(lambda: "")
     identifies: bool = False
     closed: bool = False
+    spin: AdaptiveSpin | None = None
     drops: bool = False
 
     def close(self, *, drop: bool) -> None:

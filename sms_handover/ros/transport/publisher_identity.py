@@ -19,13 +19,25 @@ class PublisherIdentity:
     DDS-Security helps.
     """
 
-    def __init__(self, node: Node, topic: str, peers: Collection[str], *, several: bool = False) -> None:
-        """Expect the messages of a topic, by its full name, from nodes among ``peers``."""
+    def __init__(
+        self,
+        node: Node,
+        topic: str,
+        peers: Collection[str],
+        *,
+        several: bool = False,
+        namespace: str | None = None,
+    ) -> None:
+        """Expect the messages of a topic, by its full name, from nodes among ``peers``.
+
+        Where graphs have the topic in common the ``namespace`` tells their nodes apart.
+        """
         self.own: frozenset[bytes] = frozenset()  # global identifiers of the publishers that are known
         self._node = node
         self._topic = topic
         self._peers = frozenset(peers)
         self._several = several
+        self._namespace = namespace
         self._strangers: dict[bytes, str] = {}  # names by global identifier
 
     @property
@@ -61,7 +73,7 @@ class PublisherIdentity:
         for endpoint in others:
             if _identity(endpoint) == publisher:
                 name = repr(_name(endpoint))
-                if endpoint.node_name not in self._peers and endpoint.node_name != _NAMELESS:
+                if not self._is_peer(endpoint) and endpoint.node_name != _NAMELESS:
                     self._strangers[publisher] = name
                 return name
         return "that has ended"
@@ -72,12 +84,17 @@ class PublisherIdentity:
         there.sort(key=lambda endpoint: _identity(endpoint) not in self.own)
         by_node: dict[str, TopicEndpointInfo] = {}
         for endpoint in there:
-            if endpoint.node_name in self._peers:
+            if self._is_peer(endpoint):
                 by_node.setdefault(endpoint.node_name, endpoint)
         own = list(by_node.values())
         nameless = [endpoint for endpoint in there if endpoint.node_name == _NAMELESS]
         own = own + nameless if self._several else (own or nameless)[:1]
         return own, [endpoint for endpoint in there if endpoint not in own]
+
+    def _is_peer(self, endpoint: TopicEndpointInfo) -> bool:
+        """Whether an endpoint belongs to a node of the run, by its name."""
+        here = self._namespace in (None, endpoint.node_namespace)
+        return here and endpoint.node_name in self._peers
 
 
 def _identity(endpoint: TopicEndpointInfo) -> bytes:

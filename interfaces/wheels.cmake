@@ -1,0 +1,18 @@
+# The targets that message packages from wheels export name include folders of the machine that built
+# the wheels, and CMake refuses a target whose include folder is missing. A normal ROS install has none.
+function(drop_missing_include_directories)
+  get_property(imported DIRECTORY PROPERTY IMPORTED_TARGETS)
+  foreach(target IN LISTS imported)
+    if(NOT target MATCHES "__rosidl_generator_py$")
+      continue()
+    endif()
+    get_target_property(directories ${target} INTERFACE_INCLUDE_DIRECTORIES)
+    set(existing "")
+    foreach(directory IN LISTS directories)
+      if(EXISTS "${directory}")
+        list(APPEND existing "${directory}")
+      endif()
+    endforeach()
+    set_target_properties(${target} PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${existing}")
+  endforeach()
+endfunction()
