@@ -64,7 +64,7 @@ ALLOWED: dict[str, set[str]] = {
     "playback": {"messages", "bag"},
     "export": {"messages", "model", "clearance", "bag"},
     "report": {"plant", "clearance", "bag", "analysis", "engines", "scene"},
-    "campaign": {"model", "control", "trajectory", "simulation", "bag", "analysis", "report"},
+    "campaign": {"conditions", "model", "control", "trajectory", "simulation", "bag", "analysis", "report"},
     "ros": CORE,
     "nodes": CORE | {"ros"},
     "external": CORE | {"ros", "nodes"},
