@@ -127,6 +127,7 @@ def command(options: Namespace) -> int:
             nodes=here,
             elsewhere=elsewhere,
             scope=scope,
+            server=options.node_server,
         )
         where = options.output or output
         print(f"running on ROS domain {held.domain}, {scope}; output in {where}", flush=True)
