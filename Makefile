@@ -21,7 +21,7 @@ MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evi
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover figures report simulate test verify measure bench docs screenshots faults lowest cycles fuzz hostile soak reference clearance geometries scenarios lint install colcon clean
+.PHONY: help handover figures report simulate test verify measure bench docs screenshots faults lowest cycles fuzz hostile soak reference clearance geometries effects scenarios engines lint install colcon clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -91,8 +91,15 @@ clearance: install  ## simulate the shipped handover under each law and write do
 geometries: install  ## try random possible geometries of the handover under both laws, write docs/geometries.md
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m docs.geometries
 
+effects: install  ## run the smooth handover under each effect of conditions alone, write docs/conditions.md
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m docs.effects
+
 scenarios: install  ## run every shipped scenario in one process and draw it again for docs/scenarios.md
 	$(BIN)/python -m docs.scenario_pictures
+
+engines: $(VENV)-basilisk/.engines  ## replay shipped scenarios (SCENARIOS, or all) in MuJoCo and Basilisk, write docs/second_engine.md
+	OPENBLAS_NUM_THREADS=1 $(VENV)-basilisk/bin/python -m docs.second_engine $(SCENARIOS)
+	OPENBLAS_NUM_THREADS=1 $(VENV)-basilisk/bin/python -m pytest -q -p no:cacheprovider test/verification/test_second_engine.py -k basilisk
 
 reference: install  ## write the pages of docs/ that list what is in the code
 	$(BIN)/python -m docs.reference
@@ -108,7 +115,7 @@ colcon:  ## build the package as a ROS workspace does, with colcon, and list its
 	PYTHON="$(PYTHON)" .ci/colcon
 
 clean:  ## remove the environment and everything built; recordings stay
-	rm -rf $(VENV) $(LOWEST) build dist docs/api *.egg-info interfaces*/build interfaces*/*.egg-info .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) $(LOWEST) $(VENV)-basilisk build dist docs/api *.egg-info interfaces*/build interfaces*/*.egg-info .mypy_cache .pytest_cache .ruff_cache
 
 # Stamps: each holds until a file it depends on changes.
 INTERFACES := $(wildcard interfaces/*.txt interfaces/*.cmake interfaces/*.xml interfaces/*.py interfaces/*.toml) \
@@ -148,6 +155,11 @@ $(VENV)/.test: $(VENV)/.package
 
 $(VENV)/.verify: $(VENV)/.test
 	$(PIP) --editable '.[analysis,ros,test,verify]'
+	@touch $@
+
+$(VENV)-basilisk/.engines: $(METADATA)
+	$(PYTHON) -m venv $(VENV)-basilisk
+	$(VENV)-basilisk/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[basilisk,mujoco]' 'pytest>=8.4'
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.test

@@ -83,9 +83,17 @@ setup(
             "matplotlib>=3.10,<4",
             "plotly>=7,<8",  # of it only plotly.js is used
         ],
+        "campaign": [
+            "distributed>=2026.1,<2027",  # Dask's; pins dask to the same version
+            "pyarrow>=18,<27",
+            "SALib>=1.5.1,<2",
+            "scipy>=1.13,<2",
+            "statsmodels>=0.14.4,<0.16",
+        ],
         "compiled": ["casadi>=3.7,<4"],  # writes the equations of motion out as C
         "matlab": ["scipy>=1.13,<2"],
         "pandas": ["pandas>=2.2.2,<4"],
+        "mpc": ["daqp>=0.11,<0.12"],  # solves the quadratic programs of the law mpc
         "parquet": ["pyarrow>=18,<27"],
         "ros": [  # the graph over DDS; the last two are in interfaces/ and interfaces_tf2/, in no index
             "ros-jazzy-rclpy>=7.1.6,<7.2",
@@ -96,6 +104,8 @@ setup(
         ],
         "test": [
             "casadi>=3.7,<4",
+            "daqp>=0.11,<0.12",
+            "distributed>=2026.1,<2027",
             "hypothesis>=6.140,<7",  # draws the inputs of the fuzzers
             "jsonschema>=4.26,<5",  # validates files against the schemas for editors
             "mcap-ros2-support>=0.5.7,<1",
@@ -108,13 +118,15 @@ setup(
             "pytest-xdist>=3.8,<4",
             "rerun-sdk>=0.41,<0.42",  # another reader of our bags
             "ruff>=0.6",
+            "SALib>=1.5.1,<2",
             "scipy>=1.13,<2",
+            "statsmodels>=0.14.4,<0.16",
             "types-PyYAML",
             "types-setuptools",
         ],
         "verify": [  # second engines and methods; mujoco 4 needs Python 3.11
             "casadi>=3.7,<4",
-            "daqp>=0.11,<1",
+            "daqp>=0.11,<0.12",
             "mink>=1.3,<2",
             "mujoco>=4.0,<5",
         ],
@@ -124,6 +136,9 @@ setup(
             "sphinx>=9.0,<10",
             "sphinx-copybutton>=0.5.2,<0.6",
         ],
+        # second engines for verify --with; the tested ranges
+        "mujoco": ["mujoco>=4.0,<5"],  # needs Python 3.11
+        "basilisk": ["bsk>=2.12,<2.13"],  # its own pins of other packages need an environment of its own
         "bench": [  # what the benchmarks compare with, beyond verify
             "drake>=1.51,<2",
             "matplotlib>=3.10,<4",

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
+from time import process_time
 from unittest.mock import patch
 
 from benchmarks.results import Result, Table, publish, row
@@ -15,11 +16,14 @@ from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.simulation.wiring import make_ik
 from sms_handover.types import IkRequest
+from sms_handover.units import NS_PER_S
 
 SIMULATED_S = 60.0  # s of a handover
-ROUNDS = 5
+ROUNDS, _LOADED_ROUNDS = 5, 40
 RUNS = tuple((scenario, law) for scenario in ("paper", "smooth") for law in ("nmpc", "pid"))
 _TICKS, _CALLS = 20, 50  # ticks of a period, and calls of a part in a row
+_DEPUTY_KG, _HELD_S = 4.0, 21.0  # mass of the payload; a time at which it is held
+_LONG = 1000  # ticks in a row
 
 
 def compiled(name: str, law: str) -> Scenario:
@@ -50,6 +54,15 @@ def _record(loop: Loop) -> None:
     recorder.data()
 
 
+def ticks_of(mass: float) -> Callable[[], object]:
+    """Return what carries out ticks in C while the deputy is held, of this mass in kg."""
+    values = {"law": "nmpc", "common.dynamics": "compiled", "deputy.mass": mass}
+    loop = Loop(load_scenario("paper", values))
+    while loop.state.stamp_ns < _HELD_S * NS_PER_S or not loop.deputy.holder:
+        loop.advance_period()
+    return partial(loop._runner.run, _LONG, _LONG)
+
+
 def parts(scenario: Scenario) -> tuple[Timings, dict[str, int]]:
     """Return the times of parts of a period, and how often each is called in its contestant."""
     robot, parameters = scenario.model.robot, scenario.parameters
@@ -76,6 +89,7 @@ def parts(scenario: Scenario) -> tuple[Timings, dict[str, int]]:
             "momenta, energy, centre of mass": repeated(partial(kinematics.conserved, state.q, state.v)),
         },
         ROUNDS,
+        process_time,
     )
     return found, dict.fromkeys(found.seconds, _CALLS)
 
@@ -88,10 +102,14 @@ def main() -> None:
     first = compiled(*RUNS[0])
     runs["paper, nmpc: periods by Python"] = partial(by_period, first)
     runs["paper, nmpc: periods and ticks by Python"] = partial(by_tick, first)
-    times = interleaved(runs, ROUNDS)
+    times = interleaved(runs, ROUNDS, process_time)
+    payloads = {name: ticks_of(mass) for name, mass in (("none", 0.0), (f"{_DEPUTY_KG:g} kg", _DEPUTY_KG))}
+    ticks = interleaved(payloads, _LOADED_ROUNDS, process_time)
     base = next(iter(runs))
     speed = {name: SIMULATED_S / times.best(name) for name in runs}
     rows = [row(name, times.best(name), speed[name], times.ratio(name, base)) for name in runs]
+    bare = next(iter(payloads))
+    loaded = [row(name, 1e6 * ticks.best(name) / _LONG, ticks.ratio(name, bare)) for name in payloads]
     split, calls = parts(first)
     cells = [row(name, 1e6 * split.best(name) / calls[name]) for name in split.seconds]
     publish(
@@ -100,14 +118,16 @@ def main() -> None:
             question="How fast is a handover in one process with compiled dynamics?",
             notes=[
                 "60 s of simulated time with everything recorded, one case on one core; loading the scenario "
-                "is not in it. All took turns; the shortest time counts. The second table has parts called "
-                "from Python one by one, so with the cost of a call; in quiet periods C calls them itself."
+                "is not in it. All took turns; the shortest processor time counts. The second table has parts "
+                "called from Python one by one, so with the cost of a call; in quiet periods C calls them "
+                "itself. The third has ticks in C while a deputy is held, under a law that knows its mass."
             ],
             tables=[
                 Table(("run", "s", "times real time", "time over the first"), rows),
                 Table(("part of a reference period", "us"), cells),
+                Table(("payload", "us per tick", "time over the first"), loaded),
             ],
-            values=speed,
+            values={**speed, "tick with payload over tick without": ticks.ratio(*reversed([*payloads]))},
         )
     )
 

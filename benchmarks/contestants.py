@@ -10,8 +10,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from benchmarks.handover_task import HandoverTask, NmpcTracker, State
-from benchmarks.mujoco_model import MujocoRobot, rotation_matrix
 from sms_handover.control.protocol import Guidance
+from sms_handover.engines.mujoco_robot import MujocoRobot, rotation_matrix
 from sms_handover.plant.integrators import Tableau
 from sms_handover.simulation.wiring import make_controller, make_dynamics, make_plant
 from sms_handover.types import BASE_NQ, BASE_NV, Array
@@ -56,7 +56,7 @@ class InMujoco:
 
     def __init__(self, task: HandoverTask, integrator: str, steps: int = 1) -> None:
         """Integrate each tick by an integrator of MuJoCo in some steps."""
-        self._robot = MujocoRobot(task.scenario.truth.robot.description)
+        self._robot = MujocoRobot.of(task.scenario.truth.robot.description)
         self._robot.model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator}")
         self._robot.model.opt.timestep = task.tick_s / steps
         self._robot.place(*task.start)

@@ -15,8 +15,8 @@ import numpy as np
 from benchmarks.contestants import InDrake, InMujoco, Ours
 from benchmarks.handover_task import Contestant, HandoverTask, State
 from benchmarks.machine import versions
-from benchmarks.mujoco_model import apart
 from benchmarks.results import DIAGRAMS, Result, Table, publish, row
+from benchmarks.states import apart
 from sms_handover.model.conserved import conserved_quantities
 from sms_handover.plant.integrators import TABLEAUS, Tableau
 from sms_handover.run_data import RunData

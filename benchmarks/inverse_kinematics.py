@@ -16,10 +16,10 @@ import pink
 import pinocchio as pin
 
 from benchmarks.machine import versions
-from benchmarks.mujoco_model import mjcf_of
 from benchmarks.results import Result, Table, publish, row
 from sms_handover.frames import tool_frame
 from sms_handover.ik.levenberg_marquardt import solve_ik
+from sms_handover.model.mjcf import to_mjcf
 from sms_handover.model.poses import se3_of
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.simulation.scenario import load_parameters
@@ -69,7 +69,7 @@ def ours(robot: RobotModel) -> Solver:
 
 def with_mink(robot: RobotModel) -> Solver:
     """Return mink's, on the robot in MuJoCo with its base fixed."""
-    model = mujoco.MjModel.from_xml_string(mjcf_of(robot.description, floating=False))
+    model = mujoco.MjModel.from_xml_string(to_mjcf(robot.urdf, floating=False))
     at, limits = mink.Configuration(model), [mink.ConfigurationLimit(model, gain=1.0)]
     tasks = {arm: mink.FrameTask(tool_frame(arm), "site", 1.0, 1.0, lm_damping=1.0) for arm in robot.arms}
 

@@ -17,8 +17,7 @@ from collections.abc import Iterable, Iterator
 from importlib import import_module
 
 from docs.tables import WRITTEN_BY, plain, table
-from sms_handover.cli import bag
-from sms_handover.cli.verbs import BAG, GROUPS, OLD_NAMES, PROGRAM
+from sms_handover.cli.verbs import FAMILIES, GROUPS, OLD_NAMES, PROGRAM
 
 _EXIT_CODES = [
     ("0", "success"),
@@ -46,7 +45,7 @@ Names of the first edition work for one more release and say what replaces them:
     ]
     for verbs in GROUPS.values():
         for verb in verbs:
-            parts += _of_bag() if verb == BAG else _command(verb, "##")
+            parts += _family(verb) if verb in FAMILIES else _command(verb, "##")
     return "\n\n".join(parts) + "\n"
 
 
@@ -58,12 +57,12 @@ def parser_of(verb: str) -> ArgumentParser:
 
 
 def _listed() -> Iterator[tuple[str, str]]:
-    """Yield a row per verb, those of ``bag`` below it."""
+    """Yield a row per verb, those that a verb has of its own below it."""
     for verbs in GROUPS.values():
         for verb, text in verbs.items():
             yield _link(verb), text
-            if verb == BAG:
-                yield from ((_link(f"{BAG} {name}"), text) for name, text in bag.COMMANDS.items())
+            _, commands = FAMILIES.get(verb, ("", {}))
+            yield from ((_link(f"{verb} {name}"), text) for name, text in commands.items())
 
 
 def _link(verb: str) -> str:
@@ -77,12 +76,13 @@ def _replaced() -> str:
     return ", ".join(f"`{' '.join(words)}` is `{OLD_NAMES[words[0]](words[1:])[0]}`" for words in old)
 
 
-def _of_bag() -> Iterator[str]:
-    """Yield the section of ``bag`` and those of its own verbs."""
-    yield f"## {PROGRAM} {BAG}"
-    yield " ".join(bag.DESCRIPTION.split())
-    for name in bag.COMMANDS:
-        yield from _command(f"{BAG} {name}", "###")
+def _family(verb: str) -> Iterator[str]:
+    """Yield the section of a verb that has verbs of its own, and theirs."""
+    description, commands = FAMILIES[verb]
+    yield f"## {PROGRAM} {verb}"
+    yield " ".join(description.split())
+    for name in commands:
+        yield from _command(f"{verb} {name}", "###")
 
 
 def _command(verb: str, level: str) -> Iterator[str]:

@@ -4,6 +4,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from sms_handover.configuration.conditions_fields import CONDITIONS_FIELDS
 from sms_handover.configuration.field_specification import (
     FLOATS,
     TEXTS,
@@ -17,7 +18,7 @@ from sms_handover.configuration.parameters import EVERY_NODE, specs_of
 from sms_handover.configuration.robot_fields import ARM_FIELDS, ROBOT_FIELDS
 from sms_handover.configuration.scenario_file import COMMON, DESCRIPTION, EXTENDS, KEYS, SHORT
 from sms_handover.configuration.schedule_fields import DEPUTY_FIELDS, SCHEDULE_FIELDS
-from sms_handover.configuration.values import DEPUTY, ROBOT, ROLES, SCHEDULE
+from sms_handover.configuration.values import CONDITIONS, DEPUTY, ROBOT, ROLES, SCHEDULE
 from sms_handover.graph.topics import CONTROLLER, LOOP_NODES, NODES
 from sms_handover.ros.reference.interfaces import COMMON_GROUP, OWN_GROUPS
 
@@ -35,6 +36,7 @@ def schemas() -> dict[str, str]:
         "robot": schema_of(ROBOT_FIELDS),
         "arm": schema_of(ARM_FIELDS),
         "schedule": schema_of(SCHEDULE_FIELDS),
+        "conditions": schema_of(CONDITIONS_FIELDS),
         "parameters": _parameter_files(),
         "scenario": _scenario(),
     }
@@ -103,7 +105,11 @@ def _section(parameters: Mapping[str, Spec]) -> Schema:
 def _scenario() -> Schema:
     """Return the schema of scenario files."""
     file = {"type": "string"}
-    definitions = {ROBOT: change_of(ROBOT_FIELDS), SCHEDULE: change_of(SCHEDULE_FIELDS)}
+    definitions = {
+        ROBOT: change_of(ROBOT_FIELDS),
+        SCHEDULE: change_of(SCHEDULE_FIELDS),
+        CONDITIONS: change_of(CONDITIONS_FIELDS),
+    }
     for change in definitions.values():
         change["anyOf"][0]["properties"][EXTENDS] = {"description": "the file that is changed", **file}
     definitions[DEPUTY] = change_of(DEPUTY_FIELDS)
@@ -116,6 +122,7 @@ def _scenario() -> Schema:
         ROBOT: {"anyOf": [file, named[ROBOT]]},
         SCHEDULE: {"anyOf": [file, named[SCHEDULE]]},
         DEPUTY: named[DEPUTY],
+        CONDITIONS: {"anyOf": [file, named[CONDITIONS]]},
         **{name: schema_of(specs_of(sections[section].cls)[name]) for name, section in SHORT.items()},
         **{role: {"type": "object", "properties": of_roles, "additionalProperties": False} for role in ROLES},
         **{section: _object(specs_of(group.cls)) for section, group in sections.items()},

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sms_handover.graph.events import RunEvent
-from sms_handover.types import GraspEvent, TaskPhase
+from sms_handover.types import GraspEvent, PlanReport, TaskPhase
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
@@ -23,13 +23,15 @@ class RunData:
     answers the state of that stamp; ``base_pose`` (N, 7) position then quaternion x y z w of
     ``base_link`` in ``world``; ``base_twist`` (N, 6) linear then angular in ``base_link`` axes.
 
-    Rows per reference period: ``reference_ns`` (M,); reference position and velocity (M, n);
-    per arm ``target_pose`` and ``tool_pose`` (M, 7) in ``world``; ``deputy_pose`` (M, 7), and
-    ``deputy_twist`` (M, 6) in axes of the deputy; momentum (M, 3) of robot and deputy in ``world`` axes, the
-    angular one about the common centre of mass; ``kinetic_energy`` (M,) J, which grows by ``work`` of the
-    joint efforts and ``external_work`` of wrenches from outside, less ``lost`` to heat, each (M,) J since the
-    start; ``ik_status`` (M,) the number of the IkStatus message, -1 where none was asked. Bags of older
-    versions have no deputy twist (NaN), and their work is less what joint stops have taken.
+    Rows per reference period: ``reference_ns`` (M,); reference position and velocity (M, n); per arm
+    ``target_pose`` and ``tool_pose`` (M, 7) in ``world``; ``deputy_pose`` (M, 7), and ``deputy_twist`` (M, 6)
+    in axes of the deputy; momentum (M, 3) of robot and deputy in ``world`` axes, the angular one about the
+    common centre of mass; ``kinetic_energy`` (M,) J, which grows by ``work`` of the joint efforts and
+    ``external_work`` of wrenches from outside, less ``lost`` to heat, each (M,) J since the start;
+    ``linear_impulse`` (M, 3) N s and ``angular_impulse`` (M, 3) N m s are what those have added to the
+    momenta, 0 where there were none; ``ik_status`` (M,) the number of the IkStatus message, -1 where none was
+    asked. Bags of older versions have no deputy twist (NaN), and their work is less what joint stops have
+    taken. ``plans`` has the reports of a predictive law, one per solve.
     """
 
     joint_names: tuple[str, ...]
@@ -54,10 +56,13 @@ class RunData:
     work: Array
     external_work: Array
     lost: Array
+    linear_impulse: Array
+    angular_impulse: Array
     ik_status: npt.NDArray[np.int64]
     phases: tuple[TaskPhase, ...]
     grasp_events: tuple[GraspEvent, ...]
     run_events: tuple[RunEvent, ...] = ()
+    plans: tuple[PlanReport, ...] = ()
 
     def __post_init__(self) -> None:
         for item in fields(self):

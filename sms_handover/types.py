@@ -343,3 +343,83 @@ class DeputyState:
     deputy_in_world: Pose
     twist_deputy_in_world: Twist
     holder: str
+
+
+@dataclass(frozen=True, eq=False)
+class PreviewedTargets:
+    """What the arms are expected to do at one instant to come, as far as the schedule tells.
+
+    ``tool_in_world`` has the target pose of every tool that leads its arm, ``tool_twist_in_world`` its twist;
+    ``joint_position`` (n,) rad and ``joint_velocity`` (n,) rad/s the desired motion of all other arms.
+    ``deputy`` is where the deputy is expected: in the tool of ``holder``, or in ``world`` while nobody holds
+    it; ``touching`` has the arms whose gripper may touch it.
+    """
+
+    tool_in_world: Mapping[str, Pose]
+    tool_twist_in_world: Mapping[str, Twist]
+    joint_position: Array
+    joint_velocity: Array
+    holder: str
+    deputy: Pose
+    touching: frozenset[str]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tool_in_world", MappingProxyType(dict(self.tool_in_world)))
+        object.__setattr__(self, "tool_twist_in_world", MappingProxyType(dict(self.tool_twist_in_world)))
+        freeze(self, "joint_position", "joint_velocity")
+
+
+@dataclass(frozen=True, eq=False)
+class PreviewState:
+    """Everything that a preview depends on: the phase as it began, the deputy, and the time law of targets.
+
+    ``start_ns`` is when the phase began, with joints (n,) rad and tools as they were. ``grasp_frame`` is
+    where ``holder`` has the deputy; ``deputy_in_world`` is where it was last.
+    """
+
+    phase: TaskPhase
+    start_ns: int
+    joints_at_start: Array
+    tools_at_start: Mapping[str, Pose]
+    holder: str
+    grasp_frame: str
+    deputy_in_world: Pose
+    time_law: str
+
+    def __post_init__(self) -> None:
+        freeze(self, "joints_at_start")
+        object.__setattr__(self, "tools_at_start", MappingProxyType(dict(self.tools_at_start)))
+
+
+class PlanStatus(Enum):
+    """What came of one solve of a predictive law; the value is what a user reads."""
+
+    SOLVED = "solved"
+    ITERATION_LIMIT = "stopped at the limit of iterations"
+    INFEASIBLE = "no plan keeps the hard limits"
+    BRAKING = "too many solves in a row gave no plan: the arms brake to rest"
+
+
+@dataclass(frozen=True)
+class PlanReport:
+    """One solve of a predictive law for the state at ``stamp_ns``.
+
+    ``plan`` is the number of the solve, ``active`` the rows of constraints that bind. ``largest_slack`` is by
+    how much the worst soft limit is exceeded, in the unit of ``largest_slack_row``. Times in s are of the
+    wall clock, ``plan_age`` is simulation time since the plan in use began; counts are since the start.
+    """
+
+    stamp_ns: int
+    plan: int
+    status: PlanStatus
+    iterations: int
+    active: tuple[str, ...]
+    largest_slack: float
+    largest_slack_row: str
+    kkt_residual: float
+    linearization_time: float
+    program_time: float
+    total_time: float
+    plan_age: float
+    late_plans: int = 0
+    reused_plans: int = 0

@@ -9,6 +9,7 @@ from .workspace import PACKAGE, ROOT
 SPELLED_OUT = {  # a line may spell out these words of file names
     "cli": "command",
     "ik": "kinematics",
+    "mpc": "predictive",
     "info": "information",
     "main": "command",
     "nmpc": "predictive",

@@ -39,7 +39,17 @@ KEYS = {
     "zstandard": "mcap-ros2-support",
 }
 # Extras that a user installs with pip: rosdep has no key for them.
-BY_PIP_ONLY = {"casadi", "pandas", "playwright", "plotly", "pyarrow"}
+BY_PIP_ONLY = {
+    "SALib",
+    "casadi",
+    "distributed",
+    "pandas",
+    "playwright",
+    "plotly",
+    "pyarrow",
+    "scipy",
+    "statsmodels",
+}
 ROS_PACKAGE = re.compile(r"rclpy|rosidl_\w+|ament_index_python|tf2_\w+|\w+_(msgs|srvs|interfaces)")
 
 
@@ -142,7 +152,7 @@ def test_the_lowest_versions_are_those_that_are_declared() -> None:
     lowest = dict(line.split("==") for line in lines if not line.startswith("#"))
     users = {
         name: bound
-        for extra in ("", "analysis", "compiled", "matlab", "pandas", "parquet")
+        for extra in ("", "analysis", "campaign", "compiled", "matlab", "pandas", "parquet")
         for name, bound in bounds[extra].items()
     }
     assert users.keys() <= lowest.keys()

@@ -20,7 +20,8 @@ class PhysicsResiduals:
     """Largest violation of each conservation law in a run.
 
     ``linear_momentum`` kg m/s and ``angular_momentum`` kg m^2/s, the latter about the centre of mass, are the
-    largest changes since the start; ``energy`` is the largest |change of kinetic energy - work + heat|,
+    largest changes since the start less what wrenches from outside have given; ``energy`` is the largest
+    |change of kinetic energy - work + heat|,
     relative to ``peak_kinetic_energy`` J, and NaN if nothing moved.
     """
 
@@ -53,8 +54,8 @@ def physics_residuals(run: RunData, phase: PhaseSpan | None = None) -> PhysicsRe
     residual = energy_residual(run).values[rows, 0]
     known = residual[~np.isnan(residual)]
     return PhysicsResiduals(
-        linear_momentum=largest(lengths(_change(run.linear_momentum)[rows])),
-        angular_momentum=largest(lengths(_change(run.angular_momentum)[rows])),
+        linear_momentum=largest(lengths(_change(run.linear_momentum - run.linear_impulse)[rows])),
+        angular_momentum=largest(lengths(_change(run.angular_momentum - run.angular_impulse)[rows])),
         energy=largest(np.abs(known - known[:1])) / peak if peak > 0.0 else nan,
         peak_kinetic_energy=peak,
     )

@@ -59,6 +59,17 @@ _LIMITS = {
     "farthest_beyond_position_limit": "how far a joint is past a limit of its position, negative inside",
     "time_beyond_position_limit": "time in which any joint is past a limit of its position",
 }
+_PLANS = {
+    "solves": "solves of the predictive law",
+    "failed_solves": "solves that gave no plan",
+    "reused_plans": "reference periods in which an older plan was carried on",
+    "late_plans": "plans that came after the period for which they were made; real time only",
+    "binding_share": "share of the solves in which a row of a constraint binds",
+    "solve_median": "median wall time of a solve: linearisation and quadratic program",
+    "solve_tail": "99th percentile of the wall time of a solve",
+    "solve_max": "largest wall time of a solve",
+    "program_median": "median wall time of the quadratic program in a solve",
+}
 _LOOP = {
     "wall_duration": "wall time from the first recorded state to the last",
     "real_time_factor": "simulated over wall time",
@@ -81,6 +92,7 @@ DEFINITIONS: Mapping[str, str] = MappingProxyType(
         **_PHYSICS,
         CLEARANCE: "least signed distance of a group of bodies; below zero they pass through each other",
         **_LIMITS,
+        **_PLANS,
         **_LOOP,
     }
 )

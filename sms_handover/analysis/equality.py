@@ -1,7 +1,8 @@
 """Equality of two runs, bit for bit."""
 
+import hashlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ _PER_TICK = (
     "base_pose",
     "base_twist",
 )
+_UNTIMED: Mapping[str, Any] = dict.fromkeys(("linearization_time", "program_time", "total_time"), 0.0)
 _PER_JOINT = (
     *("joint_position", "joint_velocity", "joint_effort", "joint_command"),
     *("reference_position", "reference_velocity"),
@@ -39,10 +41,23 @@ class Difference:
 def compare_runs(a: RunData, b: RunData) -> tuple[Difference, ...]:
     """Return the fields in which two runs differ; none if they are bit-identical (NaN equals NaN).
 
-    Of the run events only those of the trajectory are compared, because those of other nodes depend on
-    wall time too. Events of rejected messages are left out: they depend on what strangers sent.
+    The wall times of solves are left out. Of the run events only those of the trajectory are compared,
+    because those of other nodes depend on wall time too. Events of rejected messages are left out: they
+    depend on what strangers sent.
     """
     return tuple(_differences(a, b))
+
+
+def run_digest(run: RunData) -> str:
+    """Return SHA-256 of all that :func:`compare_runs` compares, as hexadecimal digits."""
+    digest = hashlib.sha256()
+    for item in fields(RunData):
+        value = _compared(run, item.name)
+        if isinstance(value, Mapping):
+            value = [(arm, value[arm].tobytes()) for arm in sorted(value)]
+        parts = value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode()
+        digest.update(item.name.encode() + parts)
+    return digest.hexdigest()
 
 
 def before(run: RunData, end_ns: int) -> RunData:
@@ -87,6 +102,8 @@ def _compared(run: RunData, name: str) -> Any:
     if name == "run_events":
         own = (event for event in run.run_events if event.node == TRAJECTORY)
         return tuple(event for event in own if event.kind != MESSAGE_REFUSED)
+    if name == "plans":
+        return tuple(replace(plan, **_UNTIMED) for plan in run.plans)
     return getattr(run, name)
 
 

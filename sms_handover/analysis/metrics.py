@@ -13,6 +13,7 @@ from sms_handover.analysis.joint_limits import LimitUse, limit_use
 from sms_handover.analysis.loop_timing import LoopTiming, loop_timing
 from sms_handover.analysis.numbers import largest
 from sms_handover.analysis.phases import PhaseSpan, phase_spans
+from sms_handover.analysis.plan_use import PlanUse, plan_use
 from sms_handover.analysis.torque import JointTorque, joint_torque
 from sms_handover.analysis.tracking import ToolTracking, tool_tracking
 from sms_handover.analysis.work import JointWork, joint_work
@@ -48,7 +49,7 @@ class RunMetrics:
     """One run: its phases in the order of time, and the figures of the whole run.
 
     ``loop`` is the timing of the run, None where it is not known; so are ``clearance`` and ``limits``
-    where it is not known what the run was made with.
+    where it is not known what the run was made with. ``plans`` is None unless its law plans.
     """
 
     run: RunData
@@ -60,6 +61,7 @@ class RunMetrics:
     loop: LoopTiming | None = None
     clearance: RunClearance | None = None
     limits: LimitUse | None = None
+    plans: PlanUse | None = None
 
     @property
     def completion(self) -> Completion:
@@ -101,6 +103,7 @@ def measure(run: RunData, loop: LoopRecord | None = None, texts: TaskTexts | Non
         ik=ik_outcomes(run),
         loop=loop_timing(loop) if loop else None,
         clearance=run_clearance(run, texts) if texts else None,
+        plans=plan_use(run),
         limits=limit_use(run, floating_model(texts.urdf)) if texts else None,
     )
 

@@ -64,6 +64,8 @@ def _of_run(comparison: Comparison, name: str, metrics: RunMetrics) -> Iterator[
             yield "", "", CLEARANCE.replace("GROUP", group.group), "m", group.least
     if metrics.limits:
         yield from _rows("", "", _LIMITS, metrics.limits)
+    if metrics.plans:
+        yield from _rows("", "", _PLANS, metrics.plans)
     if metrics.loop:
         yield from _rows("", "", _LOOP, metrics.loop)
 
@@ -145,6 +147,17 @@ _LIMITS: tuple[_Column[LimitUse], ...] = (
     ("farthest_beyond_position_limit", "rad", lambda limits: limits.position.value),
     ("time_beyond_position_limit", "s", lambda limits: limits.position.beyond),
 )
+_PLANS = _attributes(
+    solves="-",
+    failed_solves="-",
+    reused_plans="-",
+    late_plans="-",
+    binding_share="-",
+    solve_median="s",
+    solve_tail="s",
+    solve_max="s",
+    program_median="s",
+)
 _IK = _attributes("ik_{}", solves="-", failures="-", stalled="-", iteration_limit="-")
 _LOOP = _attributes(
     wall_duration="s",
@@ -159,7 +172,7 @@ _LOOP = _attributes(
     held_commands="-",
 )
 _OF_PHASES: tuple[_Column[Any], ...] = (*_TOOL, *_ORIENTATION, *_TORQUE, *_WORK, *_PHASE, *_BASE, *_DRIFT)
-_OF_RUNS: tuple[_Column[Any], ...] = (*_PHYSICS, *_IK, *_LIMITS, *_LOOP)
+_OF_RUNS: tuple[_Column[Any], ...] = (*_PHYSICS, *_IK, *_LIMITS, *_PLANS, *_LOOP)
 UNITS: Mapping[str, str] = MappingProxyType(
     {
         **{figure: unit for figure, unit, _ in (*_OF_PHASES, *_OF_RUNS)},

@@ -18,6 +18,7 @@ from sms_handover.analysis.layout import MISSING, WIDTH, Row, Section, layout, n
 from sms_handover.analysis.loop_timing import LoopTiming
 from sms_handover.analysis.metrics import PhaseMetrics, RunMetrics
 from sms_handover.analysis.numbers import largest, lengths
+from sms_handover.analysis.plan_rows import plan_sections
 from sms_handover.analysis.tracking import Motion, ToolTracking
 from sms_handover.graph.events import Severity
 from sms_handover.run_data import RunData
@@ -64,6 +65,7 @@ def figure_sections(comparison: Comparison, tolerance: Tolerance | None = None) 
         *(_phase_section(comparison, name) for name in comparison.phase_names),
         Section("Torque over the whole run, peak / RMS [N m]", _torque_rows(runs)),
         *clearance_sections(runs),
+        *plan_sections(runs),
         Section("Physics and inverse kinematics", _conservation_rows(runs)),
         *([Section("Wall clock", _loop_rows(runs))] if any(item.loop for item in runs) else []),
     )

@@ -63,6 +63,10 @@ class ClearanceModel:
             geometry.addCollisionPair(pin.CollisionPair(*pair))
         self.bodies: tuple[Body, ...] = (*robot_bodies, DEPUTY_BODY)
         self.pairs: tuple[tuple[Body, Body], ...] = tuple((self.bodies[a], self.bodies[b]) for a, b in pairs)
+        carriers = [int(item.parentJoint) for item in geometry.geometryObjects]
+        self.joints: tuple[tuple[int, int], ...] = tuple(
+            (carriers[one], carriers[other]) for one, other in pairs
+        )
         self._geometry, self._results = geometry, _results_without_memory(geometry)
         self._found = list(self._results.distanceResults)  # views: asking for them each time takes longest
 

@@ -6,6 +6,7 @@ from enum import Enum
 from math import degrees
 from pathlib import Path
 
+from sms_handover.campaign.engine.plan import plan_in_words
 from sms_handover.cli.collisions import add_dry_run_options, check_collisions
 from sms_handover.cli.columns import columns
 from sms_handover.cli.options import add_scenario_options, scenario_of
@@ -15,6 +16,7 @@ from sms_handover.model.robot_model import RobotModel
 from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.feasibility import PhasePrediction
 from sms_handover.simulation.scenario import Scenario
+from sms_handover.terminal.progress import Progress
 from sms_handover.units import ns_to_seconds
 
 _HEAD = ("phase", "ends [s]", "base rotation [deg]", "IK restarts")
@@ -28,6 +30,7 @@ class _Kind(Enum):
     SCHEDULE = "schedule"
     ROBOT = "robot"
     PARAMETERS = "parameters"
+    CAMPAIGN = "campaign"
 
 
 def add_parser(parser: ArgumentParser) -> None:
@@ -36,8 +39,8 @@ def add_parser(parser: ArgumentParser) -> None:
     parser.description = (
         "Check whether a scenario can be run: every value, every target in reach, every grasp at its frame,\n"
         "the sampled loop stable where each phase ends; then by a dry run whether bodies collide. SCENARIO\n"
-        "may also be a file with a schedule or with parameters, checked in the default scenario, or with a\n"
-        "robot."
+        "may also be a file with a schedule or with parameters, checked in the default scenario, with a\n"
+        "robot, or with a campaign, whose first case is run."
     )
     parser.epilog = (
         "Where the targets of a phase were found only after restarts, the run may end elsewhere.\n\n"
@@ -65,6 +68,8 @@ def command(options: Namespace) -> int:
         options.schedule = file
     elif file and kind is _Kind.PARAMETERS:
         options.params_file = [*options.params_file, file]
+    elif file and kind is _Kind.CAMPAIGN:
+        return _check_campaign(file, options)
     scenario = scenario_of(options, recorded=True)
     predictions = check_scenario(scenario)
     check_collisions(scenario, options)
@@ -80,6 +85,8 @@ def _kind_of(file: Path) -> _Kind:
     root = Section.read(file)
     if any("ros__parameters" in value for value in map(root.value, root.keys) if isinstance(value, dict)):
         return _Kind.PARAMETERS
+    if {"scenarios", "draws", "laws"} & set(root.keys):
+        return _Kind.CAMPAIGN
     if {"phases", "initial"} & set(root.keys):
         return _Kind.SCHEDULE
     return _Kind.ROBOT if {"base", "arms"} & set(root.keys) else _Kind.SCENARIO
@@ -96,6 +103,18 @@ def _check_robot(file: Path, options: Namespace) -> int:
     arms = "; ".join(f"{arm} with {_count(robot, arm)} joints" for arm in robot.arms)
     print(f"robot {robot.description.name}: {robot.mass:.6g} kg; {arms}")
     print(f"\nrobot {file} is complete")
+    return 0
+
+
+def _check_campaign(file: Path, options: Namespace) -> int:
+    """Check a campaign; return the exit code."""
+    given = [name for name in (*_OVER_A_SCENARIO, "robot", "schedule") if getattr(options, name)]
+    if given:
+        raise ConfigurationError(f"{file} is a campaign, which takes no options: put values into the file")
+    with Progress() as progress:
+        progress.show("running the first case of each scenario under each law")
+        text = plan_in_words(file)
+    print(f"{text}\n\ncampaign {file} can be run")
     return 0
 
 

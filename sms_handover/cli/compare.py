@@ -15,7 +15,12 @@ from sms_handover.analysis.latex import latex_table
 from sms_handover.analysis.records import Record, records_of
 from sms_handover.analysis.summary import summary
 from sms_handover.analysis.table import figure_sections, render
-from sms_handover.cli.recorded_runs import read_all
+from sms_handover.campaign.record.campaign_folder import CampaignFolder
+from sms_handover.campaign.record.cases_table import TABLE
+from sms_handover.campaign.statistics.campaign_text import campaign_text, campaign_values
+from sms_handover.campaign.statistics.case_columns import columns_of
+from sms_handover.campaign.statistics.tables import outcome_sections
+from sms_handover.cli.recorded_runs import campaign_among, read_all
 from sms_handover.cli.text_files import write_text
 from sms_handover.errors import ConfigurationError
 from sms_handover.report.recorded_run import common_tolerance, compare_recorded
@@ -29,10 +34,17 @@ def add_parser(parser: ArgumentParser) -> None:
     """Describe the command."""
     parser.description = (
         "Read bags and print what happened in each, side by side. With one run under nmpc and one under pid "
-        "the paper's claims are judged. docs/metrics.md defines every figure."
+        "the paper's claims are judged. docs/metrics.md defines every figure. Of the folder of a campaign "
+        "print its laws side by side, with intervals and paired tests."
     )
     parser.epilog = "A FILE that is - is standard output, in place of the table."
-    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="output folder of a run, or a bag")
+    parser.add_argument(
+        "runs",
+        nargs="+",
+        type=Path,
+        metavar="RUN",
+        help="output folder of a run, or a bag; or the folder of one campaign",
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures to a JSON file too")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="write them to a CSV file too, one per row")
     parser.add_argument(
@@ -49,6 +61,9 @@ def command(options: Namespace) -> int:
     printed = [name for name, path in wanted.items() if path == _STANDARD_OUTPUT]
     if len(printed) > 1:
         raise ConfigurationError(f"--{' and --'.join(printed)} cannot both be standard output: name a FILE")
+    campaign = campaign_among(options.runs)
+    if campaign:
+        return _compare_laws(campaign, wanted)
     recorded = read_all(options.runs)
     comparison, tolerance = compare_recorded(recorded), common_tolerance(recorded)
     if not printed:
@@ -59,6 +74,25 @@ def command(options: Namespace) -> int:
             sys.stdout.write(text)
         else:
             write_text(path, text)
+    return 0
+
+
+def _compare_laws(folder: CampaignFolder, wanted: Mapping[str, Path]) -> int:
+    """Print the laws of a campaign side by side; return the exit code."""
+    campaign, columns = folder.campaign, columns_of(folder.entries())
+    if "csv" in wanted:
+        raise ConfigurationError(f"--csv is for runs: the cases of {folder.path} are in its {TABLE}")
+    texts: Mapping[str, Callable[[], str]] = {
+        "json": lambda: json.dumps(campaign_values(campaign, columns), indent=2) + "\n",
+        "latex": lambda: latex_table(campaign.laws, outcome_sections(campaign, columns)),
+    }
+    if _STANDARD_OUTPUT not in wanted.values():
+        print(campaign_text(campaign, columns))
+    for name, path in wanted.items():
+        if path == _STANDARD_OUTPUT:
+            sys.stdout.write(texts[name]())
+        else:
+            write_text(path, texts[name]())
     return 0
 
 

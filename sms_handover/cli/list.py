@@ -4,6 +4,7 @@ import json
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -11,10 +12,11 @@ from sms_handover.analysis.definitions import DEFINITIONS
 from sms_handover.analysis.records import UNITS
 from sms_handover.cli.columns import columns
 from sms_handover.cli.verbs import PROGRAM
+from sms_handover.configuration.conditions_content import condition_names, read_conditions_content
 from sms_handover.configuration.documents import Replacements, documents_of
-from sms_handover.configuration.scenario_file import COMMON, load_scenario_file, scenario_names
+from sms_handover.configuration.scenario_file import COMMON, DESCRIPTION, load_scenario_file, scenario_names
 from sms_handover.configuration.value_paths import parameter_paths, value_paths
-from sms_handover.configuration.values import MODEL, ROBOT, SCHEDULE
+from sms_handover.configuration.values import CONDITIONS, MODEL, ROBOT, SCHEDULE
 from sms_handover.control.registry import law_named, law_names, package_of
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.topics import LOOP_NODES
@@ -88,6 +90,13 @@ def _scenarios(_: str) -> list[Row]:
     return [{"scenario": name, "description": load_scenario_file(name).description} for name in names]
 
 
+def _conditions(_: str) -> list[Row]:
+    return [
+        {"conditions": name, "description": read_conditions_content(Path(name)).get(DESCRIPTION, "")}
+        for name in condition_names()
+    ]
+
+
 def _laws(_: str) -> list[Row]:
     return [_law(name) for name in law_names()]
 
@@ -107,10 +116,15 @@ def _metrics(_: str) -> list[Row]:
 
 
 def _paths(scenario: str) -> list[Row]:
-    """Return every value of robot, deputy, schedule and parameters, as a scenario has it."""
+    """Return every value of robot, deputy, schedule, conditions and parameters, as a scenario has it."""
     parameters = load_scenario(scenario).parameters
     documents = documents_of(load_scenario_file(parameters.common.scenario), Replacements(), MODEL)
-    found = [*value_paths(ROBOT, documents.robot), *value_paths(SCHEDULE, documents.schedule)]
+    contents = {
+        ROBOT: documents.robot,
+        SCHEDULE: documents.schedule,
+        CONDITIONS: documents.conditions,
+    }
+    found = [path for document, content in contents.items() for path in value_paths(document, content)]
     for node in (COMMON, *LOOP_NODES):
         group = getattr(parameters, node)
         found += parameter_paths(node, type(group), asdict(group))
@@ -120,6 +134,7 @@ def _paths(scenario: str) -> list[Row]:
 KINDS: Mapping[str, Kind] = MappingProxyType(
     {
         "scenarios": Kind("what can be run", ("scenario", "description"), _scenarios),
+        "conditions": Kind("what is not ideal about a run", ("conditions", "description"), _conditions),
         "laws": Kind("control laws and what they need", ("law", "package", "needs", "description"), _laws),
         "metrics": Kind("figures of 'compare --csv'", ("metric", "unit", "definition"), _metrics),
         "paths": Kind(

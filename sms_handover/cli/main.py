@@ -79,7 +79,7 @@ def _run(call: Call) -> int:
 
 def _prepare_ros(call: Call) -> None:
     """Check what ROS needs before it is imported, and report what was changed for it."""
-    private = call.verb == "run"
+    private = call.verb in ("run", "campaign rerun")
     require_utf8([*call.arguments, os.getcwd()] if private else call.arguments)
     require_shared_memory()
     for change in (*prepare_environment(private=private), avoid_full_shared_memory()):

@@ -43,6 +43,13 @@ def add_scenario_options(parser: ArgumentParser) -> None:
         "--robot", type=Path, metavar="FILE", help="robot description (default: that of the scenario)"
     )
     group.add_argument(
+        "--conditions",
+        type=Path,
+        metavar="CONDITIONS",
+        help="what is not ideal: name of shipped conditions ('sms-handover list conditions'), or a file "
+        "(default: those of the scenario, ideal unless it says so)",
+    )
+    group.add_argument(
         "--duration", type=float, metavar="S", help="simulated time in s (default: the schedule's)"
     )
     group.add_argument(
@@ -69,8 +76,8 @@ def add_scenario_options(parser: ArgumentParser) -> None:
         default=[],
         metavar="PATH:=VALUE",
         help="one parameter, e.g. plant.integrator:=midpoint, where the node 'common' is for all of "
-        "them; or a value of robot, deputy or schedule, e.g. robot.arms.arm_a.gripper.mass:=0.9, with truth "
-        "before it for the plant alone, with model for all others: truth.robot.base.mass:=264",
+        "them; or a value of robot, deputy, schedule or conditions, e.g. robot.arms.arm_a.gripper.mass:=0.9, "
+        "with truth before it for the plant alone, with model for all others: truth.robot.base.mass:=264",
     )
 
 
@@ -95,6 +102,7 @@ def overrides_of(options: Namespace) -> Overrides:
         (TRAJECTORY, "time_law", options.time_law),
         (COMMON, "schedule", options.schedule and str(_found(options.schedule))),
         (COMMON, "robot", options.robot and str(_found(options.robot))),
+        (COMMON, "conditions", options.conditions and str(_found(options.conditions))),
         (COMMON, "duration", options.duration),
         (COMMON, "dynamics", options.dynamics),
     )

@@ -3,6 +3,8 @@
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from sms_handover.campaign.record.campaign_folder import CampaignFolder
+from sms_handover.campaign.record.manifest import MANIFEST
 from sms_handover.errors import ConfigurationError
 from sms_handover.launcher.run_folder import BAG, bags_of, is_bag_of_run
 from sms_handover.report.recorded_run import RecordedRun, read_recorded
@@ -22,6 +24,19 @@ def read_all(paths: Sequence[Path], progress: Progress | None = None) -> tuple[R
             progress.show(f"reading {name}", f"{len(runs) + 1} of {len(names)}", len(runs) / len(names))
         runs.append(read_recorded(name, path))
     return tuple(runs)
+
+
+def campaign_among(paths: Sequence[Path]) -> CampaignFolder | None:
+    """Return the campaign that a command is given in place of runs, None if these are runs.
+
+    Raises ConfigurationError if there is anything beside it.
+    """
+    campaigns = [path for path in paths if (path / MANIFEST).is_file()]
+    if campaigns and len(paths) > 1:
+        raise ConfigurationError(
+            f"{campaigns[0]} is a campaign: give it alone, its laws are what is compared"
+        )
+    return CampaignFolder(campaigns[0]) if campaigns else None
 
 
 def named(bags: Iterable[Path]) -> dict[str, Path]:

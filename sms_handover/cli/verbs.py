@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from sms_handover import __version__
-from sms_handover.cli import bag
+from sms_handover.cli import bag, campaign
 from sms_handover.errors import ConfigurationError, UnknownNameError
 
 PROGRAM = "sms-handover"
-BAG = "bag"  # the verb that has verbs of its own
+BAG, CAMPAIGN = "bag", "campaign"  # verbs that have verbs of their own
 
 GROUPS: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
@@ -22,6 +22,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = MappingProxyType(
         "run": {
             "run": "run the handover as a graph of ROS 2 nodes and record it",
             "simulate": "run it in one process, without ROS",
+            CAMPAIGN: "run it many times with drawn values, under one law or several",
         },
         "look at runs": {
             "compare": "print recorded runs side by side, with the paper's claims",
@@ -34,12 +35,14 @@ GROUPS: Mapping[str, Mapping[str, str]] = MappingProxyType(
         },
     }
 )
+FAMILIES: Mapping[str, tuple[str, Mapping[str, str]]] = MappingProxyType(
+    {BAG: (bag.DESCRIPTION, bag.COMMANDS), CAMPAIGN: (campaign.DESCRIPTION, campaign.COMMANDS)}
+)
 VERBS: Mapping[str, str] = {verb: text for group in GROUPS.values() for verb, text in group.items()}
 
 _DESCRIPTION = "A free-floating spacecraft with two arms hands a CubeSat from one arm to the other."
 _RESERVED = {
     "plan": "find schedules with it",
-    "campaign": "run many handovers with drawn values with it",
 }
 
 
@@ -79,12 +82,13 @@ def _call(verb: str, words: Sequence[str]) -> Call:
         raise ConfigurationError(f"'{verb}' is not there yet: a later release will {_RESERVED[verb]}")
     if verb not in VERBS:
         raise UnknownNameError("command", verb, VERBS)
-    if verb != BAG:
+    if verb not in FAMILIES:
         return Call(verb, tuple(words))
-    inner = _parser(f"{PROGRAM} {BAG}", bag.DESCRIPTION, {"commands": bag.COMMANDS}).parse_args(words)
-    if inner.verb not in bag.COMMANDS:
-        raise UnknownNameError("bag command", inner.verb, bag.COMMANDS)
-    return Call(f"{BAG} {inner.verb}", tuple(inner.arguments))
+    description, commands = FAMILIES[verb]
+    inner = _parser(f"{PROGRAM} {verb}", description, {"commands": commands}).parse_args(words)
+    if inner.verb not in commands:
+        raise UnknownNameError(f"{verb} command", inner.verb, commands)
+    return Call(f"{verb} {inner.verb}", tuple(inner.arguments))
 
 
 def _parser(program: str, description: str, groups: Mapping[str, Mapping[str, str]]) -> ArgumentParser:

@@ -42,7 +42,7 @@ class CompiledKinematics:
         q, v, _ = example_of(robot)
         ours, theirs = self.tools_at(q), robot.tools_at(q)
         pairs = [(pose_row(ours[arm]), pose_row(theirs[arm])) for arm in robot.arms]
-        pairs.append((_sums(self.conserved(q, v)), _sums(conserved_quantities(robot, q, v))))
+        pairs.append((sums_of(self.conserved(q, v)), sums_of(conserved_quantities(robot, q, v))))
         require_equal(library, pairs)
 
     def tools_at(self, q: Array, arms: Iterable[str] | None = None) -> dict[str, Pose]:
@@ -63,8 +63,7 @@ class CompiledKinematics:
         """Return momenta, energy and centre of mass of the robot."""
         self._q[:], self._v[:] = q, v
         self._conserved()
-        sums = frozen(self._sums.copy())
-        return ConservedQuantities(sums[:3], sums[3:6], sums[6:9], float(sums[9]))
+        return quantities_of(frozen(self._sums.copy()))
 
     def carry(self, deputy: MasslessDeputy, q: Array, v: Array) -> None:
         """Move a held deputy with its tool."""
@@ -85,8 +84,13 @@ def numbers_of(deputy: MasslessDeputy) -> Array:
     return np.concatenate([deputy.in_tool.rotation.ravel(), deputy.in_tool.translation])
 
 
-def _sums(of: ConservedQuantities) -> Array:
-    """Return what is conserved as one array."""
+def quantities_of(sums: Array) -> ConservedQuantities:
+    """Return what is conserved by name."""
+    return ConservedQuantities(sums[:3], sums[3:6], sums[6:9], float(sums[9]))
+
+
+def sums_of(of: ConservedQuantities) -> Array:
+    """Return what is conserved as one array (10,)."""
     energy = np.array([of.kinetic_energy])
     return np.concatenate([of.linear_momentum, of.angular_momentum, of.centre_of_mass, energy])
 

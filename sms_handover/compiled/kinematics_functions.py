@@ -6,7 +6,14 @@ from typing import Any
 
 import casadi
 
-from sms_handover.compiled.names import CONSERVED, GENERALIZED_JACOBIAN, MOTION, TOOL_JACOBIANS, TOOLS
+from sms_handover.compiled.names import (
+    CARRIED,
+    CONSERVED,
+    GENERALIZED_JACOBIAN,
+    MOTION,
+    TOOL_JACOBIANS,
+    TOOLS,
+)
 from sms_handover.compiled.rigid_bodies import RigidBodies, turned_about_axis
 from sms_handover.compiled.tree import Body, Tool
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV
@@ -34,7 +41,8 @@ def kinematics_functions(
     origin of the tool in ``world`` axes (3), and its angular velocity in axes of the tool (3). Of q and v:
     the poses, and the twists (6) of the origins in ``world`` axes. Of q, v and parameters, in ``world``:
     linear momentum (3), angular momentum about the centre of mass (3), centre of mass (3), kinetic energy.
-    Of q and parameters: the generalised Jacobian (6 arms, n), row by row.
+    Of q and parameters: the generalised Jacobian (6 arms, n), row by row. Of q, v and parameters: the twists
+    that the tools have by the momentum alone, with joints at rest.
     """
     base = ca.SX.sym("base", BASE_NQ)
     q = ca.vertcat(base, angles)
@@ -50,6 +58,7 @@ def kinematics_functions(
         MOTION: ([q, v], [poses, twists]),
         CONSERVED: ([q, v, parameters], [_conserved(placed, robot)]),
         GENERALIZED_JACOBIAN: ([q, parameters], [_generalized(tools, placed, columns, robot)]),
+        CARRIED: ([q, v, parameters], [_carried(placed, robot)]),
     }
     return [ca.Function(name, given, ca.cse(found)) for name, (given, found) in functions.items()]
 
@@ -115,6 +124,16 @@ def _twists(
             linear += moved * v[BASE_NV + joint]
             angular += rotation @ turned * v[BASE_NV + joint]
         twists.append(ca.vertcat(linear, turn @ angular))
+    return ca.vertcat(*twists)
+
+
+def _carried(placed: _Placed, robot: RigidBodies) -> Expression:
+    """Return the twists of the origins of the tools in ``world`` axes as parts of a base that drifts."""
+    turn, drift = placed.base[0], robot.drift()
+    twists = [
+        ca.vertcat(turn @ (drift[:3] + ca.cross(drift[3:], origin)), turn @ drift[3:])
+        for _, origin in placed.tools
+    ]
     return ca.vertcat(*twists)
 
 

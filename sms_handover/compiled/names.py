@@ -11,6 +11,11 @@ def rest_name(scheme: str) -> str:
     return f"sms_rest_{scheme}"
 
 
+def loaded_name(arm: int) -> str:
+    """Return the name of the law's function where truth and model differ in what an arm carries alone."""
+    return f"sms_loaded_torque_{arm}"
+
+
 def step_name(scheme: str) -> str:
     """Return the name of the function that steps by a scheme."""
     return f"sms_step_{scheme}"
@@ -18,4 +23,5 @@ def step_name(scheme: str) -> str:
 
 TOOL_ROWS, MOTION_ROWS, FIND_JOINTS = "sms_tool_rows", "sms_motion_rows", "sms_find_joints"
 PERIODS, ON_PATH, RESOLVE_RATES = "sms_periods", "sms_on_path", "sms_resolve_rates"
-GENERALIZED_JACOBIAN = "sms_generalized_jacobian"
+GENERALIZED_JACOBIAN, CARRIED = "sms_generalized_jacobian", "sms_carried"
+WITHOUT_DRIFT = "sms_without_drift"

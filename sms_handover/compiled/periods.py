@@ -1,13 +1,22 @@
 """Reference periods in C: as many as there are while nothing has to be decided, in one call."""
 
 import ctypes
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from sms_handover.compiled.c_function import NativeFunction
 from sms_handover.compiled.inverse_kinematics import STATUSES, ik_settings
-from sms_handover.compiled.kinematics import CONSERVED_SIZE, POSE, POSE_ROW, TWIST, numbers_of
+from sms_handover.compiled.kinematics import (
+    CONSERVED_SIZE,
+    POSE,
+    POSE_ROW,
+    TWIST,
+    numbers_of,
+    quantities_of,
+    sums_of,
+)
 from sms_handover.compiled.library import dynamics_library
 from sms_handover.compiled.names import PERIODS
 from sms_handover.compiled.ticks import CompiledTicks
@@ -15,11 +24,13 @@ from sms_handover.ik.parameters import IkParameters
 from sms_handover.model.poses import pose_row, twist_in_deputy
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.deputy import MasslessDeputy
+from sms_handover.plant.rigid_deputy import RigidDeputy
 from sms_handover.trajectory.generator import Course
-from sms_handover.types import JointReference, PeriodRows, Pose, TickRows, Twist, read_only
+from sms_handover.types import Array, JointReference, PeriodRows, Pose, TickRows, Twist, read_only
 from sms_handover.units import ns_to_seconds
 
 Failures = tuple[int, int]
+Room = Callable[[int], Array]  # where the rows (13 + 4 n,) of so many ticks are to be written
 _HOLD, _JOINTS, _TOOL = range(3)  # how an arm is led, as in native/periods.c
 
 
@@ -41,20 +52,26 @@ class CompiledPeriods:
         self._call = NativeFunction(dynamics_library(known), PERIODS, kinds)
 
     def run(
-        self, course: Course, before: JointReference, first_ns: int, deputy: MasslessDeputy, failed: Failures
+        self,
+        course: Course,
+        before: JointReference,
+        first_ns: int,
+        deputy: MasslessDeputy,
+        failed: Failures,
+        room: Room | None = None,
     ) -> tuple[TickRows, PeriodRows, int]:
         """Carry out at most the periods of a course, all of them integrated, from a time on.
 
         ``before`` is the reference of the period before; ``failed`` the failures of inverse kinematics in a
-        row so far, and the number at which the periods end, 0 for never. Returns ticks, periods, and the
-        failures then.
+        row so far, and the number at which the periods end, 0 for never. Ticks are written to ``room``, by
+        default to a new array. Returns ticks, periods, and the failures then.
         """
         quiet, count = self._quiet, len(course.progress)
         self._set(course, before, deputy, failed)
         quiet["period_s"] = ns_to_seconds(first_ns - before.stamp_ns)
         periods, progress = np.zeros(count, self._layout), np.ascontiguousarray(course.progress)
         ticks = self._ticks
-        rows = ticks.room(count * self._per_period)
+        rows = (room or ticks.room)(count * self._per_period)
         ticks.take_over()
         given = tuple(array.ctypes.data for array in (self._settings, quiet, progress, periods, rows))
         done = self._call(*ticks.address, *given, count, self._per_period)
@@ -77,7 +94,7 @@ class CompiledPeriods:
                 quiet["starts"][index] = pose_row(course.starts[arm])
                 quiet["goals"][index] = pose_row(course.goals[arm])
         quiet["joints"], quiet["ends"], quiet["rates"] = course.joints, course.ends, before.velocity
-        quiet["damping"] = course.damping
+        quiet["damping"], quiet["has_momentum"] = course.damping, course.has_momentum
         quiet["holder"] = self._arms.index(deputy.holder) if deputy.holder else -1
         quiet["in_tool"] = numbers_of(deputy)
         quiet["deputy"] = pose_row(deputy.state.deputy_in_world)
@@ -86,7 +103,10 @@ class CompiledPeriods:
 
     def _rows(self, periods: Any, ticks: TickRows) -> PeriodRows:
         """Return periods by name."""
-        conserved = periods["conserved"]
+        plant, conserved = self._ticks.plant, periods["conserved"]
+        if isinstance(plant.deputy_body, RigidDeputy) and not plant.deputy_body.holder:
+            for sums in conserved:
+                sums[:] = sums_of(plant.with_deputy(quantities_of(np.array(sums))))
         return PeriodRows(
             stamp_ns=ticks.stamp_ns[:: self._per_period],
             reference_position=periods["reference"],
@@ -99,8 +119,8 @@ class CompiledPeriods:
             angular_momentum=conserved[:, 3:6],
             kinetic_energy=conserved[:, 9],
             work=periods["work"],
-            external_work=np.full(len(periods), self._ticks.plant.external_work),
-            lost=np.full(len(periods), self._ticks.plant.losses),
+            external_work=np.full(len(periods), plant.external_work),
+            lost=np.full(len(periods), plant.losses),
             ik_status=tuple(None if k < 0 else STATUSES[k] for k in periods["status"].astype(int).tolist()),
         )
 
@@ -111,6 +131,7 @@ def _quiet(joints: int, arms: int) -> Any:
     reals |= {"joints": joints, "ends": joints, "rates": joints}
     reals |= {"in_tool": POSE, "deputy": POSE_ROW, "deputy_twist": TWIST, "damping": (), "period_s": ()}
     counts: dict[str, Any] = {"kind": arms, "holder": (), "failures": (), "most_failures": ()}
+    counts |= {"has_momentum": ()}
     fields = [(name, "f8", shape) for name, shape in reals.items()]
     return np.dtype([*fields, *((name, "i8", shape) for name, shape in counts.items())])
 

@@ -44,8 +44,8 @@ class RigidBodies:
         self._rates = [v[BASE_NV + joint] for joint in range(len(bodies) - 1)]
         self._rotations = [ca.SX.eye(3)]  # of each body in its parent
         self._twists = [(v[:3], v[3:BASE_NV])]
-        turns = zip(_elements(cosines), _elements(sines), strict=True)
-        for body, turn, rate in zip(bodies[1:], turns, self._rates, strict=True):
+        self._turns = [*zip(_elements(cosines), _elements(sines), strict=True)]
+        for body, turn, rate in zip(bodies[1:], self._turns, self._rates, strict=True):
             self._rotations.append(ca.SX(body.rotation) @ turned_about_axis(body, *turn))
             linear, angular = self._carried(len(self._twists), *self._twists[body.parent])
             self._twists.append((linear, angular + ca.SX(body.axis) * rate))
@@ -97,7 +97,7 @@ class RigidBodies:
             axis = ca.SX(body.axis)
             steps.append((ca.cross(velocity, axis) * rate, ca.cross(spin, axis) * rate))
         for index in range(len(self._bodies) - 1, 0, -1):
-            body, rotation, place = self._bodies[index], self._rotations[index], self._bodies[index].place
+            body, place = self._bodies[index], self._bodies[index].place
             axis, across = ca.SX(body.axis), ca.SX(np.array(ca.skew(place)))
             pull, turn = mixed[index] @ axis, angular[index] @ axis
             wanted = force[BASE_NV + index - 1] - ca.dot(axis, moments[index])
@@ -110,7 +110,7 @@ class RigidBodies:
             steps[index] += (pull_share, turn_share, inverse * wanted)
             own_force = forces[index] + own @ moved + both @ turned - pull_share * wanted
             own_moment = moments[index] + both.T @ moved + spun @ turned - turn_share * wanted
-            own, both, spun = (rotation @ part @ rotation.T for part in (own, both, spun))
+            own, both, spun = (self._in_parent(index, part) for part in (own, both, spun))
             own, shifted = _symmetric(own), own @ across
             crossed = across @ both
             linear[body.parent] += own
@@ -137,6 +137,10 @@ class RigidBodies:
         matrix, factors = self._inertia_matrix(), factored(self._base_inertia())
         columns = zip(*(row[BASE_NV:] for row in matrix[:BASE_NV]), strict=True)
         return [substituted(factors, -ca.vertcat(*column)) for column in columns]
+
+    def drift(self) -> Expression:
+        """Return H_b^-1 h_b: the twist (6,) of the base that its momentum h_b leaves with joints at rest."""
+        return substituted(factored(self._base_inertia()), ca.vertcat(*self.momentum()))
 
     def _velocity_wrenches(self) -> list[tuple[Expression, Expression]]:
         """Return the wrench that keeps the twist of each body, by Newton and Euler."""
@@ -175,6 +179,26 @@ class RigidBodies:
         into = self._rotations[index].T
         return into @ (linear + ca.cross(angular, ca.SX(self._bodies[index].place))), into @ angular
 
+    def _in_parent(self, index: int, matrix: Expression) -> Expression:
+        """Return R M R^T for the rotation R of a body in its parent.
+
+        A turn about an axis of the frame changes neither the trace of the block across it nor the difference
+        of its other two entries, so that half of the block is enough.
+        """
+        body, (cosine, sine) = self._bodies[index], self._turns[index - 1]
+        if np.count_nonzero(body.axis == 1.0) != 1:
+            return self._rotations[index] @ matrix @ self._rotations[index].T
+        k = int(np.argmax(body.axis))
+        i, j = (k + 1) % 3, (k + 2) % 3
+        found, turn = ca.SX(matrix), turned_about_axis(body, cosine, sine)
+        row, column = turn @ matrix[:, k], matrix[k, :] @ turn.T
+        first, second = (cosine * matrix[i, at] - sine * matrix[j, at] for at in (i, j))
+        found[:, k], found[k, :], found[k, k] = row, column, matrix[k, k]
+        found[i, i], found[i, j] = cosine * first - sine * second, sine * first + cosine * second
+        found[j, j] = matrix[i, i] + matrix[j, j] - found[i, i]
+        found[j, i] = found[i, j] - (matrix[i, j] - matrix[j, i])
+        return ca.SX(body.rotation) @ found @ ca.SX(body.rotation).T
+
     def _composed(self) -> list[_Rigid]:
         """Return the composite rigid body of each joint."""
         composites = list(self._rigids)
@@ -187,7 +211,7 @@ class RigidBodies:
             composites[body.parent] = _Rigid(
                 below.mass + own.mass,
                 below.first_moment + turned + own.mass * place,
-                _symmetric(below.inertia + rotation @ own.inertia @ rotation.T + shift),
+                _symmetric(below.inertia + self._in_parent(index, own.inertia) + shift),
             )
         return composites
 

@@ -8,7 +8,7 @@ from typing import Any
 import casadi
 
 from sms_handover.compiled.kinematics_functions import kinematics_functions
-from sms_handover.compiled.names import COMPUTED_TORQUE, PREPARED_TORQUE, rest_name, step_name
+from sms_handover.compiled.names import COMPUTED_TORQUE, PREPARED_TORQUE, loaded_name, rest_name, step_name
 from sms_handover.compiled.rigid_bodies import Factors, RigidBodies, substituted
 from sms_handover.compiled.step import Acceleration, step_function
 from sms_handover.compiled.tree import PER_BODY, Body, Tool
@@ -38,6 +38,7 @@ def dynamics_source(bodies: Sequence[Body], tools: Sequence[Tool], schemes: Mapp
         *(step_function(rest_name(n), by, scheme, joints, goes_on=True) for n, scheme in schemes.items()),
         _computed_torque(bodies),
         _computed_torque(bodies, by),
+        *(_loaded_torque(bodies, arm, tool.body) for arm, tool in enumerate(tools)),
         *kinematics_functions(tools, angles, v, *_with_parameters(bodies)),
     ]
     generator = ca.CodeGenerator("dynamics", {"with_header": False})
@@ -51,6 +52,9 @@ def dynamics_source(bodies: Sequence[Body], tools: Sequence[Tool], schemes: Mapp
         "STEPS": f"{{{', '.join(map(step_name, schemes))}}}",
         "RESTS": f"{{{', '.join(map(rest_name, schemes))}}}",
         "KEPT": by.kept,
+        "PER_BODY": PER_BODY,
+        "LOADED": f"{{{', '.join(loaded_name(arm) for arm in range(len(tools)))}}}",
+        "TOOL_BODIES": f"{{{', '.join(str(tool.body) for tool in tools)}}}",
         "ARMS": len(tools),
         "FIRST_JOINTS": f"{{{', '.join(str(tool.first_joint) for tool in tools)}}}",
         "ARM_JOINTS": f"{{{', '.join(str(tool.joints) for tool in tools)}}}",
@@ -102,32 +106,62 @@ def _computed_torque(bodies: Sequence[Body], by: Acceleration | None = None) -> 
     if by:
         found.append(_kept(robot.bias(), robot.inertia_factors()))
     inner = ca.Function("efforts", [*turn, v, wanted, parameters], ca.cse(found))
+    name = PREPARED_TORQUE if by else COMPUTED_TORQUE
+    return _by_feedback(name, inner, joints, [PER_BODY * len(bodies)])
+
+
+def _loaded_torque(bodies: Sequence[Body], arm: int, last: int) -> Any:
+    """Return the same of a robot whose body ``last`` of an arm has other parameters in truth and in model.
+
+    All of the other arms is the same for both, and worked out once. Arguments are q, v, desired motion,
+    gains, parameters, and those of the body (11,) in truth and in model; results are efforts by the model,
+    and the numbers that the first stage keeps by the truth.
+    """
+    turn, v, _ = _symbols(bodies)
+    parameters, known = _with_parameters(bodies)
+    joints = len(bodies) - 1
+    wanted = ca.SX.sym("wanted", joints)
+    own = [ca.SX.sym(name, PER_BODY) for name in ("in_truth", "in_model")]
+    truth, model = (
+        RigidBodies([*known[:last], _body_of(known[last], numbers), *known[last + 1 :]], *turn, v)
+        for numbers in own
+    )
+    found = [model.joint_efforts(wanted), _kept(truth.bias(), truth.inertia_factors())]
+    inner = ca.Function("efforts", [*turn, v, wanted, parameters, *own], ca.cse(found))
+    return _by_feedback(loaded_name(arm), inner, joints, [PER_BODY * len(bodies), PER_BODY, PER_BODY])
+
+
+def _by_feedback(name: str, inner: Any, joints: int, numbers: Sequence[int]) -> Any:
+    """Return the function of q, v, desired motion, gains and vectors of so many numbers."""
     q, rates = ca.MX.sym("q", BASE_NQ + joints), ca.MX.sym("v", BASE_NV + joints)
     desired = ca.MX.sym("desired", joints, 3)  # CasADi has columns where NumPy has rows
     feedback = ca.MX.sym("feedback", 2)
-    numbers = ca.MX.sym("parameters", PER_BODY * len(bodies))
+    vectors = [ca.MX.sym("parameters", size) for size in numbers]
     angles = q[BASE_NQ:]
     error, error_rate = angles - desired[:, 0], rates[BASE_NV:] - desired[:, 1]
     asked = desired[:, 2] - feedback[0] * error - feedback[1] * error_rate
-    results = inner(ca.cos(angles), ca.sin(angles), rates, asked, numbers)
-    name = PREPARED_TORQUE if by else COMPUTED_TORQUE
-    given: list[Any] = [q, rates, desired, feedback, numbers]
-    return ca.Function(name, given, list(results) if by else [results])
+    results = inner(ca.cos(angles), ca.sin(angles), rates, asked, *vectors)
+    given: list[Any] = [q, rates, desired, feedback, *vectors]
+    return ca.Function(name, given, list(results) if inner.n_out() > 1 else [results])
 
 
 def _with_parameters(bodies: Sequence[Body]) -> tuple[Any, tuple[Body, ...]]:
     """Return inertial parameters (11 N,), and the bodies that have them in place of numbers."""
     parameters = ca.SX.sym("parameters", PER_BODY * len(bodies))
-    known = []
-    for index, body in enumerate(bodies):
-        mass, x, y, z, xx, xy, xz, yy, yz, zz, rotor = (
-            parameters[PER_BODY * index + at] for at in range(PER_BODY)
-        )
-        inertia = ca.blockcat([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        moment = ca.vertcat(x, y, z)
-        values: dict[str, Any] = {"mass": mass, "first_moment": moment, "inertia": inertia, "rotor": rotor}
-        known.append(replace(body, **values))
+    known = (
+        _body_of(body, parameters[PER_BODY * index : PER_BODY * (index + 1)])
+        for index, body in enumerate(bodies)
+    )
     return parameters, tuple(known)
+
+
+def _body_of(body: Body, numbers: Any) -> Body:
+    """Return a body with inertial parameters (11,)."""
+    mass, x, y, z, xx, xy, xz, yy, yz, zz, rotor = (numbers[at] for at in range(PER_BODY))
+    inertia = ca.blockcat([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    moment = ca.vertcat(x, y, z)
+    values: dict[str, Any] = {"mass": mass, "first_moment": moment, "inertia": inertia, "rotor": rotor}
+    return replace(body, **values)
 
 
 def _symbols(bodies: Sequence[Body]) -> tuple[tuple[Any, Any], Any, Any]:

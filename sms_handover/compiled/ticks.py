@@ -10,7 +10,7 @@ import numpy as np
 from sms_handover.compiled.c_function import NativeFunction
 from sms_handover.compiled.library import dynamics_library
 from sms_handover.compiled.names import TICKS
-from sms_handover.compiled.tree import PER_BODY, body_tree, inertial_parameters
+from sms_handover.compiled.tree import PER_BODY, body_tree, inertial_parameters, tools_of
 from sms_handover.control.controller import JointController
 from sms_handover.control.nmpc import NmpcLaw
 from sms_handover.control.pid import PidLaw
@@ -23,12 +23,14 @@ from sms_handover.units import ns_to_seconds
 
 _LAWS: Mapping[type, int] = MappingProxyType({NmpcLaw: 0, PidLaw: 1})  # as in native/ticks.c
 _UNBOUNDED_NS = -1  # in place of the longest age of a reference
+_NO_ARM = -1  # in place of the number of the one in whose load truth and model differ
 
 
 class CompiledTicks:
     """Carries out the ticks of a plant under a joint controller in C.
 
     The state lives in plant and controller, as by Python; a call takes it over, goes on, and gives it back.
+    What is carried counts by parameters that are passed on; the tick of a grasp is carried out by Python.
     Not thread-safe.
     """
 
@@ -55,27 +57,49 @@ class CompiledTicks:
             "true_limit": true.effort_limit,
             "tick_s": ns_to_seconds(tick_ns),
             "tick_ns": tick_ns,
-            "true_parameters": inertial_parameters(body_tree(true)),
-            "known_parameters": inertial_parameters(body_tree(known)),
             "law": _LAWS[type(controller.law)],
             "longest_ns": _UNBOUNDED_NS if longest_ns is None else longest_ns,
         }
-        constant["one_robot"] = np.array_equal(constant["true_parameters"], constant["known_parameters"])
         for name, value in constant.items():
             self._at[name][...] = value
         pointer, number = ctypes.c_void_p, ctypes.c_long
         kinds = (pointer, number, pointer, number, number)
         self._call = NativeFunction(dynamics_library(true), TICKS, kinds)
+        self._tool_bodies = [tool.body for tool in tools_of(true)]
+        self._use(true, known)
         n = true.n_joints
         self._ends = np.cumsum([BASE_NQ + n, BASE_NV + n, n, n]).tolist()
 
     def run(self, ticks: int, steps: int) -> TickRows:
         """Carry out ``ticks`` ticks, of which the first ``steps`` are integrated."""
-        first_ns, rows = self.plant.stamp_ns, self.room(ticks)
-        self.take_over()
-        self._call(*self.address, rows.ctypes.data, ticks, steps)
-        self.give_back(steps)
+        plant, first_ns, rows = self.plant, self.plant.stamp_ns, self.room(ticks)
+        done = 1 if plant.jumps or self._controller.has_news else 0
+        if done:
+            self._by_python(rows[0], integrated=steps > 0)
+        if done < ticks:
+            left = steps - done
+            self.take_over()
+            self._call(*self.address, rows[done:].ctypes.data, ticks - done, left)
+            self.give_back(left)
         return self.rows_of(rows, first_ns)
+
+    def _by_python(self, row: Array, *, integrated: bool) -> None:
+        """Carry out a tick in which a payload changes."""
+        plant = self.plant
+        effort = self._controller.effort(plant.stamp_ns, plant.q, plant.v)
+        np.concatenate((plant.q, plant.v, plant.joint_effort, effort), out=row)
+        if integrated:
+            plant.apply(effort)
+
+    def _use(self, true: RobotModel, known: RobotModel) -> None:
+        """Pass on the inertial parameters of the robot in truth, and as it is known."""
+        self._robots = true, known
+        ours, theirs = (inertial_parameters(body_tree(robot)) for robot in (true, known))
+        self._at["true_parameters"][:], self._at["known_parameters"][:] = ours, theirs
+        different = np.flatnonzero(np.any((ours != theirs).reshape(-1, PER_BODY), axis=1)).tolist()
+        self._at["one_robot"][...] = not different
+        arms = [arm for arm, body in enumerate(self._tool_bodies) if [body] == different]
+        self._at["loaded"][...] = arms[0] if arms else _NO_ARM
 
     @property
     def address(self) -> tuple[int, int]:
@@ -95,7 +119,11 @@ class CompiledTicks:
 
     def take_over(self) -> None:
         """Take the state of plant and controller."""
-        plant, law, track, at = self.plant, self._controller.law, self._controller.track, self._at
+        plant, controller, at = self.plant, self._controller, self._at
+        controller.heed_news(plant.stamp_ns)
+        law, track, robots = controller.law, controller.track, (plant.loaded_robot, controller.robot)
+        if robots[0] is not self._robots[0] or robots[1] is not self._robots[1]:
+            self._use(*robots)
         at["q"][:], at["v"][:], at["effort"][:] = plant.q, plant.v, plant.joint_effort
         at["work"][...] = plant.work
         at["stamp_ns"][...] = plant.stamp_ns
@@ -125,7 +153,8 @@ def _layout(joints: int) -> np.dtype[Any]:
         **{"limit": joints, "true_limit": joints, "tick_s": (), "work": ()},
         **{"true_parameters": parameters, "known_parameters": parameters},
     }
-    counts = {name: () for name in ("stamp_ns", "reference_ns", "longest_ns", "tick_ns", "law", "one_robot")}
+    names = ("stamp_ns", "reference_ns", "longest_ns", "tick_ns", "law", "one_robot", "loaded")
+    counts = {name: () for name in names}
     fields: list[tuple[str, str, Any]] = [(name, "f8", shape) for name, shape in reals.items()]
     fields += [(name, "i8", shape) for name, shape in counts.items()]
     return np.dtype([*fields, ("saturated", "i8", joints)])

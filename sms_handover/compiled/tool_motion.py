@@ -8,9 +8,9 @@ import numpy as np
 from sms_handover.compiled.c_function import NativeFunction
 from sms_handover.compiled.kinematics import POSE_ROW, TWIST, CompiledKinematics
 from sms_handover.compiled.library import dynamics_library
-from sms_handover.compiled.names import ON_PATH, RESOLVE_RATES
+from sms_handover.compiled.names import ON_PATH, RESOLVE_RATES, WITHOUT_DRIFT
 from sms_handover.compiled.tree import body_tree, inertial_parameters
-from sms_handover.model.robot_model import BASE_NQ, RobotModel
+from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.trajectory.time_law import Progress
 from sms_handover.types import Array, Pose, Twist, frozen
 
@@ -30,7 +30,8 @@ class CompiledToolMotion:
         self._on_path = NativeFunction(library, ON_PATH, [ctypes.c_void_p] * 5)
         self._q, self._parameters = np.zeros(BASE_NQ + robot.n_joints), inertial_parameters(body_tree(robot))
         self._twists, self._led = np.zeros((count, TWIST)), np.zeros(count, dtype=np.int64)
-        self._damping = np.zeros(1)
+        self._damping, self._v = np.zeros(1), np.zeros(BASE_NV + robot.n_joints)
+        self._without = NativeFunction(library, WITHOUT_DRIFT, [ctypes.c_void_p] * 5)
         self._resolve = NativeFunction(library, RESOLVE_RATES, [ctypes.c_void_p] * 6)
 
     def tools_at(self, q: Array, arms: Iterable[str] | None = None) -> Mapping[str, Pose]:
@@ -47,14 +48,28 @@ class CompiledToolMotion:
         row, twist = frozen(self._row.copy()), frozen(self._twist.copy())
         return Pose(row[:3], row[3:]), Twist(twist[:3], twist[3:])
 
+    def without_drift(self, q: Array, v: Array, twists: Mapping[str, Twist]) -> Mapping[str, Twist]:
+        """Return twists of tools less what they have by the momentum alone, with joints at rest."""
+        self._q[:], self._v[:] = q, v
+        self._lead(twists)
+        given = (self._q, self._v, self._parameters, self._led, self._twists)
+        self._without(*(array.ctypes.data for array in given))
+        rows = frozen(self._twists.copy())
+        found = dict(zip(self._arms, rows, strict=True))
+        return {arm: Twist(found[arm][:3], found[arm][3:]) for arm in twists}
+
     def resolved(self, q: Array, twists: Mapping[str, Twist], velocity: Array, damping: float) -> Array:
         """Return joint rates (n,): ``velocity``, and for the arms that have a twist those that give it."""
         self._q[:], self._damping[:] = q, damping
-        for index, arm in enumerate(self._arms):
-            self._led[index] = arm in twists
-            if arm in twists:
-                self._twists[index, :3], self._twists[index, 3:] = twists[arm].linear, twists[arm].angular
+        self._lead(twists)
         rates = np.array(velocity)
         given = (self._q, self._parameters, self._twists, self._led, self._damping, rates)
         self._resolve(*(array.ctypes.data for array in given))
         return frozen(rates)
+
+    def _lead(self, twists: Mapping[str, Twist]) -> None:
+        """Say which arms are led, and how."""
+        for index, arm in enumerate(self._arms):
+            self._led[index] = arm in twists
+            if arm in twists:
+                self._twists[index, :3], self._twists[index, 3:] = twists[arm].linear, twists[arm].angular

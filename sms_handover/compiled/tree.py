@@ -18,6 +18,8 @@ _BASE = 1  # index of the base among Pinocchio's joints; the universe is 0
 class Body:
     """A body and the joint that carries it, in the frame of the joint, which moves with the body.
 
+    The origin of the frame is where the axis of the joint comes nearest to the origin of the parent: fewer
+    coordinates are other than zero there than where the model has it, and the equations are shorter.
     ``parent`` is the index of the body that carries the joint, -1 for the base. ``rotation`` (3, 3) and
     ``place`` (3,) m are those of the joint's frame at angle zero in the frame of the parent, ``axis`` (3,)
     is that of the joint. ``first_moment`` (3,) kg m is the mass times the centre of mass, ``inertia``
@@ -62,11 +64,12 @@ def inertial_parameters(bodies: Sequence[Body]) -> Array:
     return read_only(np.array(rows).ravel())
 
 
-@lru_cache(maxsize=4)  # a loop asks a dozen times for the same one or two robots
+@lru_cache(maxsize=8)  # a loop asks a dozen times for the same robots, in truth and model, bare and loaded
 def body_tree(robot: RobotModel) -> tuple[Body, ...]:
     """Return the bodies, base first, then one for each joint in the order of ``robot.joint_names``."""
     model = robot.pin
-    return tuple(_body(model, index) for index in range(_BASE, model.njoints))
+    along = _shifts(model)
+    return tuple(_body(model, index, along) for index in range(_BASE, model.njoints))
 
 
 def tools_of(robot: RobotModel) -> tuple[Tool, ...]:
@@ -78,20 +81,31 @@ def _tool(robot: RobotModel, arm: str) -> Tool:
     """Return the tool of an arm."""
     frame, joints = robot.pin.frames[robot.tool_frame_id[arm]], robot.arm_joints[arm]
     placement, body = frame.placement, frame.parentJoint - _BASE
-    rotation, place = _tidy(placement.rotation), _tidy(placement.translation)
+    rotation = _tidy(placement.rotation)
+    place = _tidy(placement.translation - _shifts(robot.pin)[frame.parentJoint])
     return Tool(body, rotation, place, joints.start, joints.stop - joints.start)
 
 
-def _body(model: pin.Model, index: int) -> Body:
+def _shifts(model: pin.Model) -> list[Array]:
+    """Return by joint where our frame begins in that of the model (3,) m: on the axis of the joint."""
+    shifts = [np.zeros(3)] * (_BASE + 1)
+    for index in range(_BASE + 1, model.njoints):
+        placement, axis = model.jointPlacements[index], _axis(model, index)
+        place = placement.translation - shifts[model.parents[index]]
+        shifts.append(-(place @ (placement.rotation @ axis)) * axis)
+    return shifts
+
+
+def _body(model: pin.Model, index: int, shifts: Sequence[Array]) -> Body:
     """Return one body of a Pinocchio model."""
-    placement, inertia = model.jointPlacements[index], model.inertias[index]
-    lever = np.array(inertia.lever)
+    placement, inertia, parent = model.jointPlacements[index], model.inertias[index], model.parents[index]
+    shift, is_base = shifts[index], index == _BASE
+    lever = np.array(inertia.lever) - shift
     about_origin = inertia.inertia + inertia.mass * (lever @ lever * np.eye(3) - np.outer(lever, lever))
-    is_base = index == _BASE
     return Body(
-        parent=-1 if is_base else model.parents[index] - _BASE,
+        parent=-1 if is_base else parent - _BASE,
         rotation=_tidy(placement.rotation),
-        place=_tidy(placement.translation),
+        place=_tidy(placement.translation + placement.rotation @ shift - shifts[parent]),
         axis=read_only(np.zeros(3)) if is_base else _axis(model, index),
         mass=float(inertia.mass),
         first_moment=_tidy(inertia.mass * lever),

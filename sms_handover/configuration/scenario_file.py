@@ -5,12 +5,13 @@ from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 
+from sms_handover.configuration.conditions_content import read_conditions_content, with_histories
 from sms_handover.configuration.merge import merged, standing_in
 from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.parameters import ParameterValues
 from sms_handover.configuration.robot_content import read_robot_content, with_arm_descriptions
 from sms_handover.configuration.sections import Section
-from sms_handover.configuration.values import DEPUTY, MODEL, ROBOT, ROLES, SCHEDULE, TRUTH
+from sms_handover.configuration.values import CONDITIONS, DEPUTY, MODEL, ROBOT, ROLES, SCHEDULE, TRUTH
 from sms_handover.configuration.yaml_reader import Mapping, load_mapping, read_file
 from sms_handover.errors import ConfigurationError, UnknownNameError
 from sms_handover.graph.topics import CONTROLLER, LOOP_NODES
@@ -20,16 +21,16 @@ EXTENDS, DESCRIPTION, LAW, SEED = "extends", "description", "law", "seed"
 _SUFFIX = ".yaml"
 _SECTIONS = (COMMON, *LOOP_NODES)
 SHORT = {LAW: CONTROLLER, SEED: COMMON}  # paths that stand for a parameter of the same name
-KEYS = (EXTENDS, DESCRIPTION, ROBOT, SCHEDULE, DEPUTY, *SHORT, *ROLES, *_SECTIONS)
+KEYS = (EXTENDS, DESCRIPTION, ROBOT, SCHEDULE, DEPUTY, CONDITIONS, *SHORT, *ROLES, *_SECTIONS)
 
 
 @dataclass(frozen=True, eq=False)
 class ScenarioFile:
     """What a scenario file says, with all that it extends.
 
-    ``robot`` and ``schedule`` are complete; ``truth`` and ``model`` have changes of robot and deputy for the
-    plant alone, or for every other node. ``parameters`` are by section and name. ``schedule_text`` is that
-    of a file of which nothing was changed, else empty.
+    ``robot``, ``schedule`` and ``conditions`` are complete; ``truth`` and ``model`` have changes of robot and
+    deputy for the plant alone, or for every other node. ``parameters`` are by section and name.
+    ``schedule_text`` is that of a file of which nothing was changed, else empty.
     """
 
     name: str
@@ -37,6 +38,7 @@ class ScenarioFile:
     robot: Mapping
     schedule: Mapping
     schedule_text: str
+    conditions: Mapping
     truth: Mapping
     model: Mapping
     parameters: dict[str, ParameterValues]
@@ -83,12 +85,14 @@ def _load(source: str, folder: Path, where: str, extended_by: Sequence[Path]) ->
         raise root.error(f"{SCHEDULE} is missing: give a file, or extend a scenario that has one")
     if DEPUTY in root:
         schedule, text = merged(schedule, _only(root, DEPUTY), path), ""
+    conditions = _document(root, CONDITIONS, base.conditions if base else None, read_conditions_content, path)
     return ScenarioFile(
         path.stem,
         description,
         robot,
         schedule,
         text,
+        Mapping() if conditions is None else conditions,
         _changes(root, TRUTH, base.truth if base else None, path),
         _changes(root, MODEL, base.model if base else None, path),
         _parameters(root, base),
@@ -110,7 +114,7 @@ def _path(source: str, folder: Path, where: str) -> Path:
 def _document(
     root: Section, key: str, base: Mapping | None, read: Callable[[Path], Mapping], path: Path
 ) -> Mapping | None:
-    """Return robot or schedule: that of a file, that extended with changes, or one written out in full."""
+    """Return one of the documents: that of a file, that extended with changes, or one written out in full."""
     if key not in root:
         return base
     value = root.value(key)
@@ -124,6 +128,8 @@ def _document(
         del content[EXTENDS]
     if key == ROBOT:
         content = with_arm_descriptions(content, path.parent)
+    elif key == CONDITIONS:
+        content = with_histories(content, path.parent)
     own: Mapping = standing_in(content, path)
     return own if base is None else merged(base, own, path)
 

@@ -137,6 +137,13 @@ class Section:
         """Return the number of a key, as its specification allows."""
         return float(self._checked(key))
 
+    def word(self, key: str) -> Any:
+        """Return the value of a key that may have a word, or one number, in place of something else."""
+        spec = self._spec.fields[key] if isinstance(self._spec, MappingSpec) else None
+        if not isinstance(spec, EitherSpec):
+            raise TypeError(f"{self.path(key)} is not specified as one of two")
+        return spec.words.check(self.value(key), self._what(key), self._kind)
+
     def vector(self, key: str, size: int | None = None) -> tuple[float, ...]:
         """Return the numbers of a key; ``size`` is how many where the specification does not say it."""
         numbers: tuple[float, ...] = self._checked(key, size)

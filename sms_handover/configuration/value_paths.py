@@ -8,6 +8,7 @@ from difflib import get_close_matches
 from functools import reduce
 from typing import Any
 
+from sms_handover.configuration.conditions_fields import CONDITIONS_FIELDS
 from sms_handover.configuration.field_specification import (
     EitherSpec,
     MappingSpec,
@@ -18,11 +19,15 @@ from sms_handover.configuration.field_specification import (
 from sms_handover.configuration.parameters import specs_of
 from sms_handover.configuration.robot_fields import ROBOT_FIELDS
 from sms_handover.configuration.schedule_fields import SCHEDULE_FIELDS
-from sms_handover.configuration.values import DEPUTY, ROBOT, SCHEDULE, path_of
+from sms_handover.configuration.values import CONDITIONS, DEPUTY, ROBOT, SCHEDULE, path_of
 from sms_handover.errors import UnknownNameError
 
 _NAME = re.compile(r"[^.\[\]]+")
-FIELDS: dict[str, MappingSpec] = {ROBOT: ROBOT_FIELDS, SCHEDULE: SCHEDULE_FIELDS}
+FIELDS: dict[str, MappingSpec] = {
+    ROBOT: ROBOT_FIELDS,
+    SCHEDULE: SCHEDULE_FIELDS,
+    CONDITIONS: CONDITIONS_FIELDS,
+}
 
 
 @dataclass(frozen=True)
@@ -40,7 +45,7 @@ class ValuePath:
 
 
 def value_paths(document: str, content: AnyMapping[str, Any]) -> tuple[ValuePath, ...]:
-    """Return the values of a ``robot`` or a ``schedule`` by path, in the order of its specification.
+    """Return the values of a document by path, in the order of its specification.
 
     ``content`` is that of the file, which its reader has accepted. The values of the deputy, which is a
     section of the schedule, begin with ``deputy``.
@@ -100,6 +105,8 @@ def _walk(path: str, spec: Spec, value: Any) -> Iterator[ValuePath]:
         for key, inner in spec.fields.items():
             if key in value or (isinstance(inner, ValueSpec | EitherSpec) and key not in spec.one_of):
                 yield from _walk(_below(path, key), inner, value.get(key))
+            elif isinstance(inner, MappingSpec) and not inner.required and key not in spec.one_of:
+                yield from _walk(_below(path, key), inner, {})
     elif isinstance(spec, NamedSpec):
         for name, item in value.items():
             yield from _walk(_below(path, name), spec.each, item)

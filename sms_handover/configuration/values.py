@@ -11,8 +11,8 @@ from typing import Any
 from sms_handover.configuration.yaml_reader import Mapping, load_value
 from sms_handover.errors import ConfigurationError, UnknownNameError
 
-ROBOT, DEPUTY, SCHEDULE = "robot", "deputy", "schedule"
-DOCUMENTS = (ROBOT, DEPUTY, SCHEDULE)  # the deputy is a section of the schedule
+ROBOT, DEPUTY, SCHEDULE, CONDITIONS = "robot", "deputy", "schedule", "conditions"
+DOCUMENTS = (ROBOT, DEPUTY, SCHEDULE, CONDITIONS)  # the deputy is a section of the schedule
 TRUTH, MODEL = "truth", "model"
 ROLES = (TRUTH, MODEL)  # what the plant has, and what every other node has
 _OF_ROLES = (ROBOT, DEPUTY)

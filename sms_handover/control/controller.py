@@ -63,8 +63,8 @@ class JointController(Generic[G]):
 
     def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
         """Return the efforts (n,) N m for a state, read-only; zero until a first reference has come."""
-        if self._news and stamp_ns > self._news[0].stamp_ns:
-            self._heed_news()
+        if self._news:
+            self.heed_news(stamp_ns)
         if not self._track.ready:
             return self._rest
         return frozen(self._law.effort(q, v, self._track.at(stamp_ns), self._dt))
@@ -84,8 +84,10 @@ class JointController(Generic[G]):
         """Whether the payload may be another one from the next state on."""
         return bool(self._news)
 
-    def _heed_news(self) -> None:
-        """Take up the payload of the latest events."""
+    def heed_news(self, stamp_ns: int) -> None:
+        """Take up the payload of the latest events, if a state comes after them."""
+        if not self._news or stamp_ns <= self._news[0].stamp_ns:
+            return
         changes = [self._payload.grasped(event) for event in self._news]
         self._news = ()
         if any(changes):

@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from sms_handover.control.computed_torque import ComputedTorque, TrackingEfforts
-from sms_handover.control.protocol import Controller
+from sms_handover.control.protocol import Controller, Distances, Preview
 from sms_handover.model.deputy import DeputyDescription
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import Array
@@ -41,7 +41,8 @@ class LawSetup(Generic[G]):
 
     A joint reference is extrapolated up to an age of ``longest_reference_ns``, without bound if None.
     ``computed_torque`` makes the inverse dynamics of a robot, by Pinocchio or compiled. ``deputy`` is the one
-    that is handed over, as the law knows it.
+    that is handed over, as the law knows it. Guidance comes every ``reference_ns``. What a law needs besides
+    it gets if it declares so: a ``preview`` of targets to come, the ``distances`` between bodies.
     """
 
     robot: RobotModel
@@ -50,6 +51,9 @@ class LawSetup(Generic[G]):
     longest_reference_ns: int | None = None
     computed_torque: Callable[[RobotModel], TrackingEfforts] = ComputedTorque
     deputy: DeputyDescription | None = None
+    reference_ns: int = 20_000_000
+    preview: Preview | None = None
+    distances: Distances | None = None
 
 
 @dataclass(frozen=True, eq=False)

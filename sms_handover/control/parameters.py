@@ -6,6 +6,7 @@ from typing import Any
 
 from sms_handover.configuration.parameters import build, parameter
 from sms_handover.control.law import Law
+from sms_handover.control.mpc.parameters import MpcGains
 from sms_handover.control.nmpc import NmpcGains
 from sms_handover.control.pid import PidGains
 from sms_handover.control.registry import GROUP, SHIPPED
@@ -13,7 +14,7 @@ from sms_handover.errors import ConfigurationError, UnknownNameError
 
 
 @dataclass(frozen=True)
-class ControllerParameters(PidGains, NmpcGains):
+class ControllerParameters(MpcGains, PidGains, NmpcGains):
     """The law that controls the joints, and its gains; the values are in ``config/controller.yaml``."""
 
     law: str = parameter(

@@ -1,6 +1,6 @@
 """Controller protocol: what the loop requires of any controller, ours or a user's."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Protocol, runtime_checkable
@@ -8,7 +8,17 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from sms_handover.errors import ControllerError
-from sms_handover.types import Array, GraspEvent, JointReference, Pose, TaskPhase, frozen
+from sms_handover.types import (
+    Array,
+    GraspEvent,
+    JointReference,
+    PlanReport,
+    Pose,
+    PreviewedTargets,
+    PreviewState,
+    TaskPhase,
+    frozen,
+)
 from sms_handover.units import ns_to_seconds
 
 
@@ -64,6 +74,70 @@ class Resumable(Protocol):
 
 
 @runtime_checkable
+class Planning(Protocol):
+    """What a controller has besides that solves a program as it goes on: it tells what came of each solve."""
+
+    def take_status(self) -> PlanReport | None:
+        """Return the report of the solve since the last call, None if there was none."""
+
+
+class Preview(Protocol):
+    """What a law that declares the need gets: the targets to come, as far as the schedule tells."""
+
+    def reset(self) -> None:
+        """Return to the start of a run."""
+
+    def update(
+        self, phase: TaskPhase, reference: JointReference, tool_in_world: Mapping[str, Pose], q: Array
+    ) -> None:
+        """Take the guidance of now, at a configuration (7 + n,)."""
+
+    def grasped(self, event: GraspEvent) -> None:
+        """Learn what came of a grasp command, between two updates."""
+
+    def ahead(self, stamps_ns: Iterable[int]) -> Sequence[PreviewedTargets]:
+        """Return the targets at some instants in order, from that of the last update on."""
+
+    @property
+    def state(self) -> PreviewState | None:
+        """Everything that later previews depend on, None at the start of a run."""
+
+    def restore(self, state: PreviewState | None) -> None:
+        """Go back to a former :attr:`state`."""
+
+
+@dataclass(frozen=True, eq=False)
+class NearPair:
+    """Two bodies between which distance counts, and what carries them: numbers of Pinocchio's joints.
+
+    The deputy has joint 0, which never moves. ``contact`` is the arm whose gripper the first or the second
+    body is where the other is the deputy, '' for any other two.
+    """
+
+    names: tuple[str, str]
+    joints: tuple[int, int]
+    contact: str
+    has_deputy: bool
+
+
+class Distances(Protocol):
+    """What a law that declares the need gets: the signed distances between the bodies of robot and deputy."""
+
+    @property
+    def pairs(self) -> Sequence[NearPair]:
+        """The pairs of bodies, in the order of their distances."""
+
+    def distances(self, q: Array, deputy_in_world: Pose) -> Array:
+        """Return the signed distance (pairs,) m of every pair at a configuration (7 + n,)."""
+
+    def nearest(self, pair: int) -> tuple[Array, Array]:
+        """Return where a pair was nearest in the last call: points (2, 3) m, unit normal (3,) in ``world``.
+
+        The normal points from the first body to the second.
+        """
+
+
+@runtime_checkable
 class Carrying(Protocol):
     """What a controller has besides that takes account of the mass of the deputy.
 
@@ -110,3 +184,8 @@ class CheckedController:
                 f"{self._joint_names[joint]}, expected a finite number"
             )
         return frozen(effort)
+
+
+def inner_of(controller: Controller) -> Controller:
+    """Return the controller itself, without the check of its efforts."""
+    return controller.inner if isinstance(controller, CheckedController) else controller

@@ -10,12 +10,13 @@ from types import MappingProxyType
 from typing import Any
 
 from sms_handover.control.law import Law
+from sms_handover.control.mpc.law import MPC
 from sms_handover.control.nmpc import NMPC
 from sms_handover.control.pid import PID
 from sms_handover.errors import ConfigurationError, UnknownNameError
 
 GROUP = "sms_handover.control_laws"
-SHIPPED: Mapping[str, Law[Any]] = MappingProxyType({law.name: law for law in (NMPC, PID)})
+SHIPPED: Mapping[str, Law[Any]] = MappingProxyType({law.name: law for law in (NMPC, PID, MPC)})
 
 
 def law_names() -> tuple[str, ...]:

@@ -100,6 +100,8 @@ def _references(run: RunData, wanted: Wanted) -> RunTable:
     columns.add_all([f"deputy.angular_velocity.{axis}" for axis in _AXES], "rad/s", run.deputy_twist[:, 3:])
     columns.add_all([f"linear_momentum.{axis}" for axis in _AXES], "kg m/s", run.linear_momentum)
     columns.add_all([f"angular_momentum.{axis}" for axis in _AXES], "kg m^2/s", run.angular_momentum)
+    columns.add_all([f"linear_impulse.{axis}" for axis in _AXES], "N s", run.linear_impulse)
+    columns.add_all([f"angular_impulse.{axis}" for axis in _AXES], "N m s", run.angular_impulse)
     columns.add("kinetic_energy", "J", run.kinetic_energy)
     for name, joules in (("work", run.work), ("external_work", run.external_work), ("lost", run.lost)):
         columns.add(name, "J", joules)

@@ -19,6 +19,7 @@ GRASP_MISSED, PHASE_RETRIED, GRASP_FAILED = "grasp_missed", "phase_retried", "gr
 IK_FAILED = "ik_failed"
 COLLISION, TOUCH = "collision", "touch"
 MESSAGE_REFUSED = "refused"
+PLAN_FAILED, PLAN_BACK = "plan_failed", "plan_back"
 POSITION_EXCEEDED, RATE_EXCEEDED = "position_exceeded", "rate_exceeded"
 
 

@@ -8,7 +8,7 @@ from enum import Enum
 from typing import TypeVar
 
 from sms_handover.graph.events import Severity
-from sms_handover.types import GraspAction, GraspStatus, IkStatus, PhaseState
+from sms_handover.types import GraspAction, GraspStatus, IkStatus, PhaseState, PlanStatus
 
 E = TypeVar("E", bound=Enum)
 
@@ -24,6 +24,10 @@ CONSTANTS: Mapping[Enum, int] = {
     IkStatus.ITERATION_LIMIT: 2,
     PhaseState.ACTIVE: 0,
     PhaseState.FAILED: 1,
+    PlanStatus.SOLVED: 0,
+    PlanStatus.ITERATION_LIMIT: 1,
+    PlanStatus.INFEASIBLE: 2,
+    PlanStatus.BRAKING: 3,
     Severity.INFO: 0,
     Severity.WARNING: 1,
     Severity.ERROR: 2,

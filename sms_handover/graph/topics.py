@@ -30,6 +30,7 @@ class Rate(Enum):
     CLOCK = "every 10 ms of simulation time"
     CHANGE = "on change, latched"
     WALL = "every second of wall time"
+    SOLVE = "every solve of a predictive law"
 
 
 @dataclass(frozen=True)
@@ -81,8 +82,11 @@ DEPUTY_ODOMETRY = "deputy/odometry"
 CLEARANCE = "clearance"  # only where it is measured online
 LINEAR_MOMENTUM = "momentum/linear"
 ANGULAR_MOMENTUM = "momentum/angular"
+LINEAR_IMPULSE = "impulse/linear"  # of wrenches from outside, only where there are any
+ANGULAR_IMPULSE = "impulse/angular"
 ENERGY = "energy"
 IK_STATUS = "ik/status"
+MPC_STATUS = "mpc/status"  # only where the law solves a program as it goes on
 ROBOT_DESCRIPTION = "robot_description"
 DEPUTY_MARKER = "deputy/marker"
 RUN_STATE = "run/state"
@@ -111,8 +115,13 @@ _OURS = "sms_handover_interfaces/msg"
 RUN_STATE_TYPE = f"{_OURS}/RunState"
 
 
-def graph_topics(arms: Iterable[str], *, clearance: bool = False) -> tuple[Topic, ...]:
-    """Return every topic of the graph for a robot with these arms; ``clearance`` if it is measured online."""
+def graph_topics(
+    arms: Iterable[str], *, clearance: bool = False, wrenches: bool = False
+) -> tuple[Topic, ...]:
+    """Return every topic of the graph for a robot with these arms.
+
+    ``clearance`` if it is measured online; ``wrenches`` if conditions have some from outside.
+    """
     everyone_else = (TRAJECTORY, IK, CONTROLLER)
     pose, vector = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/Vector3Stamped"
     odometry = "nav_msgs/msg/Odometry"
@@ -132,6 +141,7 @@ def graph_topics(arms: Iterable[str], *, clearance: bool = False) -> tuple[Topic
         Topic(ANGULAR_MOMENTUM, vector, (PLANT,), (), Rate.REFERENCE),
         Topic(ENERGY, f"{_OURS}/EnergyStamped", (PLANT,), (), Rate.REFERENCE),
         Topic(IK_STATUS, f"{_OURS}/IkStatus", (TRAJECTORY,), (), Rate.REFERENCE),
+        Topic(MPC_STATUS, f"{_OURS}/MpcStatus", (CONTROLLER,), (), Rate.SOLVE),
         Topic(ROBOT_DESCRIPTION, text, (PLANT,), (), Rate.CHANGE),
         Topic(TF, TF_TYPE, (PLANT, TRAJECTORY), (), Rate.REFERENCE),
         Topic(TF_STATIC, TF_TYPE, (PLANT,), (), Rate.CHANGE),
@@ -145,6 +155,10 @@ def graph_topics(arms: Iterable[str], *, clearance: bool = False) -> tuple[Topic
         Topic(CLOCK, "rosgraph_msgs/msg/Clock", (PLANT,), (), Rate.CLOCK),
         Topic(DIAGNOSTICS, "diagnostic_msgs/msg/DiagnosticArray", LOOP_NODES, (), Rate.WALL),
     ]
+    if wrenches:
+        table += [
+            Topic(name, vector, (PLANT,), (), Rate.REFERENCE) for name in (LINEAR_IMPULSE, ANGULAR_IMPULSE)
+        ]
     if clearance:
         table.append(Topic(CLEARANCE, f"{_OURS}/Clearance", (PLANT,), (TRAJECTORY,), Rate.REFERENCE))
     for arm in arms:

@@ -45,4 +45,4 @@ def _written_out(text: str, folder: Path, values: object) -> dict[str, object]:
     file = folder / "scenario.yaml"
     file.write_text(text, encoding="utf-8")
     of_roles = [value for value in values if any(roles_of([value]))] if isinstance(values, list) else []
-    return {"scenario": str(file), "robot": "", "schedule": "", "values": of_roles}
+    return {"scenario": str(file), "robot": "", "schedule": "", "conditions": "", "values": of_roles}

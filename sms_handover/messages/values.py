@@ -12,6 +12,8 @@ from sms_handover.types import (
     GraspEvent,
     GraspStatus,
     PhaseState,
+    PlanReport,
+    PlanStatus,
     TaskPhase,
 )
 from sms_handover.units import NS_PER_S
@@ -110,6 +112,26 @@ def collisions(message: Any) -> tuple[Collision, ...]:
         Collision(stamp_ns, item.group, (item.first_body, item.second_body), item.distance, item.allowed)
         for item in message.groups
         if item.distance < item.allowed
+    )
+
+
+def plan_report(message: Any) -> PlanReport:
+    """Return the value of an MpcStatus."""
+    return PlanReport(
+        stamp_ns=header_ns(message),
+        plan=int(message.plan),
+        status=member_of(PlanStatus, message.status),
+        iterations=int(message.iterations),
+        active=tuple(message.active),
+        largest_slack=message.largest_slack,
+        largest_slack_row=message.largest_slack_row,
+        kkt_residual=message.kkt_residual,
+        linearization_time=message.linearization_time,
+        program_time=message.program_time,
+        total_time=message.total_time,
+        plan_age=message.plan_age,
+        late_plans=int(message.late_plans),
+        reused_plans=int(message.reused_plans),
     )
 
 

@@ -121,6 +121,11 @@ class RobotDescription:
         return tuple(names)
 
     @property
+    def rotor_inertia(self) -> dict[str, float]:
+        """What the motor adds at each joint, kg m^2 by name: a URDF has no place for it."""
+        return {joint.name: joint.rotor_inertia for arm in self.arms for joint in arm.joints}
+
+    @property
     def mass(self) -> float:
         """Total mass in kg."""
         return self.base.inertia.mass + sum(arm.mass for arm in self.arms)

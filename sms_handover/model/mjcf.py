@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pinocchio as pin
 
-from sms_handover.model.parts import Origin
+from sms_handover.model.parts import Floats, Inertia, Origin
 from sms_handover.model.urdf_tree import FIXED, TreeJoint, TreeLink, UrdfTree, read_urdf
 from sms_handover.types import Array, Pose
 
@@ -43,6 +43,16 @@ class Solid:
     vertices: Array | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class Payload:
+    """A body that a link carries: its inertia in its own axes, and its pose in the link."""
+
+    name: str
+    link: str
+    inertia: Inertia
+    pose_in_link: Pose
+
+
 def to_mjcf(
     urdf: str,
     rotor_inertia: Mapping[str, float] | None = None,
@@ -51,20 +61,22 @@ def to_mjcf(
     limited: bool = True,
     solids: Iterable[Solid] = (),
     may_touch: Iterable[tuple[str, str]] = (),
+    payload: Payload | None = None,
 ) -> str:
     """Return the robot of URDF text as MJCF, without damping and gravity.
 
     A link is a body of the same name; one without mass and shape at the end of a chain is a site.
     ``rotor_inertia`` kg m^2 by joint is what motors add, which a URDF cannot say. The root moves freely if
     ``floating`` and is fixed to the world otherwise; joints have their limits if ``limited``. Between the
-    links of ``may_touch`` solids do not collide. Raises RobotDescriptionError if the text is no URDF.
+    links of ``may_touch`` solids do not collide. A ``payload`` is a child of the body that carries it. Raises
+    RobotDescriptionError if the text is no URDF.
     """
     tree = read_urdf(urdf)
     root = ET.Element("mujoco", model=tree.name)
     ET.SubElement(root, "compiler", _EXACTLY_AS_WRITTEN, angle="radian", eulerseq="XYZ")
     option = ET.SubElement(root, "option", _STILL, integrator="RK4")
     ET.SubElement(option, "flag", filterparent="disable")  # what may touch is stated
-    writer = _Writer(tree, rotor_inertia or {}, limited, tuple(solids))
+    writer = _Writer(tree, rotor_inertia or {}, limited, tuple(solids), payload)
     writer.meshes(root)
     body = ET.SubElement(ET.SubElement(root, "worldbody"), "body", name=tree.root)
     if floating:
@@ -83,10 +95,15 @@ class _Writer:
     """Writes the bodies of a tree, each inside the one that carries it."""
 
     def __init__(
-        self, tree: UrdfTree, rotor_inertia: Mapping[str, float], limited: bool, solids: tuple[Solid, ...]
+        self,
+        tree: UrdfTree,
+        rotor_inertia: Mapping[str, float],
+        limited: bool,
+        solids: tuple[Solid, ...],
+        payload: Payload | None,
     ) -> None:
         self._tree, self._rotor, self._limited = tree, rotor_inertia, limited
-        self._solids = solids
+        self._solids, self._payload = solids, payload
 
     def meshes(self, root: ET.Element) -> None:
         """Add the vertices of all convex hulls."""
@@ -101,7 +118,10 @@ class _Writer:
     def fill(self, body: ET.Element, link: TreeLink) -> None:
         """Give a body its inertia, its solids, and the bodies that it carries."""
         if link.inertia is not None:
-            _inertial(body, link)
+            _inertial(body, link.inertia, link.inertia_rpy)
+        if self._payload is not None and self._payload.link == link.name:
+            place = _at(self._payload.pose_in_link)
+            _inertial(ET.SubElement(body, "body", place, name=self._payload.name), self._payload.inertia)
         for solid in self._solids:
             if solid.link == link.name:
                 _geom(body, solid)
@@ -128,7 +148,8 @@ class _Writer:
 
     def _is_frame(self, joint: TreeJoint, link: TreeLink) -> bool:
         """Whether a link is nothing but a frame at the end of a chain."""
-        bare = link.inertia is None and not link.has_shape
+        carries = self._payload is not None and self._payload.link == link.name
+        bare = link.inertia is None and not link.has_shape and not carries
         return joint.kind == FIXED and bare and not self._tree.below(link.name)
 
     def _joint(self, body: ET.Element, joint: TreeJoint) -> None:
@@ -142,25 +163,28 @@ class _Writer:
         ET.SubElement(body, "joint", motor | bounds, name=joint.name, type=kind, axis=_text(joint.axis))
 
 
-def _inertial(body: ET.Element, link: TreeLink) -> None:
-    """Give a body its inertia by its principal axes.
+def _inertial(body: ET.Element, inertia: Inertia, rpy: Floats = (0.0, 0.0, 0.0)) -> None:
+    """Give a body its inertia, of which the axes are turned by ``rpy``, by its principal axes.
 
     They are found here: MuJoCo 3.10 stops its own search for them at about 1e-7 rad.
     """
-    assert link.inertia is not None
-    moments, axes = np.linalg.eigh(link.inertia.matrix)
-    if any(link.inertia_rpy):
-        axes = pin.rpy.rpyToMatrix(np.array(link.inertia_rpy)) @ axes
-    place = {"pos": _text(link.inertia.com), "xyaxes": _text([*axes[:, 0], *axes[:, 1]])}
-    ET.SubElement(body, "inertial", place, mass=_text([link.inertia.mass]), diaginertia=_text(moments))
+    moments, axes = np.linalg.eigh(inertia.matrix)
+    if any(rpy):
+        axes = pin.rpy.rpyToMatrix(np.array(rpy)) @ axes
+    place = {"pos": _text(inertia.com), "xyaxes": _text([*axes[:, 0], *axes[:, 1]])}
+    ET.SubElement(body, "inertial", place, mass=_text([inertia.mass]), diaginertia=_text(moments))
 
 
 def _geom(body: ET.Element, solid: Solid) -> None:
     """Add a solid to a body."""
-    x, y, z, w = solid.pose_in_link.quaternion_xyzw
-    place = {"pos": _text(solid.pose_in_link.position), "quat": _text([w, x, y, z])}
     what = {"mesh": solid.name} if solid.vertices is not None else {"size": _text(solid.size)}
-    ET.SubElement(body, "geom", place | what, name=solid.name, type=solid.kind)
+    ET.SubElement(body, "geom", _at(solid.pose_in_link) | what, name=solid.name, type=solid.kind)
+
+
+def _at(pose: Pose) -> dict[str, str]:
+    """Return the attributes of something at a pose in what carries it."""
+    x, y, z, w = pose.quaternion_xyzw
+    return {"pos": _text(pose.position), "quat": _text([w, x, y, z])}
 
 
 def _place(origin: Origin) -> dict[str, str]:

@@ -10,7 +10,8 @@ import numpy as np
 from sms_handover.configuration.scenario_file import LAW
 from sms_handover.control.law import Need
 from sms_handover.control.parameters import ControllerParameters, parameters_with
-from sms_handover.control.protocol import Carrying, Controller
+from sms_handover.control.plan_events import PlanEvents
+from sms_handover.control.protocol import Carrying, Controller, Planning, inner_of
 from sms_handover.control.registry import law_named
 from sms_handover.frames import BASE, WORLD
 from sms_handover.graph.topics import (
@@ -20,10 +21,12 @@ from sms_handover.graph.topics import (
     JOINT_COMMAND,
     JOINT_REFERENCE,
     JOINT_STATES,
+    MPC_STATUS,
     TASK_PHASE,
 )
 from sms_handover.nodes.parts.guidance_parts import GuidanceParts
 from sms_handover.nodes.parts.watchdogs import ReferenceWatchdog
+from sms_handover.ros.codecs.convert import plan_message
 from sms_handover.ros.codecs.events import read_grasp_event
 from sms_handover.ros.codecs.loop_messages import (
     JointStateCodec,
@@ -229,7 +232,11 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
 
     def prepare(self) -> None:
         """Set up the law; raises UnstableLoopError if its gains cannot work at this tick."""
+        self._plans = self.endpoints.publisher(MPC_STATUS)
         super().prepare()
+        inner = inner_of(self._controller)
+        self._solves = inner if isinstance(inner, Planning) else None
+        self._plan_events = PlanEvents()
         self._watchdog = ReferenceWatchdog(longest_reference_ns(self.common, self.parameters))
 
     @property
@@ -249,10 +256,15 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
     def begin(self) -> None:
         """Go back to the start of a run."""
         super().begin()
+        self._plan_events.reset()
         self._watchdog.reset()
 
     def on_answered(self, stamp: int) -> None:
-        """In real time, report when references stop coming and when they come again."""
+        """Publish what came of a solve; in real time, report when references stop and come again."""
+        report = self._solves.take_status() if self._solves else None
+        if report:
+            self._plans.publish(plan_message(report))
+            self.events.publish_all(self._plan_events.of(report))
         if not self._lockstep:
             event = self._watchdog.poll(self._parts.reference_ns, stamp)
             if event is not None:

@@ -65,7 +65,7 @@ class PlantNode(GraphNode[PlantParameters]):
     def prepare(self) -> None:
         """Place robot and deputy at the start of the schedule."""
         schedule = self.schedule
-        self._plant = make_plant(self.robot, schedule, self.common, self.parameters)
+        self._plant = make_plant(self.robot, schedule, self.common, self.parameters, self.conditions)
         self._end_ns = schedule.end_ns
         self.lockstep = self.common.mode == LOCKSTEP
         self._tick_ns, self._per_reference = self.common.tick_ns, self.common.ticks_per_reference
@@ -162,7 +162,10 @@ class PlantNode(GraphNode[PlantParameters]):
     def _make_endpoints(self) -> None:
         names = [GRASP_EVENT, RUN_STATE, LOOP_TIMING]
         self._publish = {name: self.endpoints.publisher(name) for name in names}
-        self._outputs = PlantOutputs(self.robot, self.endpoints.publisher, lockstep=self.lockstep)
+        wrenches = bool(self.conditions.wrenches)
+        self._outputs = PlantOutputs(
+            self.robot, self.endpoints.publisher, lockstep=self.lockstep, wrenches=wrenches
+        )
         for topic, codec in ((TASK_PHASE, self._phase_codec), (JOINT_COMMAND, self._command_codec)):
             self.inputs.subscribe(topic, partial(self._on_input, topic), codec.checked)
         self.inputs.subscribe(RUN_RECORDED, self._on_recorded, stamped)

@@ -13,7 +13,9 @@ from sms_handover.model.conserved import ConservedQuantities, together
 from sms_handover.model.robot_model import BASE_NQ, RobotModel
 from sms_handover.plant.deputy import DeputyMotion, MasslessDeputy
 from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics, pinocchio_dynamics
+from sms_handover.plant.effects import EffectsState, PlantEffects
 from sms_handover.plant.enforced_limits import EnforcedLimits
+from sms_handover.plant.external_wrenches import Companion, ExternalAccount
 from sms_handover.plant.grasping import execute_grasp
 from sms_handover.plant.integrators import TABLEAUS
 from sms_handover.plant.joint_limits import ENFORCE, Excess, JointLimitWatch
@@ -68,6 +70,7 @@ class PlantState:
     saturated_ticks: tuple[int, ...]
     excesses: tuple[Excess, ...]
     deputy: DeputyMotion
+    effects: EffectsState | None
 
 
 class FreeFloatingPlant:
@@ -85,18 +88,22 @@ class FreeFloatingPlant:
         initial: InitialState,
         tick_ns: int,
         make_dynamics: MakeDynamics | None = None,
+        effects: PlantEffects | None = None,
     ) -> None:
         """Place robot and deputy; raises ConfigurationError on a joint outside its limits.
 
         ``make_dynamics`` is asked for every robot that comes about as the deputy changes hands, by default
-        for Pinocchio's.
+        for Pinocchio's. ``effects`` are those of conditions that are not ideal.
         """
         self._robot = robot
         self._tolerance = parameters.grasp_tolerance
         self._initial = initial
         self._tick_ns = tick_ns
         self._tick_s = ns_to_seconds(tick_ns)
-        self._make = make_dynamics or pinocchio_dynamics(TABLEAUS[parameters.integrator], self._tick_s)
+        tableau = TABLEAUS[parameters.integrator]
+        make = make_dynamics or pinocchio_dynamics(tableau, self._tick_s)
+        self._effects = effects
+        self._make = effects.dynamics(make, tableau) if effects else make
         self._watch = JointLimitWatch(robot, tick_ns)
         self._enforces, self._rated_speed = parameters.joint_limits == ENFORCE, parameters.rated_speed
         self._check_start()
@@ -111,6 +118,8 @@ class FreeFloatingPlant:
         self.v = read_only(np.zeros(robot.pin.nv))
         self.joint_effort = read_only(np.zeros(robot.n_joints))
         self._work = self._losses = 0.0
+        if self._effects:
+            self._effects.reset()
         self._watch.reset()
         self._saturated_ticks = np.zeros(robot.n_joints, dtype=np.int64)
         place = (initial.deputy_in_world, initial.deputy_grasp_frames)
@@ -124,6 +133,11 @@ class FreeFloatingPlant:
         self._next_losses = 0.0
         self._load()
 
+    def seed(self, seed: int) -> None:
+        """Let every random stream of the conditions follow from a seed, from the start of a run on."""
+        if self._effects:
+            self._effects.seed(seed)
+
     def snapshot(self) -> PlantState:
         """Return the state to :meth:`restore`."""
         return PlantState(
@@ -136,6 +150,7 @@ class FreeFloatingPlant:
             tuple(self._saturated_ticks.tolist()),
             self._watch.excesses(self.stamp_ns),
             self._deputy.motion,
+            self._effects.state if self._effects else None,
         )
 
     def restore(self, state: PlantState) -> None:
@@ -150,6 +165,8 @@ class FreeFloatingPlant:
         self._saturated_ticks = np.array(state.saturated_ticks, dtype=np.int64)
         self._watch.restore(state.excesses)
         self._deputy.restore(state.deputy)
+        if self._effects and state.effects:
+            self._effects.restore(state.effects)
         self._next_v, self._next_losses = None, 0.0
         if self._payload:
             self._payload.follow_holder()
@@ -198,12 +215,22 @@ class FreeFloatingPlant:
 
     @property
     def external_work(self) -> float:
-        """Work in J that wrenches from outside have done since the start; none act on this plant."""
-        return 0.0
+        """Work in J that wrenches from outside have done since the start."""
+        return self._effects.external.work if self._effects else 0.0
+
+    @property
+    def is_ideal(self) -> bool:
+        """Whether the conditions are ideal: commands are the efforts, and nothing else acts."""
+        return self._effects is None
+
+    @property
+    def external_impulse(self) -> ExternalAccount | None:
+        """What wrenches from outside have given since the start, None where conditions have none."""
+        return self._effects.external if self._effects and self._effects.has_wrenches else None
 
     @property
     def losses(self) -> float:
-        """Energy in J that has become heat since the start, in joint stops and in grips that close."""
+        """Energy in J that has become heat since the start, in joint stops, friction and grips that close."""
         return self._losses
 
     @property
@@ -219,7 +246,10 @@ class FreeFloatingPlant:
     @property
     def conserved(self) -> ConservedQuantities:
         """Return momenta, energy and centre of mass of robot and deputy."""
-        of_robot = self._kinematics.conserved(self.q, self.v)
+        return self.with_deputy(self._kinematics.conserved(self.q, self.v))
+
+    def with_deputy(self, of_robot: ConservedQuantities) -> ConservedQuantities:
+        """Return what is conserved of robot and deputy, by that of the robot with what it carries."""
         if not isinstance(self._deputy, RigidDeputy) or self._deputy.holder:
             return of_robot
         return together(of_robot, self._robot.mass, self._deputy.conserved, self._deputy.inertia.mass)
@@ -272,15 +302,20 @@ class FreeFloatingPlant:
 
         The work is u . (q_m(t + h) - q_m(t)), exact because u is constant over the tick.
         """
-        effort = self._limited(asked)
+        effects = self._effects
+        effort = self._limited(effects.torque(self.tick, asked) if effects else asked)
         if self._next_v is not None:
             self._jump(self._next_v)
+        if effects:
+            effects.begins(self.tick, self._stepper)
         before = self.q
         if self._enforced is None:
             q, v = self._stepper.step(before, self.v, effort)
         else:
             q, v, effort, lost = self._enforced.step(before, self.v, effort)
             self._losses += lost
+        if effects:
+            self._losses += effects.settle(self._companion)
         for part in (effort * (q[BASE_NQ:] - before[BASE_NQ:])).tolist():
             self._work += part
         self.q, self.v, self.joint_effort = q, v, effort
@@ -321,6 +356,15 @@ class FreeFloatingPlant:
         if not self._enforces:
             return dynamics, None
         return dynamics, EnforcedLimits(robot, dynamics.stepper, self._rated_speed, self._tick_s)
+
+    @property
+    def _companion(self) -> Companion | None:
+        """The deputy where it floats and has mass."""
+        deputy = self._deputy
+        if not isinstance(deputy, RigidDeputy) or deputy.holder:
+            return None
+        conserved, mass = deputy.conserved, deputy.inertia.mass
+        return Companion(mass, conserved.centre_of_mass, conserved.linear_momentum / mass)
 
     def _limited(self, asked: Array) -> Array:
         """Return the efforts that act, and count those at their limit or beyond."""

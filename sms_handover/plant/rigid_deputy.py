@@ -64,7 +64,9 @@ class RigidDeputy(MasslessDeputy):
         self._set(pose_row(self.state.deputy_in_world), twist_in_deputy)
 
     def drift(self, duration: float) -> None:
-        """Move freely over one tick."""
+        """Move freely over one tick; at rest it stays where it is, to the bit."""
+        if self.rests:
+            return
         self._set(*self._integrator.step(self._acceleration, self._q, self._v))
 
     @property

@@ -39,7 +39,13 @@ def run_card(run: RecordedRun, style: RunStyle, completion: Completion) -> RunCa
         duration=ns_to_seconds(int(ticks[-1] - ticks[0])) if len(ticks) else 0.0,
         started=run.info.provenance.get("start", ""),
         messages=run.info.message_count,
-        verdicts=(_completion(completion), _grasps(run), *_decisions(run), _recording(ledger)),
+        verdicts=(
+            _completion(completion),
+            _grasps(run),
+            *_decisions(run),
+            _recording(ledger),
+            *_second_engine(run),
+        ),
         ledger="" if ledger is None else ledger_table(ledger),
     )
 
@@ -65,6 +71,12 @@ def _decisions(run: RecordedRun) -> tuple[Verdict, ...]:
     """Return the number of warnings and errors that the nodes reported, if there were any."""
     words = graver_in_words(run.data.run_events)
     return (Verdict(words, good=False),) if words else ()
+
+
+def _second_engine(run: RecordedRun) -> tuple[Verdict, ...]:
+    """Return what another engine says of the run, if one was asked."""
+    found = run.second_engine
+    return () if found is None else (Verdict(found.sentence(), None if found.unsupported else found.agrees),)
 
 
 def _recording(ledger: Ledger | None) -> Verdict:

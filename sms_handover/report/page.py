@@ -17,7 +17,7 @@ from sms_handover.report.recorded_run import RecordedRun, common_tolerance, comp
 from sms_handover.report.security import content_security_policy, inline_scripts
 from sms_handover.report.styles import run_styles
 
-_SCRIPTS = ("data.js", "theme.js", "plot.js", "link.js", "main.js")
+_SCRIPTS = ("data.js", "colours.js", "theme.js", "plot.js", "link.js", "main.js")
 
 
 def report_page(runs: Sequence[RecordedRun]) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 from pathlib import Path
 
 from sms_handover.analysis.clearance import TaskTexts
@@ -11,6 +12,7 @@ from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.run.loop_record import LoopRecord, read_loop
 from sms_handover.bag.run.reader import read_run
 from sms_handover.clearance.contacts import CONTACT_DEPTH
+from sms_handover.engines.verdict import Verdict as EngineVerdict
 from sms_handover.errors import BagError, ConfigurationError
 from sms_handover.graph.topics import CONTROLLER, PLANT
 from sms_handover.plant.deputy import GraspTolerance
@@ -20,15 +22,17 @@ UNKNOWN_LAW = "unknown"
 
 _CONTACT_DEPTH = "contact_depth"
 _TOLERANCES = ("grasp_position_tolerance", "grasp_angle_tolerance", "grasp_speed_tolerance")
+_RATE_TOLERANCE = "grasp_rate_tolerance"  # older versions did not judge the rate
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedRun:
-    """The arrays of a run under a name, and the description of its bag."""
+    """The arrays of a run under a name, the description of its bag, and what a second engine says of it."""
 
     name: str
     data: RunData
     info: BagInfo
+    second_engine: EngineVerdict | None = None
 
     @cached_property
     def loop(self) -> LoopRecord:
@@ -54,7 +58,7 @@ class RecordedRun:
     def tolerance(self) -> GraspTolerance | None:
         """Return the grasp tolerance, None if the bag lacks it."""
         plant = self.info.parameters.get(PLANT, {})
-        values = [plant.get(name) for name in _TOLERANCES]
+        values = [*(plant.get(name) for name in _TOLERANCES), plant.get(_RATE_TOLERANCE, inf)]
         numbers = [float(value) for value in values if isinstance(value, int | float)]
         return GraspTolerance(*numbers) if len(numbers) == len(values) else None
 

@@ -19,7 +19,7 @@ def check_scenario(scenario: Scenario) -> tuple[PhasePrediction, ...]:
     """
     parameters, truth = scenario.parameters, scenario.truth
     robot, schedule = scenario.model.robot, scenario.model.schedule
-    make_plant(truth.robot, truth.schedule, parameters.common, parameters.plant)
+    make_plant(truth.robot, truth.schedule, parameters.common, parameters.plant, truth.conditions)
     ours = CONTROLLER not in parameters.common.external
     if ours:
         make_controller(robot, schedule, parameters.common, parameters.controller)

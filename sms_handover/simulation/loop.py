@@ -5,15 +5,24 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from sms_handover.clearance.monitor import PeriodClearance
-from sms_handover.compiled.periods import CompiledPeriods
+from sms_handover.compiled.periods import CompiledPeriods, Room
 from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.control.law import Need
-from sms_handover.control.protocol import Carrying, CheckedController, Controller, Guidance
+from sms_handover.control.plan_events import PlanEvents
+from sms_handover.control.protocol import (
+    Carrying,
+    CheckedController,
+    Controller,
+    Guidance,
+    Planning,
+    inner_of,
+)
 from sms_handover.control.registry import law_named
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import CONTROLLER
 from sms_handover.model.conserved import ConservedQuantities
+from sms_handover.plant.external_wrenches import ExternalAccount
 from sms_handover.simulation.quiet_periods import QuietPeriods, QuietRunner
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.snapshot import Snapshot, controller_data, restore_controller
@@ -31,6 +40,7 @@ from sms_handover.types import (
     GraspEvent,
     IkStatus,
     JointReference,
+    PlanReport,
     Pose,
     RobotState,
     TaskPhase,
@@ -43,7 +53,8 @@ class Period:
     """What is worked out once per reference period, at the instant at which it begins.
 
     Tool poses and targets are in ``world``; since the start the joint efforts have done ``work`` J, wrenches
-    from outside ``external_work`` J, and ``lost`` J have become heat; ``ik_status`` is None where no tool had
+    from outside ``external_work`` J, and ``lost`` J have become heat;
+    ``external_impulse`` is None where no such wrenches act; ``ik_status`` is None where no tool had
     a target. ``events`` has what came of grasp commands, ``decisions`` what was decided about the task.
     ``clearance`` is None unless it is measured online.
     """
@@ -57,6 +68,7 @@ class Period:
     work: float
     external_work: float
     lost: float
+    external_impulse: ExternalAccount | None
     ik_status: IkStatus | None
     events: tuple[GraspEvent, ...]
     decisions: tuple[RunEvent, ...]
@@ -105,13 +117,15 @@ class Observation(NamedTuple):
 class Ticks:
     """Ticks under one guidance, as arrays; ``period`` is there if a reference period begins with them.
 
-    ``excesses`` tells, by the number of the tick, of limits of the joints that were exceeded.
+    ``excesses`` tells, by the number of the tick, of limits of the joints that were exceeded and of solves
+    without a plan; ``plan`` is what came of the solve of a predictive law.
     """
 
     rows: TickRows
     excesses: Mapping[int, tuple[RunEvent, ...]]
     guidance: Guidance
     period: Period | None
+    plan: PlanReport | None = None
 
     @property
     def phases(self) -> tuple[TaskPhase, ...]:
@@ -150,7 +164,9 @@ class Loop:
         parameters, truth = self.scenario.parameters, self.scenario.truth
         robot, schedule = self.scenario.model.robot, self.scenario.model.schedule
         self._common = parameters.common
-        self._plant = make_plant(truth.robot, truth.schedule, self._common, parameters.plant)
+        self._plant = make_plant(
+            truth.robot, truth.schedule, self._common, parameters.plant, truth.conditions
+        )
         self._generator = make_generator(robot, schedule, self._common, parameters.trajectory)
         self._find_joints = make_ik(robot, self._common, parameters.ik)
         measured = self._common.measures_clearance
@@ -169,6 +185,9 @@ class Loop:
             self.law = parameters.controller.law
             self._aims = Need.TOOL_TARGETS in law_named(self.law).needs
             self._controller = make_controller(robot, schedule, self._common, parameters.controller)
+        inner = inner_of(self._controller)
+        self._solves = inner if isinstance(inner, Planning) else None
+        self._plan_events = PlanEvents()
         self._runner = make_runner(self._plant, self._controller, robot, self._common, parameters.plant)
         self._quiet: QuietRunner | None = None
         if isinstance(self._runner, CompiledTicks) and not self._monitor:
@@ -182,9 +201,11 @@ class Loop:
         ``seed`` is that of every random stream, by default that of the scenario, and is kept by snapshots.
         """
         self.seed = self._common.seed if seed is None else seed
+        self._plant.seed(self.seed)
         self._plant.reset()
         self._generator.reset()
         self._controller.reset()
+        self._plan_events.reset()
         if self._monitor:
             self._monitor.reset()
         schedule, rest = self.scenario.model.schedule, self._plant.state
@@ -225,7 +246,12 @@ class Loop:
         period = None if since else self._begin_period()
         left = self.last_tick - plant.tick
         ticks = min(most, self._per_reference - since, left + 1)
-        return Ticks(*self._run(ticks, left), self._guidance, period)
+        rows, excesses = self._run(ticks, left)
+        report = self._solves.take_status() if self._solves else None
+        told = self._plan_events.of(report) if report else ()
+        if told:
+            excesses = {**excesses, 0: excesses.get(0, ()) + told}
+        return Ticks(rows, excesses, self._guidance, period, report)
 
     def _run(self, ticks: int, left: int) -> tuple[TickRows, Mapping[int, tuple[RunEvent, ...]]]:
         """Carry out some ticks, with ``left`` still to be integrated; return them with their excesses."""
@@ -238,10 +264,13 @@ class Loop:
             excesses[last] = excesses.get(last, ()) + plant.end_excesses()
         return rows, excesses
 
-    def advance_quietly(self) -> Ticks | QuietPeriods:
-        """Carry out as many reference periods as there are without a decision, or the next one."""
+    def advance_quietly(self, room: Room | None = None) -> Ticks | QuietPeriods:
+        """Carry out as many reference periods as there are without a decision, or the next one.
+
+        The rows of quiet periods may be in the ``room`` for them that is returned for a number of ticks.
+        """
         if self._quiet and not self.finished and self._plant.tick % self._per_reference == 0:
-            quiet = self._quiet.run(self._guidance, self.last_tick)
+            quiet = self._quiet.run(self._guidance, self.last_tick, room)
             if quiet:
                 for self._guidance in quiet.guidance:
                     self._controller.guide(self._guidance)
@@ -266,6 +295,7 @@ class Loop:
         Under another law than that of the snapshot the controller begins here, with the guidance in force.
         Raises ConfigurationError if the snapshot is of another robot or schedule.
         """
+        self._plant.seed(snapshot.seed)
         self._plant.restore(snapshot.plant)
         self._generator.restore(snapshot.trajectory)
         if self._monitor and snapshot.clearance:
@@ -274,6 +304,7 @@ class Loop:
         self.last_tick = self._common.last_tick(phase.end_ns, failed=phase.failed)
         self.seed, self.finished = snapshot.seed, snapshot.finished
         self._controller.reset()
+        self._plan_events.reset()
         if snapshot.law == self.law:
             restore_controller(self._controller, snapshot.controller)
         elif snapshot.plant.tick:
@@ -317,6 +348,7 @@ class Loop:
             plant.work,
             plant.external_work,
             plant.losses,
+            plant.external_impulse,
             status,
             events,
             decisions,

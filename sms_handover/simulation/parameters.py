@@ -36,8 +36,11 @@ class CommonParameters:
     scenario: str = parameter("name of a shipped scenario, or path of a scenario file")
     robot: str = parameter("path of a robot description; empty: that of the scenario")
     schedule: str = parameter("path of a task schedule; empty: that of the scenario")
+    conditions: str = parameter(
+        "name of shipped conditions, or path of a file of them; empty: those of the scenario"
+    )
     values: tuple[str, ...] = parameter(
-        "values of robot, deputy and schedule by dotted path on top of the files, such as "
+        "values of robot, deputy, schedule and conditions by dotted path on top of the files, such as "
         "robot.base.mass:=300 or schedule.phases.carry.duration:=30; those of the plant alone begin with "
         "truth, as in truth.robot.base.mass:=264, those of every other node with model"
     )

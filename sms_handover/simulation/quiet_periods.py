@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sms_handover.compiled.periods import CompiledPeriods
+from sms_handover.compiled.periods import CompiledPeriods, Room
 from sms_handover.control.protocol import Guidance
 from sms_handover.graph.events import RunEvent
 from sms_handover.plant.free_floating import FreeFloatingPlant
@@ -42,10 +42,11 @@ class QuietRunner:
         self._plant, self._generator = plant, generator
         self._periods, self._per_period = periods, per_period
 
-    def run(self, guidance: Guidance, last_tick: int) -> QuietPeriods | None:
+    def run(self, guidance: Guidance, last_tick: int, room: Room | None = None) -> QuietPeriods | None:
         """Carry out the quiet periods from here on, after one with ``guidance``, None if there are none.
 
         All their ticks are before ``last_tick``. The goals of the phase stand still, and no decision is due.
+        The rows are written to ``room``, by default to a new array.
         """
         plant, generator, per_period = self._plant, self._generator, self._per_period
         first, stamp_ns = plant.tick, plant.stamp_ns
@@ -62,7 +63,7 @@ class QuietRunner:
             return None
         course = generator.course(stamp_ns, period_ns, count, plant.deputy.deputy_in_world)
         failures = generator.ik_failures
-        rows, periods, failed = self._periods.run(course, before, stamp_ns, deputy, failures)
+        rows, periods, failed = self._periods.run(course, before, stamp_ns, deputy, failures, room)
         generator.failed_so_far(failed)
         phases = tuple(_at(course.phase, stamp) for stamp in periods.stamp_ns.tolist())
         latest = range(max(0, len(phases) - 2), len(phases))

@@ -4,6 +4,7 @@ from collections import defaultdict
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.message_constants import CONSTANTS
@@ -11,13 +12,15 @@ from sms_handover.model.poses import pose_row, twist_in_deputy
 from sms_handover.run_data import RunData
 from sms_handover.simulation.loop import Period, Ticks
 from sms_handover.simulation.quiet_periods import QuietPeriods
-from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, TaskPhase, TickRows
+from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, PlanReport, TaskPhase, TickRows
 
 _BY_PERIOD = (
     *("reference_position", "reference_velocity", "deputy_pose", "deputy_twist"),
     *("linear_momentum", "angular_momentum", "kinetic_energy", "work", "external_work", "lost"),
 )
+_NONE = np.zeros(3)  # [N s], [N m s]
 _NOT_ASKED = -1  # in place of a status where inverse kinematics was not asked
+_GROWTH = 1.5  # [-] of the room for rows, where a run is longer than it was told
 
 
 class RunRecorder:
@@ -26,30 +29,60 @@ class RunRecorder:
     Of a period only numbers, phase and events are kept, so that a long run stays small.
     """
 
-    def __init__(self, joint_names: tuple[str, ...], arms: tuple[str, ...]) -> None:
-        """Start without a row."""
+    def __init__(self, joint_names: tuple[str, ...], arms: tuple[str, ...], ticks: int = 0) -> None:
+        """Start without a row, with room for so many ticks; for more it grows."""
         self._joint_names, self._arms = joint_names, arms
-        self._rows: list[TickRows] = []
+        n = len(joint_names)
+        self._ends = np.cumsum([BASE_NQ + n, BASE_NV + n, n, n]).tolist()
+        self._table = np.empty((ticks, self._ends[-1]))
+        self._stamps: list[npt.NDArray[np.int64]] = []
+        self._count = 0
         self._periods: defaultdict[str, list[Any]] = defaultdict(list)
         self._target_pose, self._tool_pose = ({arm: list[Array]() for arm in arms} for _ in range(2))
         self._phases: list[TaskPhase] = []
         self._events: list[GraspEvent] = []
         self._decisions: list[RunEvent] = []
+        self._plans: list[PlanReport] = []
 
     def add(self, ticks: Ticks | QuietPeriods) -> None:
         """Add some ticks, and the reference periods that begin with them."""
-        self._rows.append(ticks.rows)
+        self._add_rows(ticks.rows)
         self._decisions.extend(ticks.excesses.get(0, ()))
         if isinstance(ticks, QuietPeriods):
             self._add_periods(ticks)
         elif ticks.period:
             self._add_period(ticks.period)
+        if isinstance(ticks, Ticks) and ticks.plan:
+            self._plans.append(ticks.plan)
         for index, events in ticks.excesses.items():
             self._decisions.extend(events if index else ())
+
+    def room(self, ticks: int) -> Array:
+        """Return where the next rows of ticks are kept, for who writes them there and adds them next.
+
+        A row (13 + 4 n,) is q, v, the efforts that acted, and those that answer, as in TickRows.
+        """
+        end = self._count + ticks
+        if end > len(self._table):
+            grown = np.empty((max(end, round(_GROWTH * len(self._table))), self._ends[-1]))
+            grown[: self._count] = self._table[: self._count]
+            self._table = grown
+        return self._table[self._count : end]
+
+    def _add_rows(self, rows: TickRows) -> None:
+        """Add the rows of some ticks; those that were written where they belong are there."""
+        if rows.q.base is not self._table:
+            room = self.room(len(rows))
+            columns = (rows.q, rows.v, rows.joint_effort, rows.effort)
+            for start, end, values in zip((0, *self._ends), self._ends, columns, strict=False):
+                room[:, start:end] = values
+        self._count += len(rows)
+        self._stamps.append(rows.stamp_ns)
 
     def _add_period(self, period: Period) -> None:
         """Add what a reference period begins with."""
         reference, conserved, status = period.reference, period.conserved, period.ik_status
+        given = period.external_impulse
         deputy = pose_row(period.deputy.deputy_in_world)
         row = {
             "reference_ns": reference.stamp_ns,
@@ -63,6 +96,8 @@ class RunRecorder:
             "work": period.work,
             "external_work": period.external_work,
             "lost": period.lost,
+            "linear_impulse": _NONE if given is None else given.linear_impulse,
+            "angular_impulse": _NONE if given is None else given.angular_impulse,
             "ik_status": CONSTANTS[status] if status else _NOT_ASKED,
         }
         for name, value in row.items():
@@ -80,6 +115,8 @@ class RunRecorder:
         for name in _BY_PERIOD:
             self._periods[name].append(getattr(rows, name))
         self._periods["reference_ns"].append(rows.stamp_ns)
+        for name in ("linear_impulse", "angular_impulse"):  # in C nothing acts from outside
+            self._periods[name].append(np.zeros((len(rows.stamp_ns), 3)))
         status = [CONSTANTS[status] if status else _NOT_ASKED for status in rows.ik_status]
         self._periods["ik_status"].append(np.array(status))
         for arm in self._arms:
@@ -89,21 +126,22 @@ class RunRecorder:
 
     def data(self) -> RunData:
         """Return the run so far."""
-        rows = self._rows
+        rows, (nq, nv, acted, _) = self._table[: self._count], self._ends
         return RunData(
             joint_names=self._joint_names,
             arms=self._arms,
-            tick_ns=np.concatenate([part.stamp_ns for part in rows]),
-            joint_position=np.concatenate([part.q[:, BASE_NQ:] for part in rows]),
-            joint_velocity=np.concatenate([part.v[:, BASE_NV:] for part in rows]),
-            joint_effort=np.concatenate([part.joint_effort for part in rows]),
-            joint_command=np.concatenate([part.effort for part in rows]),
-            base_pose=np.concatenate([part.q[:, :BASE_NQ] for part in rows]),
-            base_twist=np.concatenate([part.v[:, :BASE_NV] for part in rows]),
+            tick_ns=np.concatenate(self._stamps),
+            joint_position=rows[:, BASE_NQ:nq],
+            joint_velocity=rows[:, nq + BASE_NV : nv],
+            joint_effort=rows[:, nv:acted],
+            joint_command=rows[:, acted:],
+            base_pose=rows[:, :BASE_NQ],
+            base_twist=rows[:, nq : nq + BASE_NV],
             target_pose={arm: np.concatenate(rows) for arm, rows in self._target_pose.items()},
             tool_pose={arm: np.concatenate(rows) for arm, rows in self._tool_pose.items()},
             phases=tuple(self._phases),
             grasp_events=tuple(self._events),
             run_events=tuple(self._decisions),
+            plans=tuple(self._plans),
             **{name: np.concatenate(rows) for name, rows in self._periods.items()},
         )

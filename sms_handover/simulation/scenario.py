@@ -6,6 +6,9 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TypeVar
 
+from sms_handover.conditions.conditions import IDEAL, Conditions, conditions_of, model_error_of
+from sms_handover.conditions.model_error import ModelError, with_model_error
+from sms_handover.conditions.random_streams import RandomStreams
 from sms_handover.configuration.documents import Replacements, as_yaml, documents_of, resolved, truth_is_model
 from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.parameters import EVERY_NODE, build, read_parameter_files
@@ -47,17 +50,23 @@ class ParameterSet:
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """Robot and schedule, the deputy in it, as they are or as they are known."""
+    """Robot and schedule, the deputy in it, and conditions, as they are or as they are known.
+
+    What is known of the conditions is that they are ideal. ``model_error`` is what the robot was drawn with.
+    """
 
     robot: RobotModel
     schedule: Schedule
+    conditions: Conditions = IDEAL
+    model_error: ModelError | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
     """Parameters of one run, and its world: the ``truth`` that the plant has, the ``model`` of all others.
 
-    The two are the same object unless the scenario makes a difference between them.
+    Unless the scenario makes a difference between them, the two are the same object, or have robot and
+    schedule in common where the conditions are not ideal.
     """
 
     parameters: ParameterSet
@@ -145,8 +154,10 @@ def load_scenario(
     scenario = load_scenario_file(_scenario_name(of_nodes, files))
     parameters = load_parameters(of_nodes, files, scenario)
     truth = load_world(parameters.common, TRUTH, scenario)
-    same = truth_is_model(scenario, _replacements(parameters.common))
-    model = truth if same else load_world(parameters.common, MODEL, scenario)
+    if truth_is_model(scenario, _replacements(parameters.common)) and not truth.model_error:
+        model = truth if truth.conditions is IDEAL else replace(truth, conditions=IDEAL)
+    else:
+        model = load_world(parameters.common, MODEL, scenario)
     if model.robot.joint_names != truth.robot.joint_names:
         raise ConfigurationError(
             f"truth has the joints {', '.join(truth.robot.joint_names)}, "
@@ -163,9 +174,14 @@ def load_world(common: CommonParameters, role: str, scenario: ScenarioFile) -> W
     What the parameters give in place of its files and values lies over it. Raises ConfigurationError.
     """
     documents = documents_of(scenario, _replacements(common), role)
-    robot = RobotModel(robot_of(documents.robot))
-    text = documents.schedule_text
-    return World(robot, schedule_of(documents.schedule, text, robot, common.reference_ns))
+    description, text = robot_of(documents.robot), documents.schedule_text
+    error = model_error_of(documents.conditions) if role == TRUTH else None
+    if error:
+        description = with_model_error(description, error, RandomStreams(common.seed))
+    robot = RobotModel(description)
+    conditions = conditions_of(documents.conditions, robot)
+    schedule = schedule_of(documents.schedule, text, robot, common.reference_ns)
+    return World(robot, schedule, conditions if role == TRUTH else IDEAL, error)
 
 
 def deputy_masses(common: CommonParameters, scenario: ScenarioFile) -> tuple[float, ...]:
@@ -182,7 +198,7 @@ def scenario_text(common: CommonParameters, scenario: ScenarioFile) -> str:
 
 
 def _replacements(common: CommonParameters) -> Replacements:
-    return Replacements(common.robot, common.schedule, common.values)
+    return Replacements(common.robot, common.schedule, common.conditions, common.values)
 
 
 def _scenario_name(of_nodes: Overrides, files: Sequence[Path]) -> str:

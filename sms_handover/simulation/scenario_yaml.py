@@ -11,7 +11,7 @@ from sms_handover.configuration.values import roles_of
 from sms_handover.graph.topics import CONTROLLER, IK, PLANT, TRAJECTORY
 from sms_handover.simulation.scenario import load_scenario, scenario_text
 
-_WRITTEN_OUT = {"scenario", "robot", "schedule"}  # parameters whose content stands in the text
+_WRITTEN_OUT = {"scenario", "robot", "schedule", "conditions"}  # parameters whose content stands in the text
 _HOW = {  # parameters that say how a run is carried out: they change none of its numbers
     "mode",
     "transport",

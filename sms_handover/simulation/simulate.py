@@ -25,9 +25,9 @@ def simulate(
     """
     loop = Loop(scenario, controller)
     robot = loop.scenario.model.robot
-    recorder = RunRecorder(robot.joint_names, robot.arms)
+    recorder = RunRecorder(robot.joint_names, robot.arms, loop.last_tick + 1)
     while not loop.finished:
-        ticks = loop.advance_quietly()
+        ticks = loop.advance_quietly(recorder.room)
         recorder.add(ticks)
         if progress:
             for phase in ticks.phases:

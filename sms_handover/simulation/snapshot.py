@@ -11,7 +11,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from sms_handover.clearance.monitor import MonitorState
-from sms_handover.control.protocol import CheckedController, Controller, Guidance, Resumable
+from sms_handover.control.protocol import Controller, Guidance, Resumable, inner_of
 from sms_handover.errors import ConfigurationError, ControllerError
 from sms_handover.plant.free_floating import PlantState
 from sms_handover.trajectory.generator import GeneratorState
@@ -65,7 +65,7 @@ def load_snapshot(path: Path) -> Snapshot:
 
 def controller_data(controller: Controller, law: str) -> Any:
     """Return the state of a controller as plain data; raises ControllerError if it does not tell it."""
-    inner = _inner(controller)
+    inner = inner_of(controller)
     if not isinstance(inner, Resumable):
         raise ControllerError(f"{law} has no state to keep: give it 'state' and 'restore' (docs/control.md)")
     return plain(inner.state)
@@ -73,7 +73,7 @@ def controller_data(controller: Controller, law: str) -> Any:
 
 def restore_controller(controller: Controller, data: Any) -> None:
     """Take a controller that has been reset back to the state in ``data``."""
-    inner = _inner(controller)
+    inner = inner_of(controller)
     if isinstance(inner, Resumable):
         inner.restore(structured(type(inner.state), data))
 
@@ -108,8 +108,3 @@ def structured(kind: Any, data: Any) -> Any:
     if origin is not None and issubclass(origin, Mapping):
         return {name: structured(inner[1], item) for name, item in data.items()}
     return kind(data) if isinstance(kind, type) and issubclass(kind, Enum) else data
-
-
-def _inner(controller: Controller) -> Controller:
-    """Return the controller itself, without the check of its efforts."""
-    return controller.inner if isinstance(controller, CheckedController) else controller

@@ -12,6 +12,7 @@ from sms_handover.compiled.inverse_kinematics import CompiledIk
 from sms_handover.compiled.kinematics import CompiledKinematics
 from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.compiled.tool_motion import CompiledToolMotion
+from sms_handover.conditions.conditions import IDEAL, Conditions
 from sms_handover.control.computed_torque import ComputedTorque
 from sms_handover.control.law import LawSetup, Need
 from sms_handover.control.parameters import ControllerParameters, gains_of
@@ -22,15 +23,18 @@ from sms_handover.ik.levenberg_marquardt import FindJoints, find_joints
 from sms_handover.ik.parameters import IkParameters
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics, pinocchio_dynamics
+from sms_handover.plant.effects import PlantEffects
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
 from sms_handover.plant.integrators import TABLEAUS, Tableau
 from sms_handover.plant.joint_limits import ENFORCE
 from sms_handover.plant.parameters import PlantParameters
+from sms_handover.simulation.near_pairs import NearPairs
 from sms_handover.simulation.parameters import COMPILED, CommonParameters
 from sms_handover.simulation.period_runner import PeriodRunner, PythonRunner
 from sms_handover.simulation.stability import check_stability_by_phase
 from sms_handover.trajectory.generator import TrajectoryGenerator
 from sms_handover.trajectory.parameters import TrajectoryParameters
+from sms_handover.trajectory.preview import TargetPreview
 from sms_handover.trajectory.schedule import Schedule
 from sms_handover.trajectory.tool_motion import PinocchioToolMotion
 from sms_handover.types import Array
@@ -49,7 +53,11 @@ def initial_joints(robot: RobotModel, schedule: Schedule) -> Array:
 
 
 def make_plant(
-    robot: RobotModel, schedule: Schedule, common: CommonParameters, parameters: PlantParameters
+    robot: RobotModel,
+    schedule: Schedule,
+    common: CommonParameters,
+    parameters: PlantParameters,
+    conditions: Conditions = IDEAL,
 ) -> FreeFloatingPlant:
     """Return the plant at the start of the schedule; raises ConfigurationError."""
     initial = InitialState(
@@ -62,9 +70,11 @@ def make_plant(
     )
     tableau, h = TABLEAUS[parameters.integrator], ns_to_seconds(common.tick_ns)
     _check_deputy_twist(schedule, h)
-    return FreeFloatingPlant(
-        robot, parameters, initial, common.tick_ns, make_dynamics(common.dynamics, tableau, h)
-    )
+    effects = None
+    if not conditions.ideal:
+        effects = PlantEffects(conditions, robot.n_joints, common.tick_ns, common.seed)
+    dynamics = make_dynamics(common.dynamics, tableau, h)
+    return FreeFloatingPlant(robot, parameters, initial, common.tick_ns, dynamics, effects)
 
 
 def make_dynamics(dynamics: str, tableau: Tableau, h: float) -> MakeDynamics:
@@ -122,7 +132,8 @@ def make_controller(
     The efforts of a law of another package are checked. Raises ConfigurationError.
     """
     law, gains = law_named(parameters.law), gains_by_phase(schedule, parameters)
-    missing = sorted(need.value for need in law.needs - {Need.TOOL_TARGETS, Need.PAYLOAD})
+    have = {Need.TOOL_TARGETS, Need.PREVIEW, Need.CLEARANCE, Need.PAYLOAD}
+    missing = sorted(need.value for need in law.needs - have)
     if missing:
         raise ConfigurationError(f"control law {law.name!r} needs {missing[0]}, which the loop has not")
     start = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
@@ -130,7 +141,19 @@ def make_controller(
     check_stability_by_phase(law, robot, schedule, gains, ns_to_seconds(common.tick_ns), places)
     computed_torque = CompiledComputedTorque if common.dynamics == COMPILED else ComputedTorque
     longest_ns = longest_reference_ns(common, parameters)
-    setup = LawSetup(robot, gains, common.tick_ns, longest_ns, computed_torque, schedule.deputy)
+    preview = TargetPreview(robot, schedule) if Need.PREVIEW in law.needs else None
+    distances = NearPairs(make_clearance(robot, schedule)) if Need.CLEARANCE in law.needs else None
+    setup = LawSetup(
+        robot,
+        gains,
+        common.tick_ns,
+        longest_ns,
+        computed_torque,
+        schedule.deputy,
+        reference_ns=common.reference_ns,
+        preview=preview,
+        distances=distances,
+    )
     controller = law.make(setup)
     return controller if law.name in SHIPPED else CheckedController(controller, robot.joint_names)
 
@@ -148,10 +171,11 @@ def make_runner(
     """
     if common.dynamics != COMPILED:
         return PythonRunner(plant, controller)
-    if parameters.joint_limits == ENFORCE or not CompiledTicks.fits(plant, controller, known):
+    has_all = parameters.joint_limits != ENFORCE and plant.is_ideal
+    if not has_all or not CompiledTicks.fits(plant, controller, known):
         _LOG.warning(
             "ticks are carried out by Python: C has only our own laws, joints that are alike in truth and "
-            "model, and limits that are not enforced"
+            "model, limits that are not enforced, and ideal conditions"
         )
         return PythonRunner(plant, controller)
     return CompiledTicks(plant, controller, known, parameters.integrator, common.tick_ns)

@@ -10,9 +10,10 @@ from sms_handover.graph.events import RunEvent
 from sms_handover.model.deputy import DeputyDescription
 from sms_handover.model.known_payload import EMPTY_HANDS, Grip, KnownPayload
 from sms_handover.model.poses import pose_of, se3_of
-from sms_handover.model.reduced import carried_twist, drift_of_base
 from sms_handover.model.robot_model import RobotModel
+from sms_handover.trajectory.deputy_twist import Before, DeputyTwist, twist_at
 from sms_handover.trajectory.parameters import TrajectoryParameters
+from sms_handover.trajectory.pose_path import PosePath
 from sms_handover.trajectory.schedule import (
     GraspFrameTarget,
     Hold,
@@ -67,7 +68,7 @@ class Course:
     The tools of some arms go from ``starts`` to ``goals`` in ``world``; the joints (n,) rad of those in
     ``by_joints`` from ``joints`` to ``ends``; those of the others stay at ``joints``. ``progress`` (k, 2) has
     the fraction of the motion and its rate in 1/s for each period; ``damping`` is that of the generalised
-    Jacobian.
+    Jacobian. With ``has_momentum`` a deputy with mass may have given the robot some.
     """
 
     phase: TaskPhase
@@ -78,16 +79,21 @@ class Course:
     ends: Array
     progress: Array
     damping: float
+    has_momentum: bool
 
 
 @dataclass(frozen=True, eq=False)
 class GeneratorState:
-    """Progress of the task, joints (n,) rad and tools as the phase began, and who holds the deputy."""
+    """Progress of the task, joints (n,) rad and tools as the phase began, who holds the deputy, where it was.
+
+    ``deputy_before`` is None unless the motion of the deputy is followed.
+    """
 
     progress: ProgressState
     joints_at_start: Array
     tools_at_start: Mapping[str, Pose]
     grip: Grip = EMPTY_HANDS
+    deputy_before: Before | None = None
 
 
 class TrajectoryGenerator:
@@ -111,6 +117,7 @@ class TrajectoryGenerator:
         self._make_motion = make_motion
         self._payload = KnownPayload(robot, schedule.deputy)
         self._motion = make_motion(robot)
+        self._deputy_twist = DeputyTwist(schedule.deputy)
         self._schedule = schedule
         self._progress = TaskProgress(
             schedule, parameters, abort_on_collision=abort_on_collision, fail_on_touch=fail_on_touch
@@ -123,18 +130,21 @@ class TrajectoryGenerator:
         """Return to the start of the schedule."""
         self._progress.reset()
         self._hold(EMPTY_HANDS)
+        self._deputy_twist.before = None
         self._joints_at_start: Array = np.zeros(self._robot.n_joints)
         self._tools_at_start: Mapping[str, Pose] = {}
 
     def snapshot(self) -> GeneratorState:
         """Return the state to :meth:`restore`."""
         joints, tools = read_only(self._joints_at_start), dict(self._tools_at_start)
-        return GeneratorState(self._progress.snapshot(), joints, tools, self._payload.grip)
+        before = self._deputy_twist.before
+        return GeneratorState(self._progress.snapshot(), joints, tools, self._payload.grip, before)
 
     def restore(self, state: GeneratorState) -> None:
         """Go back to a former state; raises ConfigurationError if it is that of another schedule."""
         self._progress.restore(state.progress)
         self._hold(state.grip)
+        self._deputy_twist.before = state.deputy_before
         self._joints_at_start, self._tools_at_start = state.joints_at_start, state.tools_at_start
 
     def targets(self, state: RobotState, deputy_in_world: Pose) -> tuple[TaskPhase, Targets]:
@@ -181,7 +191,7 @@ class TrajectoryGenerator:
     def quiet_until(self, stamp_ns: int, *, deputy_rests: bool) -> int | None:
         """Return up to when nothing has to be decided and goals stand still, None if not even now."""
         quiet = self._progress.quiet_from(stamp_ns)
-        if quiet is None or self._payload.has_mass:
+        if quiet is None:
             return None
         targets = self._progress.at(stamp_ns).targets.values()
         if not deputy_rests and any(isinstance(target, GraspFrameTarget) for target in targets):
@@ -205,9 +215,16 @@ class TrajectoryGenerator:
             elif isinstance(target, JointTarget):
                 moved.add(arm)
                 ends[self._robot.arm_joints[arm]] = target.position
-        starts = self._tools_at_start
         return Course(
-            stage.task, starts, goals, frozenset(moved), self._joints_at_start, ends, progress, self._damping
+            stage.task,
+            self._tools_at_start,
+            goals,
+            frozenset(moved),
+            self._joints_at_start,
+            ends,
+            progress,
+            self._damping,
+            self._payload.has_mass,
         )
 
     def ik_request(self, state: RobotState, targets: Targets) -> IkRequest:
@@ -232,7 +249,7 @@ class TrajectoryGenerator:
         by_joints = self._motion.tools_at(at, others) if others else {}
         velocity, twists = targets.joint_velocity, targets.tool_twist_in_world
         if self._payload.has_mass:
-            twists = self._without_drift(state, twists)
+            twists = self._motion.without_drift(state.q, state.v, twists)
         if any(_moves(twist) for twist in twists.values()):
             velocity = self._motion.resolved(state.q, twists, velocity, self._damping)
         reference = JointReference(state.stamp_ns, joint_position, velocity)
@@ -244,16 +261,6 @@ class TrajectoryGenerator:
             self._payload.hold(grip)
             self._motion = self._make_motion(self._payload.robot)
 
-    def _without_drift(self, state: RobotState, twists: Mapping[str, Twist]) -> Mapping[str, Twist]:
-        """Return the twists less those that tools have by the momentum of the robot with joints at rest."""
-        drift = drift_of_base(self._payload.robot, state.q, state.v)
-        tools = self._motion.tools_at(state.q, twists)
-        carried = {arm: carried_twist(state.base_in_world, drift, tools[arm].position) for arm in twists}
-        return {
-            arm: Twist(twist.linear - carried[arm].linear, twist.angular - carried[arm].angular)
-            for arm, twist in twists.items()
-        }
-
     def _targets_of(self, stage: Stage, state: RobotState, deputy_in_world: Pose) -> Targets:
         """Return the targets of every arm at the time of a state."""
         progress = self._time_law(
@@ -261,6 +268,7 @@ class TrajectoryGenerator:
         )
         poses: dict[str, Pose] = {}
         twists: dict[str, Twist] = {}
+        deputy_twist = self._deputy_twist.at(state.stamp_ns, deputy_in_world)
         position = np.array(state.joint_position)
         velocity = np.zeros(self._robot.n_joints)
         for arm, target in stage.targets.items():
@@ -269,7 +277,12 @@ class TrajectoryGenerator:
             match target:
                 case ToolTarget() | GraspFrameTarget():
                     goal = goal_in_world(target, self._schedule.deputy, deputy_in_world)
-                    poses[arm], twists[arm] = self._motion.on_path(self._tools_at_start[arm], goal, progress)
+                    tool = self._tools_at_start[arm]
+                    if deputy_twist and isinstance(target, GraspFrameTarget):
+                        moves = twist_at(deputy_twist, deputy_in_world.position, goal.position)
+                        poses[arm], twists[arm] = PosePath(tool, goal, moves).at(progress)
+                    else:
+                        poses[arm], twists[arm] = self._motion.on_path(tool, goal, progress)
                 case JointTarget():
                     position[joints], velocity[joints] = _joint_motion(start, target.position, progress)
                 case Hold():

@@ -5,11 +5,11 @@ from typing import Protocol
 
 import numpy as np
 
-from sms_handover.model.reduced import generalized_jacobian
+from sms_handover.model.reduced import carried_twist, drift_of_base, generalized_jacobian
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.trajectory.pose_path import PosePath
 from sms_handover.trajectory.time_law import Progress
-from sms_handover.types import Array, Pose, Twist, frozen
+from sms_handover.types import BASE_NQ, Array, Pose, Twist, frozen
 
 
 class ToolMotion(Protocol):
@@ -20,6 +20,9 @@ class ToolMotion(Protocol):
 
     def on_path(self, start: Pose, goal: Pose, progress: Progress) -> tuple[Pose, Twist]:
         """Return pose and twist on the way from pose to pose, as :class:`PosePath`."""
+
+    def without_drift(self, q: Array, v: Array, twists: Mapping[str, Twist]) -> Mapping[str, Twist]:
+        """Return twists of tools less what they have by the momentum alone, with joints at rest."""
 
     def resolved(self, q: Array, twists: Mapping[str, Twist], velocity: Array, damping: float) -> Array:
         """Return joint rates (n,): ``velocity``, and for the arms that have a twist those that give it.
@@ -41,6 +44,16 @@ class PinocchioToolMotion:
     def on_path(self, start: Pose, goal: Pose, progress: Progress) -> tuple[Pose, Twist]:
         """Return pose and twist on the way from pose to pose, as :class:`PosePath`."""
         return PosePath(start, goal).at(progress)
+
+    def without_drift(self, q: Array, v: Array, twists: Mapping[str, Twist]) -> Mapping[str, Twist]:
+        """Return twists of tools less what they have by the momentum alone, with joints at rest."""
+        drift, base = drift_of_base(self._robot, q, v), Pose(q[:3], q[3:BASE_NQ])
+        tools = self._robot.tools_at(q, twists)
+        carried = {arm: carried_twist(base, drift, tools[arm].position) for arm in twists}
+        return {
+            arm: Twist(twist.linear - carried[arm].linear, twist.angular - carried[arm].angular)
+            for arm, twist in twists.items()
+        }
 
     def resolved(self, q: Array, twists: Mapping[str, Twist], velocity: Array, damping: float) -> Array:
         """Return joint rates (n,): ``velocity``, and for the arms that have a twist those that give it."""

@@ -206,6 +206,8 @@ def made_up_run(ticks: int = 101, seed: int = 0) -> RunData:
         work=random.standard_normal(periods),
         external_work=random.standard_normal(periods),
         lost=random.standard_normal(periods),
+        linear_impulse=np.zeros((periods, 3)),
+        angular_impulse=np.zeros((periods, 3)),
         ik_status=np.arange(periods, dtype=np.int64) % 4 - 1,
         phases=tuple(
             TaskPhase(int(stamp_ns), row // 2, f"phase {row // 2}", (grasp, transfer) if row == 2 else ())

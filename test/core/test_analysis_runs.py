@@ -97,10 +97,13 @@ def make_run(
         "target_pose": {arm: poses((target or {}).get(arm, still())(t)) for arm in ARMS},
         "tool_pose": {arm: poses((tool or {}).get(arm, still())(t)) for arm in ARMS},
         "deputy_pose": poses(np.zeros((periods, 3))),
+        "deputy_twist": np.zeros((periods, 6)),
         "linear_momentum": np.zeros((periods, 3)),
         "angular_momentum": np.zeros((periods, 3)),
         "kinetic_energy": np.zeros(periods),
         "work": np.zeros(periods),
+        "external_work": np.zeros(periods),
+        "lost": np.zeros(periods),
         "ik_status": np.zeros(periods, dtype=np.int64),
         "phases": tuple(
             TaskPhase(int(stamp), int(place), phases[place][0])

@@ -11,9 +11,8 @@ import pytest
 
 from sms_handover.analysis.latex import escaped, latex_table
 from sms_handover.analysis.layout import Row, Section
-from sms_handover.cli import bag
 from sms_handover.cli.main import main
-from sms_handover.cli.verbs import BAG, OLD_NAMES, VERBS, call_of
+from sms_handover.cli.verbs import FAMILIES, OLD_NAMES, VERBS, call_of
 from sms_handover.errors import ConfigurationError
 
 from .bag_messages import made_up_run, write_run
@@ -72,7 +71,7 @@ def test_the_notice_is_one_line_on_standard_error(run: str, capsys: pytest.Captu
             "sms-handover: error: unknown command 'simulte' (did you mean 'simulate'?): known are ",
         ),
         (["bag", "chek"], "sms-handover: error: unknown bag command 'chek' (did you mean 'check'?): known"),
-        (["campaign", "x.yaml"], "sms-handover: error: 'campaign' is not there yet: a later"),
+        (["campaign", "rum"], "sms-handover: error: unknown campaign command 'rum' (did you mean 'run'?)"),
         (["plan"], "sms-handover: error: 'plan' is not there yet: "),
         (
             ["verify", "x", "--domain-id", "3"],
@@ -87,7 +86,7 @@ def test_a_slip_is_one_line(words: Sequence[str], told: str, capsys: pytest.Capt
     assert told in err and err.count("\n") == 1 and out == ""
 
 
-@pytest.mark.parametrize("words", [["--help"], ["bag", "--help"]])
+@pytest.mark.parametrize("words", [["--help"], ["bag", "--help"], ["campaign", "--help"]])
 def test_help_lists_every_verb_within_a_terminal(
     words: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -96,7 +95,7 @@ def test_help_lists_every_verb_within_a_terminal(
     assert ended.value.code == 0
     lines = capsys.readouterr().out.splitlines()
     listed = [found[1] for line in lines if (found := re.match(r"  (\w+) +\S", line))]
-    assert listed == list(bag.COMMANDS if words[0] == BAG else VERBS)
+    assert listed == list(FAMILIES[words[0]][1] if words[0] in FAMILIES else VERBS)
     assert all(len(line) <= 100 for line in lines) and len(lines) <= 40
 
 
@@ -164,7 +163,8 @@ NEED_ROS = ("run", "bag play BAG", "bag record --all", "view --live", "verify --
 
 
 def test_ros_is_imported_by_the_verbs_alone_that_need_it(run: str, tmp_path: Path) -> None:
-    names = [*(verb for verb in VERBS if verb != BAG), *(f"{BAG} {name}" for name in bag.COMMANDS)]
+    names = [verb for verb in VERBS if verb not in FAMILIES]
+    names += [f"{verb} {name}" for verb, (_, commands) in FAMILIES.items() for name in commands]
     need_none = [f"{name} --help" for name in names if not any(line.startswith(name) for line in NEED_ROS)]
     need_none += ["view --help", "verify --help", "list", "show pid", f"verify {run}", f"bag info {run}"]
     done = subprocess.run(

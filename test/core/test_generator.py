@@ -1,6 +1,7 @@
 """The trajectory generator gives each phase its targets, its commands once, and rates that fit."""
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from sms_handover.ik.levenberg_marquardt import solve_ik
@@ -132,6 +133,34 @@ def test_a_grasp_frame_target_follows_the_deputy(stepping: Bench, draw: Draw) ->
         pose = targets.tool_in_world["arm_b"]
         relative = se3_of(offset).actInv(se3_of(pose))
         np.testing.assert_allclose(relative.translation, [0.0, 0.0, -0.05], atol=_ROUNDING)
+
+
+@pytest.mark.parametrize(
+    "given", [{"mass": 4.0}, {"twist_in_world": {"linear": [0, 0, 0], "angular": [0, 0, 1]}}]
+)
+def test_a_target_at_a_deputy_that_moves_has_its_twist(
+    make_scenario: MakeScenario, draw: Draw, given: dict[str, object]
+) -> None:
+    """On a screw the velocity of the grasp frame, whatever the deputy was said to do at first."""
+    bench = Bench(make_scenario(trajectory={"time_law": "step"}, deputy=given))
+    bench.at(0.0)
+    start, linear, angular = se3_of(bench.deputy), draw.vector(3), draw.vector(3)
+    for time in (0.02, 0.04):
+        turn = pin.exp3(time * angular)
+        bench.deputy = pose_of(pin.SE3(turn @ start.rotation, start.translation + time * linear))
+        _, targets = bench.at(time)
+        twist, lever = targets.tool_twist_in_world["arm_a"], targets.tool_in_world["arm_a"].position
+        velocity = linear + np.cross(angular, lever - bench.deputy.position)
+        np.testing.assert_allclose(twist.linear, velocity, atol=1e-12)
+        np.testing.assert_allclose(twist.angular, angular, atol=1e-12)
+    state = bench.generator.snapshot()
+    again = [bench.at(0.06)[1].tool_twist_in_world["arm_a"].row]
+    bench.generator.restore(state)
+    again.append(bench.at(0.06)[1].tool_twist_in_world["arm_a"].row)
+    np.testing.assert_array_equal(*again)
+    bench.generator.reset()
+    initial = bench.schedule.deputy.twist_in_world
+    np.testing.assert_array_equal(bench.at(0.0)[1].tool_twist_in_world["arm_a"].angular, initial.angular)
 
 
 def test_a_quintic_target_moves_on_its_path(smooth: Bench) -> None:

@@ -9,7 +9,7 @@ import pytest
 from sms_handover.model.poses import pose_distance, pose_of, se3_of
 from sms_handover.trajectory.pose_path import PosePath
 from sms_handover.trajectory.time_law import Progress
-from sms_handover.types import Pose
+from sms_handover.types import Pose, Twist
 
 from .conftest import FD_BOUND, FD_STEP, Draw
 
@@ -60,6 +60,25 @@ def test_twist_is_the_rate_of_the_pose(draw: Draw) -> None:
         angular = pin.log3(se3_of(ahead).rotation @ se3_of(behind).rotation.T) / (2.0 * FD_STEP)
         np.testing.assert_allclose(twist.linear, linear, atol=FD_BOUND)
         np.testing.assert_allclose(twist.angular, angular, atol=FD_BOUND)
+
+
+def test_twist_includes_that_of_a_goal_that_moves(draw: Draw) -> None:
+    """By differences of poses of the path while its goal goes on; at the end it is the twist of the goal."""
+    still, rate = _between(draw, 2.0), 0.7
+    end, twist = se3_of(still.end), Twist(draw.vector(3), draw.vector(3))
+
+    def at(fraction: float, time: float) -> tuple[Pose, Twist]:
+        moved = pin.SE3(pin.exp3(time * twist.angular) @ end.rotation, end.translation + time * twist.linear)
+        return PosePath(still.start, pose_of(moved), twist).at(Progress(fraction + rate * time, rate))
+
+    for fraction in (0.0, 0.25, 0.9):
+        (behind, _), (ahead, _) = at(fraction, -FD_STEP), at(fraction, FD_STEP)
+        _, found = at(fraction, 0.0)
+        linear = (ahead.position - behind.position) / (2.0 * FD_STEP)
+        angular = pin.log3(se3_of(ahead).rotation @ se3_of(behind).rotation.T) / (2.0 * FD_STEP)
+        np.testing.assert_allclose(found.linear, linear, atol=FD_BOUND)
+        np.testing.assert_allclose(found.angular, angular, atol=FD_BOUND)
+    assert PosePath(still.start, still.end, twist).at(Progress(1.0, 0.0)) == (still.end, twist)
 
 
 def test_the_shorter_way_round_is_taken(draw: Draw) -> None:

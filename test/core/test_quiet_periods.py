@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from sms_handover.compiled.c_function import CFunction, NativeFunction
+from sms_handover.control.controller import JointController
+from sms_handover.control.nmpc import NmpcLaw
 from sms_handover.control.protocol import Guidance
 from sms_handover.run_data import RunData
 from sms_handover.simulation import loop as loop_module
@@ -24,6 +26,7 @@ from sms_handover.simulation.snapshot import plain
 from sms_handover.simulation.wiring import make_controller, make_plant, make_runner
 from sms_handover.types import GraspStatus, JointReference, TaskPhase
 
+from ..ros.short_handover import short_handover
 from .conftest import SCHEDULE
 from .retried_handover import LAWS, retried_handover
 
@@ -61,9 +64,9 @@ def runner_of(scenario: Scenario) -> PeriodRunner:
 def rest_of(loop: Loop) -> tuple[RunData, int]:
     """Return the rest of a run, and in how many calls it was carried out."""
     robot = loop.scenario.model.robot
-    recorder, calls = RunRecorder(robot.joint_names, robot.arms), 0
+    recorder, calls = RunRecorder(robot.joint_names, robot.arms, 100), 0  # ticks, of which there are more
     while not loop.finished:
-        recorder.add(loop.advance_quietly())
+        recorder.add(loop.advance_quietly(recorder.room))
         calls += 1
     return recorder.data(), calls
 
@@ -80,6 +83,13 @@ def require_same(one: RunData, other: RunData) -> None:
             assert np.array_equal(np.signbit(value), np.signbit(theirs)) or np.isnan(value).any(), name
         else:
             assert repr(value) == repr(theirs), name
+
+
+def close_handover(folder: Path) -> dict[str, Any]:
+    """Return the values of a handover whose grasps all succeed, as everything is near its place at first."""
+    schedule = folder / "close.yaml"
+    schedule.write_text(short_handover(stretch=4.0), encoding="utf-8")
+    return {"common": {"schedule": str(schedule)}}
 
 
 def merged(*parts: dict[str, Any] | Overrides) -> Overrides:
@@ -171,6 +181,52 @@ def test_what_is_no_number_stays_none(tmp_path: Path) -> None:
     for name in ("q", "v", "effort", "joint_effort"):
         found, expected = (getattr(run[0].rows, name)[:_PERIOD] for run in (ours, theirs))
         assert np.array_equal(found, expected, equal_nan=True), name
+
+
+@pytest.mark.parametrize("odd", [np.nan, np.inf])
+@pytest.mark.parametrize("law", LAWS)
+def test_a_law_that_gives_no_number(law: str, odd: float, tmp_path: Path) -> None:
+    """From a gain or a memory that is none, or infinite: the same efforts, states and events to the end."""
+    values = {"controller": LAWS[law], "trajectory": {"time_law": "step", "ik_failures": 3}}
+    scenario = load_scenario(values=merged(retried_handover(tmp_path), COMPILED, values))
+    runs = []
+    for loop in (Loop(scenario), python_loop(scenario)):
+        for _ in range(3):
+            loop.advance_period()
+        assert isinstance(loop._controller, JointController)
+        inner = loop._controller.law
+        if isinstance(inner, NmpcLaw):
+            inner.feedback[0] = odd
+        else:
+            inner.restore(np.full(scenario.model.robot.n_joints, odd))
+        runs.append((*rest_of(loop), loop.last_tick))
+    (found, fewer, last), (expected, calls, theirs) = runs
+    require_same(found, expected)
+    assert last == theirs and fewer < calls
+    assert np.isnan(found.joint_command).any()
+
+
+@pytest.mark.parametrize("model", [{}, {"model.deputy.mass": 4.2}])
+@pytest.mark.parametrize("law", LAWS)
+def test_a_deputy_with_mass_changes_hands(law: str, model: Overrides, tmp_path: Path) -> None:
+    """Grasped as it rests, carried, handed over: by parameters that are passed on, with nothing compiled.
+
+    The law knows of it, by another mass too, and takes it to lie in the hand exactly.
+    """
+    heavy = merged(
+        {"common": {"duration": 1.5}, "deputy.mass": 4.0, **model},
+        {"controller": LAWS[law], "trajectory": {"time_law": "quintic"}},
+    )
+    scenario = load_scenario(values=merged(close_handover(tmp_path), COMPILED, heavy))
+    theirs, ours = python_loop(scenario), Loop(scenario)
+    expected, calls = rest_of(theirs)
+    found, fewer = rest_of(ours)
+    require_same(found, expected)
+    assert plain(ours.snapshot()) == plain(theirs.snapshot())
+    assert [event.status for event in found.grasp_events] == [GraspStatus.SUCCEEDED] * 2
+    assert found.lost[-1] > 0.0 and fewer < calls / 4
+    reference = simulate(load_scenario(values=merged(close_handover(tmp_path), heavy)))
+    assert np.abs(found.joint_position - reference.joint_position).max() < 1e-9
 
 
 @pytest.mark.parametrize("time_law", ["step", "quintic"])

@@ -111,7 +111,13 @@ def test_phase_comes_back(commands: tuple[GraspCommand, ...]) -> None:
 def test_event_comes_back(
     command: GraspCommand, status: GraspStatus, errors: tuple[float, float, float]
 ) -> None:
-    event = GraspEvent(5 * NS_PER_S, command, status, *errors, "because of this")
+    capture = {
+        "relative_rate": errors[0],
+        "relative_twist": (*errors, 0.1, -0.0, 5e-324),
+        "impulse": (*errors, -1.0 / 3.0, 1e308, 0.0),
+        "energy_lost": 3.8e-4,
+    }
+    event = GraspEvent(5 * NS_PER_S, command, status, *errors, "because of this", **capture)
     assert repr(grasp_event(through_cdr(event_message(event)))) == repr(event)  # NaN differs from itself
 
 

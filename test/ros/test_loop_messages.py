@@ -351,8 +351,9 @@ def test_rclpy_reads_the_stamped_messages() -> None:
     )
     vector: Any = deserialize_message(vector_codec("world").pack(5, values[:3]), Vector3Stamped)
     assert vector == Vector3Stamped(header=header(5), vector=Vector3(x=1.0, y=2.0, z=3.0))
-    energy: Any = deserialize_message(energy_codec("world").pack(6, values[:2]), EnergyStamped)
-    assert energy == EnergyStamped(header=header(6), kinetic=1.0, work=2.0)
+    energy: Any = deserialize_message(energy_codec("world").pack(6, values[:4]), EnergyStamped)
+    account = {"kinetic": 1.0, "work": 2.0, "external_work": 3.0, "lost": 4.0}
+    assert energy == EnergyStamped(header=header(6), **account)
 
 
 @pytest.mark.parametrize("size", [0, 2, 4, 7])

@@ -62,6 +62,21 @@ def test_run_on_busy_cores(schedule: Path, simulated: dict[str, RunData], tmp_pa
     assert_same_bits(read_run(tmp_path / "out" / "bag"), simulated["nmpc"])
 
 
+def test_a_predictive_law(schedule: Path, tmp_path: Path) -> None:
+    """Its plans too, with the limits that bind: all but the wall times of the solves."""
+    limits = {"joint_rate_limit": 1.0, "base_rate_limit": 0.1, "least_distance": 0.01}
+    options = [part for name, value in limits.items() for part in ("-p", f"controller.{name}:={value}")]
+    command = ("run", "--controller", "mpc", *options, "--schedule", schedule, "-o", "mpc")
+    ended = sms_handover(*command, cwd=tmp_path)
+    assert ended.code == 0, ended
+    values = {"common": {"schedule": str(schedule)}, "controller": {"law": "mpc", **limits}}
+    expected, recorded = simulate(load_scenario(values=values)), read_run(tmp_path / "mpc" / "bag")
+    assert compare_runs(recorded, expected) == ()
+    assert len(recorded.plans) == len(recorded.reference_ns)
+    assert all(plan.total_time > plan.program_time > 0.0 for plan in recorded.plans)
+    assert {row for plan in recorded.plans for row in plan.active}
+
+
 @pytest.mark.parametrize(("law", "transport"), [("nmpc", "direct"), ("pid", "executor")])
 def test_run_in_one_process(
     law: str, transport: str, schedule: Path, simulated: dict[str, RunData], tmp_path: Path
@@ -84,6 +99,19 @@ def test_compiled_dynamics(schedule: Path, simulated: dict[str, RunData], tmp_pa
         simulate(load_scenario(values={"common": {"schedule": str(schedule), "dynamics": "compiled"}})),
     )
     assert run.joint_velocity.tobytes() != simulated["nmpc"].joint_velocity.tobytes()
+
+
+def test_a_run_under_harsh_conditions(schedule: Path, tmp_path: Path) -> None:
+    """With noise, delay, friction, wrenches and model error: twice the run in one process, and verified."""
+    given = ("--conditions", "harsh", "-p", "seed:=4", "-p", "conditions.command.delay:=0.003")
+    values = {"common": {"schedule": str(schedule), "conditions": "harsh", "seed": 4}}
+    expected = simulate(load_scenario(values={**values, "conditions.command.delay": 0.003}))
+    assert expected.linear_impulse[-1].any() and expected.lost[-1] > 0.0
+    for name, more in (("one", ()), ("two", ("--compose",))):
+        ended = sms_handover("run", *given, *more, "--schedule", schedule, "-o", name, cwd=tmp_path)
+        assert ended.code in (0, 4), ended  # grasps may miss
+        assert_same_bits(read_run(tmp_path / name / "bag"), expected)
+    assert sms_handover("verify", tmp_path / "one" / "bag", cwd=tmp_path).code == 0
 
 
 def test_a_collision_ends_the_run_in_the_same_tick(schedule: Path, tmp_path: Path) -> None:

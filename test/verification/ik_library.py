@@ -11,9 +11,11 @@ import mink
 import mujoco
 import numpy as np
 
-from benchmarks.mujoco_model import mjcf_of, rotation_matrix
+from sms_handover.engines.mujoco_robot import rotation_matrix
 from sms_handover.frames import tool_frame
 from sms_handover.model.assembly import RobotDescription
+from sms_handover.model.mjcf import to_mjcf
+from sms_handover.model.urdf import to_urdf
 from sms_handover.types import Array, Pose
 
 _DAMPING = 1e-6  # [-] the same constant part as ours
@@ -34,7 +36,7 @@ class FixedBase:
 
     def __init__(self, description: RobotDescription) -> None:
         """Compile the model."""
-        self.model = mujoco.MjModel.from_xml_string(mjcf_of(description, floating=False))
+        self.model = mujoco.MjModel.from_xml_string(to_mjcf(to_urdf(description), floating=False))
         self._configuration = mink.Configuration(self.model)
         self._limits = [mink.ConfigurationLimit(self.model, gain=1.0)]
 

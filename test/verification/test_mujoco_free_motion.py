@@ -13,7 +13,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from benchmarks.mujoco_model import MujocoRobot, State, apart, order
+from benchmarks.states import apart, order
+from sms_handover.engines.mujoco_robot import MujocoRobot, State
 from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import RobotModel
@@ -60,7 +61,7 @@ def _ours(robot: RobotModel) -> Advance:
 
 def _mujoco(robot: RobotModel) -> Advance:
     """Return the same for MuJoCo."""
-    other = MujocoRobot(robot.description)
+    other = MujocoRobot.of(robot.description)
 
     def advance(start: State, effort: Array, count: int) -> State:
         other.place(*start)

@@ -12,7 +12,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from benchmarks.mujoco_model import MujocoRobot, State, apart, order
+from benchmarks.states import apart, order
+from sms_handover.engines.mujoco_robot import MujocoRobot, State
 from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.reduced import base_twist_per_joint_rate, reduced_dynamics
 from sms_handover.run_data import RunData
@@ -78,7 +79,7 @@ def _our_plant(scenario: Scenario, hold: int, step: int) -> Callable[[Array], St
 
 def _in_mujoco(scenario: Scenario, start: State, hold: int, step: int) -> Callable[[Array], State]:
     """Return what moves MuJoCo's robot by ``hold`` in steps of ``step``, from the same start."""
-    other = MujocoRobot(scenario.truth.robot.description)
+    other = MujocoRobot.of(scenario.truth.robot.description)
     other.place(*start)
 
     def apply(effort: Array) -> State:

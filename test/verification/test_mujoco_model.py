@@ -13,8 +13,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from benchmarks.mujoco_model import MujocoRobot, rotation_matrix
 from sms_handover.clearance.distances import ClearanceModel
+from sms_handover.engines.mujoco_robot import MujocoRobot, rotation_matrix
 from sms_handover.export.robot_files import MJCF_FILE, robot_files
 from sms_handover.model.assembly import RobotDescription
 from sms_handover.model.conserved import conserved_quantities
@@ -79,7 +79,7 @@ def _states(robot: RobotModel) -> list[tuple[Array, Array, Array]]:
 
 def test_equations_of_motion_are_the_same(description: RobotDescription, record: Record) -> None:
     """Mass matrix, bias forces and acceleration; H^-1 magnifies the rounding of the last by cond(H)."""
-    robot, other = RobotModel(description), MujocoRobot(description)
+    robot, other = RobotModel(description), MujocoRobot.of(description)
     assert other.joint_names == robot.joint_names
     largest = np.zeros(3)  # relative to the largest entry
     for q, v, effort in _states(robot):
@@ -99,7 +99,7 @@ def test_equations_of_motion_are_the_same(description: RobotDescription, record:
 
 def test_every_frame_is_at_the_same_place(description: RobotDescription, record: Record) -> None:
     """Positions and rotation matrices of all links and both tools, which lie within 3 m of the base."""
-    robot, other = RobotModel(description), MujocoRobot(description)
+    robot, other = RobotModel(description), MujocoRobot.of(description)
     position = rotation = 0.0
     for q, v, effort in _states(robot):
         other.dynamics(q, v, effort)
@@ -114,7 +114,7 @@ def test_every_frame_is_at_the_same_place(description: RobotDescription, record:
 
 def test_momentum_is_measured_alike(description: RobotDescription, record: Record) -> None:
     """Each engine by its own formula, so that drifts measured with one hold for both."""
-    robot, other = RobotModel(description), MujocoRobot(description)
+    robot, other = RobotModel(description), MujocoRobot.of(description)
     errors = np.zeros(2)
     for q, v, effort in _states(robot):
         other.dynamics(q, v, effort)
@@ -129,7 +129,7 @@ def test_momentum_is_measured_alike(description: RobotDescription, record: Recor
 
 def test_mujoco_adds_nothing(description: RobotDescription) -> None:
     """No damping, friction, spring, limit, gravity, medium, contact or balancing of inertias."""
-    model = MujocoRobot(description).model
+    model = MujocoRobot.of(description).model
     for name in ("dof_damping", "dof_frictionloss", "jnt_stiffness", "jnt_limited", "body_gravcomp"):
         assert not np.any(getattr(model, name)), name
     assert not np.any(model.opt.gravity) and not np.any(model.opt.wind)
@@ -155,7 +155,7 @@ def test_the_exported_robot_is_the_same(description: RobotDescription, record: R
     Where no pair is nearer to contact than 0.1 mm, MuJoCo finds exactly the contacts of negative distances.
     """
     robot = RobotModel(description)
-    rotors = {joint.name: joint.rotor_inertia for arm in description.arms for joint in arm.joints}
+    rotors = description.rotor_inertia
     text = robot_files(robot.urdf, rotors).texts[MJCF_FILE]
     theirs = mujoco.MjModel.from_xml_string(text)
     data, mass = mujoco.MjData(theirs), np.zeros((theirs.nv, theirs.nv))

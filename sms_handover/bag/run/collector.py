@@ -15,6 +15,7 @@ from sms_handover.messages.stamps import stamp_ns
 from sms_handover.messages.values import (
     energy_values,
     grasp_event,
+    plan_report,
     pose_values,
     run_event,
     status_values,
@@ -22,7 +23,7 @@ from sms_handover.messages.values import (
     twist_values,
     vector_values,
 )
-from sms_handover.types import GraspEvent, TaskPhase
+from sms_handover.types import GraspEvent, PlanReport, TaskPhase
 
 JOINT_TOPICS = (topics.JOINT_STATES, topics.JOINT_COMMAND, topics.JOINT_REFERENCE)
 POSITION, VELOCITY, EFFORT = range(3)  # blocks gathered from a JointState
@@ -48,6 +49,8 @@ class RunCollector:
             topics.DEPUTY_POSE: RowCollector(7, pose_values),
             topics.LINEAR_MOMENTUM: RowCollector(3, vector_values),
             topics.ANGULAR_MOMENTUM: RowCollector(3, vector_values),
+            topics.LINEAR_IMPULSE: RowCollector(3, vector_values),
+            topics.ANGULAR_IMPULSE: RowCollector(3, vector_values),
             topics.DEPUTY_ODOMETRY: RowCollector(6, twist_values),
             topics.ENERGY: RowCollector(4, energy_values),
             topics.IK_STATUS: RowCollector(1, status_values),
@@ -57,6 +60,7 @@ class RunCollector:
         self.phases: list[TaskPhase] = []
         self.events: list[GraspEvent] = []
         self.run_events: list[RunEvent] = []
+        self.plans: list[PlanReport] = []
         self._first_ns: int | None = None
         self._newest_ns = 0
 
@@ -66,6 +70,7 @@ class RunCollector:
             topics.TASK_PHASE: lambda message: self.phases.append(task_phase(message)),
             topics.GRASP_EVENT: lambda message: self.events.append(grasp_event(message)),
             topics.RUN_EVENTS: lambda message: self.run_events.append(run_event(message)),
+            topics.MPC_STATUS: lambda message: self.plans.append(plan_report(message)),
             **{name: rows.add for name, rows in self.rows.items()},
         }
         takers: dict[str, Callable[[bytes], None]] = {
@@ -86,6 +91,7 @@ class RunCollector:
         elif time_ns < self._newest_ns and time_ns <= self._first_ns:
             self.events.clear()
             self.run_events.clear()
+            self.plans.clear()
         self._newest_ns = time_ns
         self.joints[topics.JOINT_STATES].add(data)
 
@@ -94,7 +100,7 @@ class RunCollector:
         return f"{self._prefix}/{name}"
 
     def _check_types(self) -> None:
-        for topic in topics.graph_topics(self.arms, clearance=True):
+        for topic in topics.graph_topics(self.arms, clearance=True, wrenches=True):
             recorded = self._info.topics.get(self.full_name(topic.name))
             if recorded is not None and (recorded.type, recorded.encoding) != (topic.type, "cdr"):
                 raise BagError(

@@ -59,6 +59,7 @@ def _assemble(collector: RunCollector) -> RunData:
     periods = reference.stamp_ns
     arms = _by_first_joint(collector.arms, joint_names)
     energy = rows(topics.ENERGY)
+    has_wrenches = bool(len(collector.rows[topics.LINEAR_IMPULSE].series().stamp_ns))
     return RunData(
         joint_names=joint_names,
         arms=tuple(arms),
@@ -82,10 +83,13 @@ def _assemble(collector: RunCollector) -> RunData:
         work=energy[:, 1].copy(),
         external_work=energy[:, 2].copy(),
         lost=energy[:, 3].copy(),
+        linear_impulse=rows(topics.LINEAR_IMPULSE) if has_wrenches else np.zeros((len(periods), 3)),
+        angular_impulse=rows(topics.ANGULAR_IMPULSE) if has_wrenches else np.zeros((len(periods), 3)),
         ik_status=np.nan_to_num(rows(topics.IK_STATUS)[:, 0], nan=_NO_IK).astype(np.int64),
         phases=_last_run(collector.phases),
         grasp_events=tuple(collector.events),
         run_events=tuple(collector.run_events),
+        plans=tuple(collector.plans),
     )
 
 

@@ -1,14 +1,16 @@
 """``sms-handover bag robot``: the robot of a run as URDF, SRDF and MJCF."""
 
+import tempfile
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Mapping
 from pathlib import Path
 
-from sms_handover.bag.info import read_info
+from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.cli.exit_codes import EXIT_OK
 from sms_handover.cli.text_files import write_text
 from sms_handover.errors import BagError, ConfigurationError
 from sms_handover.export.robot_files import robot_files
+from sms_handover.launcher.recorded_scenario import scenario_in
 from sms_handover.launcher.run_folder import bag_of
 from sms_handover.model.description import load_robot
 from sms_handover.model.urdf import to_urdf
@@ -23,7 +25,8 @@ def add_parser(parser: ArgumentParser) -> None:
         "Write the robot of a run for other programs: robot.urdf as the bag carries it; robot.srdf for\n"
         "MoveIt: a group per arm and one of all arms, end effectors, pairs of links that need not be\n"
         "checked; robot.xml for MuJoCo (MJCF): the same bodies, joints, limits, motors and solids, floating\n"
-        "freely and without gravity. A URDF has no rotor inertia, so that of a bag is not in its MJCF."
+        "freely and without gravity. Rotor inertia, for which a URDF has no place, is that of the scenario\n"
+        "in the bag; a bag of the first edition has none, nor has a .urdf."
     )
     parser.epilog = (
         "examples:\n"
@@ -60,14 +63,24 @@ def _described(path: Path) -> tuple[str, Mapping[str, float]]:
     """Return the URDF of a description or bag, and the rotor inertias that are known, by joint."""
     if path.suffix in _YAML:
         robot = load_robot(path)
-        joints = [joint for arm in robot.arms for joint in arm.joints]
-        return to_urdf(robot), {joint.name: joint.rotor_inertia for joint in joints}
+        return to_urdf(robot), robot.rotor_inertia
     if path.suffix in _URDF:
         try:
             return path.read_text(encoding="utf-8"), {}
         except (OSError, UnicodeDecodeError) as error:
             raise ConfigurationError(f"{path} cannot be read: {error}") from error
-    urdf = read_info(bag_of(path)).urdf_text
-    if urdf is None:
+    info = read_info(bag_of(path))
+    if info.urdf_text is None:
         raise BagError(f"{path} carries no robot description")
-    return urdf, {}
+    return info.urdf_text, _rotors(info)
+
+
+def _rotors(info: BagInfo) -> Mapping[str, float]:
+    """Return the rotor inertias of the scenario in a bag, none without a scenario.
+
+    Raises BagError if the scenario is not that of the robot description.
+    """
+    if info.scenario_text is None:
+        return {}
+    with tempfile.TemporaryDirectory() as folder:
+        return scenario_in(info, Path(folder)).truth.robot.description.rotor_inertia

@@ -13,6 +13,7 @@ typedef struct {
   double damping, period_s;             /* of the generalised Jacobian; s */
   long long kind[ARMS], holder;         /* -1: nobody */
   long long failures, most_failures;    /* of inverse kinematics in a row; 0: any number */
+  long long has_momentum;               /* whether the robot may have some, by a deputy with mass */
 } quiet_t;
 
 typedef struct {
@@ -51,7 +52,6 @@ static void refer(const ticks_t *t, const ik_settings_t *settings, quiet_t *quie
       any = 1;
       on_path(quiet->starts + POSE_ROW * arm, quiet->goals + POSE_ROW * arm, fraction, rate,
               p->targets + POSE_ROW * arm, twist);
-      for (int i = 0; i < TWIST; i++) moving |= twist[i] != 0.0;
     } else {
       all = 0;
     }
@@ -62,6 +62,8 @@ static void refer(const ticks_t *t, const ik_settings_t *settings, quiet_t *quie
       if (quiet->kind[arm] == JOINTS) p->reference[j] = quiet->joints[j] + fraction * way, p->rates[j] = rate * way;
     }
   }
+  if (any && quiet->has_momentum) sms_without_drift(t->q, t->v, t->known_parameters, led, twists, w);
+  for (int i = 0; i < ARMS * TWIST; i++) moving |= led[i / TWIST] && twists[i] != 0.0;
   p->status = -1.0;
   if (any) {
     ik_solution_t solution;

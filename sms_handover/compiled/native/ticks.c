@@ -2,7 +2,9 @@
  *
  * Included behind the functions that CasADi has generated for a kind of robot, and behind the definitions of
  *   N           number of joints
- *   PARAMETERS  number of inertial parameters
+ *   PARAMETERS  number of inertial parameters, PER_BODY for each body
+ *   LOADED      functions of the law where truth and model differ in what an arm carries, by its number
+ *   TOOL_BODIES bodies that have the tools
  *   ARGUMENTS   most pointers that a generated function needs room for
  * No operation may be fused or reordered (-ffp-contract=off), so that the two loops agree bit for bit.
  */
@@ -24,7 +26,9 @@ typedef struct {
   double true_limit[N];                 /* N m, of the joints as they are */
   double tick_s, work;                  /* s, J */
   double true_parameters[PARAMETERS], known_parameters[PARAMETERS];
-  long long stamp_ns, reference_ns, longest_ns, tick_ns, law, one_robot, saturated[N];
+  long long stamp_ns, reference_ns, longest_ns, tick_ns, law;
+  long long one_robot, loaded;          /* truth and model alike; but for what this arm carries, -1: for more */
+  long long saturated[N];
 } ticks_t;
 
 static double clipped(double value, double limit) {
@@ -49,17 +53,28 @@ static void desired_motion(const ticks_t *t, double (*desired)[N]) {
   }
 }
 
+typedef int (*function_t)(const double **, double **, casadi_int *, double *, int);
+
 static double sign(double x) { return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : x; }
 
-/* Efforts of the law; where truth and model are one, also what the step keeps of its first stage. */
+/* Whether the law works out what the step keeps of its first stage. */
+static int is_prepared(const ticks_t *t) { return t->law == LAW_NMPC && (t->one_robot || t->loaded >= 0); }
+
+/* Efforts of the law; where truth and model share most of it, also what the step keeps of its first stage. */
 static void efforts_of(ticks_t *t, double (*desired)[N], double *efforts, double *kept, double *w) {
   if (t->law == LAW_NMPC) {
     /* CasADi has columns where NumPy has rows: (3, n) in memory is its (n, 3) */
+    static const function_t loaded[] = LOADED;
+    static const int tool_bodies[] = TOOL_BODIES;
     const double *arguments[ARGUMENTS] = {t->q, t->v, desired[0], t->gains, t->known_parameters};
     double *results[ARGUMENTS] = {efforts, kept};
     if (t->one_robot)
       sms_prepared_torque(arguments, results, 0, w, 0);
-    else
+    else if (t->loaded >= 0) {
+      int own = PER_BODY * tool_bodies[t->loaded];
+      arguments[5] = t->true_parameters + own, arguments[6] = t->known_parameters + own;
+      loaded[t->loaded](arguments, results, 0, w, 0);
+    } else
       sms_computed_torque(arguments, results, 0, w, 0);
     for (int j = 0; j < N; j++) efforts[j] = clipped(efforts[j], t->limit[j]);
     return;
@@ -75,12 +90,10 @@ static void efforts_of(ticks_t *t, double (*desired)[N], double *efforts, double
 
 const long long sms_work_size = WORK;
 
-typedef int (*step_t)(const double **, double **, casadi_int *, double *, int);
-
 /* Carry out `ticks` ticks, of which `steps` are integrated; write a row of q, v, effort and command each. */
 void sms_ticks(ticks_t *t, long scheme, double *rows, long ticks, long steps, double *w) {
-  static const step_t schemes[] = STEPS, rests[] = RESTS;
-  int prepared = t->law == LAW_NMPC && t->one_robot;
+  static const function_t schemes[] = STEPS, rests[] = RESTS;
+  int prepared = is_prepared(t);
   double kept[KEPT];
   double desired[3][N], command[N], acted[N], force[NV] = {0.0}, q[NQ], v[NV];
   for (long k = 0; k < ticks; k++) {

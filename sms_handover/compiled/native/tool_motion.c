@@ -52,6 +52,17 @@ void sms_on_path(const double *start, const double *goal, const double *progress
   on_path(start, goal, progress[0], progress[1], row, twist);
 }
 
+/* Take from the twists (ARMS, 6) in world of the arms that are led what the momentum gives their tools anyway. */
+void sms_without_drift(const double *q, const double *v, const double *parameters, const long long *led,
+                       double *twists, double *w) {
+  double carried[ARMS * TWIST];
+  const double *arguments[ARGUMENTS] = {q, v, parameters};
+  double *results[ARGUMENTS] = {carried};
+  sms_carried(arguments, results, 0, w, 0);
+  for (int i = 0; i < ARMS * TWIST; i++)
+    if (led[i / TWIST]) twists[i] -= carried[i];
+}
+
 /* Change the rates (N) of the arms that are led so that their tools have twists (ARMS, 6) in world, with the
  * reaction of the base: the damped inverse of the generalised Jacobian. */
 void sms_resolve_rates(const double *q, const double *parameters, const double *twists, const long long *led,

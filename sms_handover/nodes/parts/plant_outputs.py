@@ -7,6 +7,7 @@ import numpy as np
 
 from sms_handover.frames import BASE, DEPUTY, WORLD
 from sms_handover.graph.topics import (
+    ANGULAR_IMPULSE,
     ANGULAR_MOMENTUM,
     BASE_ODOMETRY,
     CLOCK,
@@ -15,6 +16,7 @@ from sms_handover.graph.topics import (
     DEPUTY_POSE,
     ENERGY,
     JOINT_STATES,
+    LINEAR_IMPULSE,
     LINEAR_MOMENTUM,
     SAMPLED_BASE_ODOMETRY,
     SAMPLED_JOINT_STATES,
@@ -35,17 +37,29 @@ from sms_handover.ros.node.endpoints import CountedPublisher
 
 _LOOP = (JOINT_STATES, BASE_ODOMETRY, SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
 _PERIOD = (DEPUTY_ODOMETRY, LINEAR_MOMENTUM, ANGULAR_MOMENTUM, ENERGY)
+_IMPULSE = (LINEAR_IMPULSE, ANGULAR_IMPULSE)
 
 
 class PlantOutputs:
     """The publishers of the plant's state, and the layout of their messages."""
 
     def __init__(
-        self, robot: RobotModel, publisher: Callable[[str], CountedPublisher], *, lockstep: bool
+        self,
+        robot: RobotModel,
+        publisher: Callable[[str], CountedPublisher],
+        *,
+        lockstep: bool,
+        wrenches: bool = False,
     ) -> None:
-        """Make the publishers; ``publisher`` returns the one of a topic."""
+        """Make the publishers; ``publisher`` returns the one of a topic, ``wrenches`` act from outside."""
         self._lockstep = lockstep
-        names = (*_LOOP, *_PERIOD, CLOCK, *(tool_pose(arm) for arm in robot.arms))
+        names = (
+            *_LOOP,
+            *_PERIOD,
+            *(_IMPULSE if wrenches else ()),
+            CLOCK,
+            *(tool_pose(arm) for arm in robot.arms),
+        )
         self._publish: dict[str, Callable[[Any], None]] = {name: publisher(name).publish for name in names}
         self._state_codec = StateCodec(robot.joint_names, WORLD, BASE)
         self._pose_codec, self._vector_codec = PoseCodec(WORLD), vector_codec(WORLD)
@@ -88,5 +102,9 @@ class PlantOutputs:
             publish[LINEAR_MOMENTUM](self._vector_codec.pack(now_ns, conserved.linear_momentum))
             publish[ANGULAR_MOMENTUM](self._vector_codec.pack(now_ns, conserved.angular_momentum))
             publish[ENERGY](self._energy_codec.pack(now_ns, energy))
+            given = plant.external_impulse
+            if given:
+                publish[LINEAR_IMPULSE](self._vector_codec.pack(now_ns, given.linear_impulse))
+                publish[ANGULAR_IMPULSE](self._vector_codec.pack(now_ns, given.angular_impulse))
         if now_ns % CLOCK_PERIOD_NS == 0:
             publish[CLOCK](head(now_ns))

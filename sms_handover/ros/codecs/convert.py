@@ -11,7 +11,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, Twist, Vector3, Wrench
 from geometry_msgs.msg import Pose as PoseMessage
 from sensor_msgs.msg import JointState
-from sms_handover_interfaces.msg import BodyClearance
+from sms_handover_interfaces.msg import BodyClearance, MpcStatus
 from sms_handover_interfaces.msg import Clearance as ClearanceMessage
 from sms_handover_interfaces.msg import GraspCommand as GraspCommandMessage
 from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
@@ -25,7 +25,7 @@ from sms_handover.errors import MessageError, Reason
 from sms_handover.frames import WORLD
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.message_constants import CONSTANTS
-from sms_handover.types import Array, GraspCommand, GraspEvent, IkResult, Pose, TaskPhase, frozen
+from sms_handover.types import Array, GraspCommand, GraspEvent, IkResult, PlanReport, Pose, TaskPhase, frozen
 from sms_handover.units import NS_PER_S
 
 
@@ -134,6 +134,26 @@ def _group_message(item: GroupDistance) -> BodyClearance:
         allowed=item.allowed,
         first_point=first,
         second_point=second,
+    )
+
+
+def plan_message(report: PlanReport) -> MpcStatus:
+    """Return the report of a solve as a message."""
+    return MpcStatus(
+        header=header(report.stamp_ns),
+        plan=report.plan,
+        status=CONSTANTS[report.status],
+        iterations=report.iterations,
+        active=list(report.active),
+        largest_slack=report.largest_slack,
+        largest_slack_row=report.largest_slack_row,
+        kkt_residual=report.kkt_residual,
+        linearization_time=report.linearization_time,
+        program_time=report.program_time,
+        total_time=report.total_time,
+        plan_age=report.plan_age,
+        late_plans=report.late_plans,
+        reused_plans=report.reused_plans,
     )
 
 

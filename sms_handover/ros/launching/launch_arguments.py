@@ -15,7 +15,17 @@ from sms_handover.ros.reference.interfaces import COMMON_GROUP, OWN_GROUPS, Para
 from sms_handover.simulation.parameters import LOCKSTEP
 
 _EVERY_NODE = ""
-_COMMON = ("scenario", "schedule", "robot", "duration", "mode", "dynamics", "external", "autostart")
+_COMMON = (
+    "scenario",
+    "schedule",
+    "robot",
+    "conditions",
+    "duration",
+    "mode",
+    "dynamics",
+    "external",
+    "autostart",
+)
 _TRUE = "true"
 
 

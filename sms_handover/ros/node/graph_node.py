@@ -6,6 +6,7 @@ from typing import Generic, TypeVar
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import Executor
 
+from sms_handover.conditions.conditions import Conditions
 from sms_handover.configuration.parameters import EVERY_NODE
 from sms_handover.configuration.scenario_file import COMMON
 from sms_handover.configuration.values import MODEL, TRUTH
@@ -120,7 +121,9 @@ class GraphNode(LifecycleNode, Generic[P]):
         self.common = self.common.for_deputies(*deputy_masses(self.common, self.scenario))
         self.robot: RobotModel = world.robot
         self.schedule: Schedule = world.schedule
-        topics = graph_topics(self.robot.arms, clearance=self.common.measures_clearance)
+        self.conditions: Conditions = world.conditions
+        clearance, wrenches = self.common.measures_clearance, bool(world.conditions.wrenches)
+        topics = graph_topics(self.robot.arms, clearance=clearance, wrenches=wrenches)
         self.endpoints = Endpoints(self, topics, self.common.peers, self.common.external)
         self.message_filter = MessageFilter(self.get_logger().warning, self._on_first_rejected)
         self.inputs.connect(self.endpoints, self.message_filter)

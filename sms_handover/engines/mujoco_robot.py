@@ -1,27 +1,19 @@
 """The robot in MuJoCo: a model from the same description, its state in our coordinates."""
 
+from collections.abc import Mapping
+
 import mujoco
 import numpy as np
 
-from sms_handover.frames import BASE
 from sms_handover.model.assembly import RobotDescription
-from sms_handover.model.mjcf import to_mjcf
+from sms_handover.model.mjcf import Payload, to_mjcf
 from sms_handover.model.urdf import to_urdf
 from sms_handover.types import Array
 
 State = tuple[Array, Array]  # q (7 + n,) and v (6 + n,) as RobotModel has them
 
 _NO_OTHER_FORCES = ("AUTORESET", "CONSTRAINT", "CONTACT", "DAMPER", "GRAVITY", "LIMIT", "SPRING")
-
-
-def mjcf_of(robot: RobotDescription, *, floating: bool) -> str:
-    """Return a robot as MJCF without solids.
-
-    With ``floating`` the base moves freely and joints have no limits, as in the plant; without, it is
-    fixed to the world and the limits hold, as inverse kinematics sees it.
-    """
-    rotors = {joint.name: joint.rotor_inertia for arm in robot.arms for joint in arm.joints}
-    return to_mjcf(to_urdf(robot), rotors, floating=floating, limited=not floating)
+_ROOT = 1  # number of the body that floats, after the world
 
 
 class MujocoRobot:
@@ -31,13 +23,20 @@ class MujocoRobot:
     axes) and its angular velocity in base axes: v_mujoco = T v with T = diag(R, 1, 1).
     """
 
-    def __init__(self, description: RobotDescription) -> None:
-        self.model = mujoco.MjModel.from_xml_string(mjcf_of(description, floating=True))
+    def __init__(self, urdf: str, rotor_inertia: Mapping[str, float], payload: Payload | None = None) -> None:
+        """Load a robot; ``rotor_inertia`` kg m^2 by joint is what a URDF cannot say."""
+        text = to_mjcf(urdf, rotor_inertia, limited=False, payload=payload)
+        self.model = mujoco.MjModel.from_xml_string(text)
         for name in _NO_OTHER_FORCES:
             self.model.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
         self.data = mujoco.MjData(self.model)
         joints = range(1, self.model.njnt)
         self.joint_names = tuple(mujoco.mj_id2name(self.model, mujoco.mjtObj.mjOBJ_JOINT, i) for i in joints)
+
+    @classmethod
+    def of(cls, robot: RobotDescription) -> "MujocoRobot":
+        """Return the robot of a description."""
+        return cls(to_urdf(robot), robot.rotor_inertia)
 
     def place(self, q: Array, v: Array) -> None:
         """Put the robot into a state."""
@@ -52,6 +51,10 @@ class MujocoRobot:
         """Integrate ``count`` steps of ``step`` s with MuJoCo's RK4."""
         self.model.opt.timestep = step
         mujoco.mj_step(self.model, self.data, count)
+
+    def evaluate(self) -> None:
+        """Compute frames and velocities of the state it is in; after a step they are those before it."""
+        mujoco.mj_forward(self.model, self.data)
 
     @property
     def state(self) -> State:
@@ -72,24 +75,51 @@ class MujocoRobot:
         to_mujoco = _map(q)
         turning = np.zeros_like(v)
         turning[:3] = to_mujoco[:3, :3] @ np.cross(v[3:6], v[:3])
-        mass = self._mass_matrix()
+        mass = self.mass_matrix()
         bias = to_mujoco.T @ (self.data.qfrc_bias + mass @ turning)
         return to_mujoco.T @ mass @ to_mujoco, bias, to_mujoco.T @ (self.data.qacc - turning)
 
     def momentum(self) -> tuple[Array, Array]:
         """Return linear and angular momentum (about the centre of mass) where it was last evaluated."""
         mujoco.mj_subtreeVel(self.model, self.data)
-        root = self.model.body(BASE).id
-        mass = self.model.body_subtreemass[root]
-        return mass * self.data.subtree_linvel[root], np.array(self.data.subtree_angmom[root])
+        linear = self.mass * self.data.subtree_linvel[_ROOT]
+        return linear, np.array(self.data.subtree_angmom[_ROOT])
+
+    @property
+    def mass(self) -> float:
+        """The mass in kg of all of it."""
+        return float(self.model.body_subtreemass[_ROOT])
+
+    @property
+    def centre_of_mass(self) -> Array:
+        """The centre of mass in ``world`` where it was last evaluated."""
+        return np.array(self.data.subtree_com[_ROOT])
 
     def frame(self, name: str) -> tuple[Array, Array]:
         """Return position and rotation matrix in ``world`` of a body, or of a tool."""
-        found = self.data.site(name) if name.endswith("_tool") else self.data.body(name)
+        is_site = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_SITE, name) >= 0
+        found = self.data.site(name) if is_site else self.data.body(name)
         return np.array(found.xpos), np.array(found.xmat).reshape(3, 3)
 
-    def _mass_matrix(self) -> Array:
-        """Return M (nv, nv) in MuJoCo's coordinates, column by column."""
+    def pose(self, name: str) -> Array:
+        """Return the pose (7,) of a body or of a tool, position and quaternion x y z w, in ``world``."""
+        position, axes = self.frame(name)
+        quaternion = np.empty(4)
+        mujoco.mju_mat2Quat(quaternion, axes.ravel())
+        return np.concatenate([position, np.roll(quaternion, -1)])
+
+    def jacobian(self, body: str) -> Array:
+        """Return the Jacobian (6, nv) of a body in MuJoCo's coordinates, where it was last evaluated.
+
+        Its rows are the velocity of the origin in ``world`` axes and the angular velocity in those of the
+        body, as MuJoCo has the velocity of a body that floats.
+        """
+        linear, angular = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
+        mujoco.mj_jacBody(self.model, self.data, linear, angular, self.model.body(body).id)
+        return np.concatenate([linear, self.frame(body)[1].T @ angular])
+
+    def mass_matrix(self) -> Array:
+        """Return M (nv, nv) in MuJoCo's coordinates where it was last evaluated, column by column."""
         columns = np.empty((self.model.nv, self.model.nv))
         for row, unit in zip(columns, np.eye(self.model.nv), strict=True):
             mujoco.mj_mulM(self.model, self.data, row, unit)
@@ -108,18 +138,3 @@ def _map(q: Array) -> Array:
     to_mujoco = np.eye(q.size - 1)
     to_mujoco[:3, :3] = rotation_matrix(q[3:7])
     return to_mujoco
-
-
-def apart(a: State, b: State) -> tuple[float, float, float]:
-    """Return the largest joint difference rad, the base distance m and the base angle rad of two states."""
-    turned = rotation_matrix(a[0][3:7]).T @ rotation_matrix(b[0][3:7])
-    sine = np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]])
-    angle = np.arctan2(0.5 * np.linalg.norm(sine), 0.5 * (np.trace(turned) - 1.0))
-    joints = np.max(np.abs(a[0][7:] - b[0][7:]))
-    return float(joints), float(np.linalg.norm(a[0][:3] - b[0][:3])), float(angle)
-
-
-def order(errors: Array) -> Array:
-    """Return the order per column: the mean log2 of the ratio of errors (rows) as the step is halved."""
-    ratios: Array = np.log2(errors[:-1] / errors[1:])
-    return np.asarray(ratios.mean(axis=0))

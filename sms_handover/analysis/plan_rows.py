@@ -1,0 +1,40 @@
+"""Plan rows: what a comparison and a report tell of the solves of a predictive law."""
+
+from collections import Counter
+from collections.abc import Sequence
+from functools import partial
+
+from sms_handover.analysis.layout import MISSING, Row, Section, row
+from sms_handover.analysis.metrics import RunMetrics
+
+_MS_PER_S = 1000.0  # [ms/s]
+_MOST_ROWS = 8  # [-] rows of constraints that are listed, those that bind most often
+_PER_CENT = 100.0
+_cost = partial(row, smaller_is_better=True)
+
+
+def plan_sections(runs: Sequence[RunMetrics]) -> tuple[Section, ...]:
+    """Return the section of plans, none if no run has any."""
+    plans = [item.plans for item in runs]
+    if not any(plans):
+        return ()
+    rows = [
+        row("solves", plans, lambda item: item.solves),
+        _cost("  without a plan", plans, lambda item: item.failed_solves),
+        _cost("  an older plan carried on", plans, lambda item: item.reused_plans),
+        _cost("  plans that came late", plans, lambda item: item.late_plans),
+        _cost("solve time, median [ms]", plans, lambda item: item.solve_median * _MS_PER_S),
+        _cost("  of it the quadratic program [ms]", plans, lambda item: item.program_median * _MS_PER_S),
+        _cost("solve time, 99th percentile [ms]", plans, lambda item: item.solve_tail * _MS_PER_S),
+        _cost("solve time, largest [ms]", plans, lambda item: item.solve_max * _MS_PER_S),
+        row("solves in which a limit binds [%]", plans, lambda item: item.binding_share * _PER_CENT),
+    ]
+    total = Counter[str]()
+    for item in plans:
+        total.update(item.binding if item else {})
+    for name, _ in total.most_common(_MOST_ROWS):
+        cells = tuple(f"{item.binding.get(name, 0)}" if item else MISSING for item in plans)
+        rows.append(Row(f"  {name}", cells))
+    rows.append(_cost("largest excess of a soft limit, in its unit", plans, lambda item: item.largest_slack))
+    rows.append(Row("  of", tuple((item.largest_slack_row or "none") if item else MISSING for item in plans)))
+    return (Section("Plans of the predictive law", tuple(rows)),)

@@ -1,0 +1,159 @@
+"""Process that carries out cases, watched from outside: one that hangs, dies or eats memory is a row too."""
+
+import json
+import os
+import platform
+import signal
+import subprocess
+import sys
+import time
+from base64 import b64decode
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from select import select
+from typing import NamedTuple
+
+from sms_handover.campaign.cases.case_row import Beside, Row, Status, Task, row_of
+from sms_handover.campaign.definition.campaign_file import Limits
+from sms_handover.campaign.definition.frozen import Frozen
+from sms_handover.campaign.sampling.streams import run_seed
+from sms_handover.errors import ConfigurationError, SmsHandoverError
+
+CASE_PROGRAM = (sys.executable, "-m", "sms_handover.campaign.cases.case_main")
+_START_S = 300.0  # [s] to import everything and, the first time, to compile
+_LOOK_S = 0.05  # [s] between two looks at the memory
+_END_S = 5.0  # [s] to end when asked to
+_MB = 1e6  # [byte]
+_READ = 1 << 16  # [byte]
+_ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+
+
+class Done(NamedTuple):
+    """A finished case: its row, what was measured beside it, and its trajectory if it is kept."""
+
+    row: Row
+    beside: Beside
+    trajectory: bytes = b""
+
+
+class CaseProcess:
+    """A child process that runs cases one after the other; it is started again after a bad end."""
+
+    def __init__(
+        self,
+        frozen: Frozen,
+        cases: int | None,
+        seed: int,
+        limits: Limits,
+        program: Sequence[str] = CASE_PROGRAM,
+    ) -> None:
+        """Take what the child needs; it starts with the first task."""
+        self._first = json.dumps({"files": dict(frozen.files), "cases": cases})
+        self._seed, self._limits, self._program = seed, limits, tuple(program)
+        self._child: subprocess.Popen[bytes] | None = None
+        self._pending = b""
+
+    def run(self, task: Task) -> Done:
+        """Return what comes of a task; raises SmsHandoverError if the child cannot even start."""
+        begin = time.monotonic()
+        for tries in range(1, self._limits.retries + 2):
+            self._start()
+            answer, status, cause = self._ask(json.dumps(task), self._limits.wall_time)
+            if answer is not None:
+                return self._done(answer, tries)
+        row = Row(task, run_seed(self._seed, task.case), {}, status, cause, {}, "")
+        return Done(row, Beside(0.0, time.monotonic() - begin, platform.node(), tries))
+
+    def close(self) -> None:
+        """End the child."""
+        child, self._child = self._child, None
+        if child is None:
+            return
+        with suppress(OSError):
+            if child.stdin:
+                child.stdin.close()
+        try:
+            child.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            child.kill()
+            child.wait()
+        if child.stdout:
+            child.stdout.close()
+
+    def _start(self) -> None:
+        """Start the child unless it runs."""
+        if self._child is not None and self._child.poll() is None:
+            return
+        self.close()
+        self._pending = b""
+        self._child = subprocess.Popen(
+            self._program,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, **_ONE_THREAD},
+            start_new_session=True,  # Ctrl-C is for the parent, which ends it
+        )
+        answer, _, cause = self._ask(self._first, _START_S)
+        if answer is None:
+            raise SmsHandoverError(f"a process for cases cannot start: {cause}")
+        if "error" in answer:
+            raise ConfigurationError(str(answer["error"]))
+
+    def _ask(self, text: str, limit_s: float) -> tuple[dict[str, object] | None, Status, str]:
+        """Send a line and wait for the answer; without one tell how and why that ended."""
+        child = self._child
+        assert child is not None and child.stdin is not None and child.stdout is not None
+        deadline = time.monotonic() + limit_s
+        with suppress(OSError):  # a dead child has no answer either
+            child.stdin.write(text.encode() + b"\n")
+            child.stdin.flush()
+        while b"\n" not in self._pending:
+            ready = select([child.stdout], [], [], _LOOK_S)[0]
+            if ready:
+                part = os.read(child.stdout.fileno(), _READ)
+                if not part:
+                    return None, Status.DIED, self._end_in_words()
+                self._pending += part
+            elif time.monotonic() > deadline:
+                self._kill()
+                return None, Status.LIMIT, f"more than {limit_s:g} s of wall time"
+            elif _resident_mb(child.pid) > self._limits.memory:
+                self._kill()
+                return None, Status.LIMIT, f"more than {self._limits.memory:g} MB of memory"
+        line, _, self._pending = self._pending.partition(b"\n")
+        answer: dict[str, object] = json.loads(line)
+        return answer, Status.SUCCEEDED, ""
+
+    def _kill(self) -> None:
+        """End the child at once."""
+        if self._child is not None:
+            self._child.kill()
+            self.close()
+
+    def _end_in_words(self) -> str:
+        """Return how the child ended."""
+        child = self._child
+        self.close()
+        code = child.returncode if child is not None else 0
+        if code is not None and code < 0:
+            with suppress(ValueError):
+                return f"its process ended by signal {signal.Signals(-code).name}"
+        return f"its process ended with exit code {code}"
+
+    @staticmethod
+    def _done(answer: dict[str, object], tries: int) -> Done:
+        """Return a finished case from the answer of the child."""
+        row, beside = row_of(json.loads(str(answer["row"]))), answer["beside"]
+        assert isinstance(beside, dict)
+        return Done(row, Beside(**{**beside, "tries": tries}), b64decode(str(answer.get("trajectory", ""))))
+
+
+def _resident_mb(pid: int) -> float:
+    """Return the resident memory of a process in MB, 0 where the system does not tell."""
+    try:
+        pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
+    except (OSError, ValueError, IndexError):
+        return 0.0
+    return pages * os.sysconf("SC_PAGE_SIZE") / _MB

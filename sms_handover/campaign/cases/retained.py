@@ -1,0 +1,44 @@
+"""Retained data of a case: its trajectory at the rate of references, or all of its run, as NumPy archives."""
+
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sms_handover.campaign.cases.case_row import Row, Task
+from sms_handover.campaign.definition.campaign_file import Keep
+from sms_handover.campaign.definition.fields import ALL, FAILURES
+from sms_handover.run_data import RunData
+
+TRAJECTORIES, FULL = "trajectories", "full"
+
+
+def keeps_trajectory(keep: Keep, row: Row) -> bool:
+    """Whether the trajectory of a case is kept."""
+    return keep.trajectories == ALL or (keep.trajectories == FAILURES and not row.succeeded)
+
+
+def trajectory(run: RunData) -> bytes:
+    """Return a run at the rate of its references, as a NumPy archive."""
+    rows = np.searchsorted(run.tick_ns, run.reference_ns)
+    stream = BytesIO()
+    arrays: dict[str, Any] = dict(
+        stamp_ns=run.reference_ns,
+        joint_names=np.array(run.joint_names),
+        joint_position=run.joint_position[rows],
+        joint_velocity=run.joint_velocity[rows],
+        joint_command=run.joint_command[rows],
+        base_pose=run.base_pose[rows],
+        reference_position=run.reference_position,
+        deputy_pose=run.deputy_pose,
+        **{f"tool_pose.{arm}": pose for arm, pose in run.tool_pose.items()},
+        **{f"target_pose.{arm}": pose for arm, pose in run.target_pose.items()},
+    )
+    np.savez_compressed(stream, **arrays)
+    return stream.getvalue()
+
+
+def file_of(folder: Path, kind: str, task: Task) -> Path:
+    """Return the file of retained data of a case."""
+    return folder / kind / f"{task.case}_{task.scenario}_{task.law}.npz"

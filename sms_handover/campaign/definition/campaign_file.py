@@ -1,0 +1,349 @@
+"""Campaign file: which scenarios run under which laws with which draws, and what is made of them."""
+
+import csv
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from sms_handover.campaign.definition.distributions import (
+    Choice,
+    Correlated,
+    Distribution,
+    Integers,
+    Normal,
+    Truncated,
+    Uniform,
+    Value,
+    correlated,
+)
+from sms_handover.campaign.definition.fields import (
+    CAMPAIGN_FIELDS,
+    COUNTED,
+    EXTENDABLE,
+    LIST,
+    MORRIS,
+    NONE,
+    RANDOM,
+)
+from sms_handover.campaign.definition.success_expression import SuccessExpression, success_expression
+from sms_handover.configuration.sections import Section
+from sms_handover.configuration.yaml_reader import load_value, read_text
+from sms_handover.control.registry import law_names, require_law
+from sms_handover.errors import ConfigurationError
+
+_NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
+_LARGEST_TABLE = 2**26  # [byte] of a CSV file of cases
+
+
+@dataclass(frozen=True)
+class ScenarioChoice:
+    """A scenario of a campaign: its source, a name or a file, and values on top."""
+
+    source: str
+    values: Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class Sampler:
+    """How cases are spread: the kind, the numbers it takes, and the rows of a table."""
+
+    kind: str
+    numbers: Mapping[str, int]
+    rows: tuple[Mapping[str, Value], ...] = ()
+
+
+@dataclass(frozen=True)
+class StopRule:
+    """Stop when Wilson's interval is narrow enough; looked at after fixed numbers of cases only."""
+
+    half_width: float
+    looks: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of a case: ticks of its run (0: none), wall time s, memory MB, and tries after a death."""
+
+    ticks: int = 0
+    wall_time: float = 600.0  # s
+    memory: float = 4000.0  # MB
+    retries: int = 1
+
+
+@dataclass(frozen=True)
+class Keep:
+    """What is kept beyond rows: trajectories of no, failed or all cases, full data of the worst."""
+
+    trajectories: str = NONE
+    worst: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """A campaign as its file says it; ``cases`` is None where neither file nor caller gives their number."""
+
+    name: str
+    description: str
+    seed: int
+    cases: int | None
+    sampler: Sampler
+    scenarios: Mapping[str, ScenarioChoice]
+    laws: tuple[str, ...]
+    values: Mapping[str, object]
+    draws: Mapping[str, Distribution]
+    groups: tuple[Correlated, ...]
+    success: SuccessExpression
+    metrics: tuple[str, ...]
+    worst_by: str
+    stop: StopRule | None
+    keep: Keep
+    limits: Limits
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """The dotted paths of all that varies from case to case."""
+        listed = tuple(self.sampler.rows[0]) if self.sampler.rows else ()
+        return (*self.draws, *(path for group in self.groups for path in group.normals), *listed)
+
+    @property
+    def runs_per_case(self) -> int:
+        """The number of runs that share the draws of a case."""
+        return len(self.scenarios) * len(self.laws)
+
+
+def read_campaign(path: Path, cases: int | None = None) -> Campaign:
+    """Return the campaign in a file, with another number of ``cases`` if given.
+
+    Raises ConfigurationError with file and line of what is wrong.
+    """
+    root = Section.read(path, spec=CAMPAIGN_FIELDS)
+    name = root.text("name")
+    if not _NAME.fullmatch(name):
+        raise root.error(f"name is {name!r}, must be 1 to 64 letters, digits, _ or -", "name")
+    sampler = _sampler(root, path.parent)
+    if "cases" in root and sampler.kind not in COUNTED:
+        raise root.error(f"sampler {sampler.kind} has its own number of cases: leave cases out", "cases")
+    if cases is not None and sampler.kind not in EXTENDABLE:
+        raise ConfigurationError(
+            f"{path}: sampler {sampler.kind} has a fixed number of cases; {' and '.join(EXTENDABLE)} have not"
+        )
+    if cases is None and "cases" in root:
+        cases = int(root.number("cases"))
+    draws = _draws(root)
+    groups = _groups(root)
+    _require_apart(root, draws, groups, sampler)
+    with root.located("success"):
+        success = success_expression(root.text("success") if "success" in root else "complete")
+    return Campaign(
+        name=name,
+        description=root.text("description") if "description" in root else "",
+        seed=int(root.number("seed")),
+        cases=cases,
+        sampler=sampler,
+        scenarios=MappingProxyType(_scenarios(root)),
+        laws=_laws(root),
+        values=MappingProxyType(_values(root)),
+        draws=MappingProxyType(draws),
+        groups=groups,
+        success=success,
+        metrics=_texts(root, "metrics"),
+        worst_by=root.text("worst_by") if "worst_by" in root else "grasp_error",
+        stop=_stop(root),
+        keep=_keep(root),
+        limits=_limits(root),
+    )
+
+
+def _sampler(root: Section, folder: Path) -> Sampler:
+    """Return how cases are spread."""
+    value = root.value("sampler") if "sampler" in root else RANDOM
+    if isinstance(value, str):
+        return Sampler(root.name("sampler", "sampler", COUNTED) if "sampler" in root else RANDOM, {})
+    section = root.section("sampler")
+    kind = section.one_of("sampler")
+    inner = section.section(kind)
+    if kind == LIST:
+        with inner.located("file"):
+            return Sampler(kind, {}, _table(folder / inner.text("file")))
+    numbers = {key: int(inner.number(key)) for key in inner.keys}
+    base, levels = numbers.get("base", 2), numbers.get("levels", 2)
+    if base & (base - 1):
+        raise inner.error(f"{inner.path('base')} is {base}, must be a power of two", "base")
+    if kind == MORRIS and levels % 2:
+        raise inner.error(f"{inner.path('levels')} is {levels}, must be even", "levels")
+    return Sampler(kind, MappingProxyType(numbers))
+
+
+def _table(path: Path) -> tuple[Mapping[str, Value], ...]:
+    """Return the rows of a CSV file, whose header has the dotted paths; raises ConfigurationError."""
+    try:
+        text = read_text(path, _LARGEST_TABLE)
+    except (OSError, ValueError) as error:
+        raise ConfigurationError(f"cannot read {path}: {error}") from error
+    header, *rows = [row for row in csv.reader(StringIO(text)) if row] or [[]]
+    if not rows or not all(header) or len(set(header)) < len(header):
+        raise ConfigurationError(f"{path} must have a header of different dotted paths and a row per case")
+    found = []
+    for number, row in enumerate(rows, start=2):
+        if len(row) != len(header):
+            raise ConfigurationError(f"{path}: row {number} has {len(row)} cells, must have {len(header)}")
+        values = [load_value(cell, f"{path}: row {number}: {cell}") for cell in row]
+        found.append(MappingProxyType(dict(zip(header, values, strict=True))))
+    return tuple(found)
+
+
+def _scenarios(root: Section) -> dict[str, ScenarioChoice]:
+    """Return the scenarios by their names in the campaign."""
+    section = root.section("scenarios")
+    found = {}
+    for name in section.keys:
+        if not _NAME.fullmatch(name):
+            raise section.error(f"scenario name {name!r} must be 1 to 64 letters, digits, _ or -", name)
+        if isinstance(section.value(name), str):
+            found[name] = ScenarioChoice(section.text(name), MappingProxyType({}))
+        else:
+            inner = section.section(name)
+            found[name] = ScenarioChoice(inner.text("scenario"), MappingProxyType(_values(inner)))
+    if not found:
+        raise root.error("scenarios is empty, must have at least one", "scenarios")
+    return found
+
+
+def _laws(root: Section) -> tuple[str, ...]:
+    """Return the control laws, each once."""
+    laws = _texts(root, "laws")
+    for law in laws:
+        require_law(law, f"{root.where('laws')}: laws")
+    if not laws or len(set(laws)) < len(laws):
+        raise root.error(f"laws must be one or more of {', '.join(law_names())}, each once", "laws")
+    return laws
+
+
+def _texts(root: Section, key: str) -> tuple[str, ...]:
+    """Return the texts of a key, none if it is not given."""
+    value = root.value(key) if key in root else []
+    if not isinstance(value, list) or not all(isinstance(item, str) and item for item in value):
+        raise root.error(f"{root.path(key)} must be a list of texts", key)
+    return tuple(value)
+
+
+def _values(section: Section) -> dict[str, object]:
+    """Return the values of a section by dotted path."""
+    if "values" not in section:
+        return {}
+    values = section.section("values")
+    return {path: values.value(path) for path in values.keys}
+
+
+def _draws(root: Section) -> dict[str, Distribution]:
+    """Return the distribution of every drawn value."""
+    if "draws" not in root:
+        return {}
+    section = root.section("draws")
+    return {path: _distribution(section.section(path), path) for path in section.keys}
+
+
+def _distribution(section: Section, path: str) -> Distribution:
+    """Return how one value is drawn."""
+    kind = section.one_of(path)
+    inner = section.section(kind)
+    with inner.located():
+        if kind == "normal":
+            return Normal(inner.number("mean"), inner.number("std"))
+        if kind == "truncated":
+            mean, std, low, high = (inner.number(key) for key in ("mean", "std", "low", "high"))
+            return Truncated(mean, std, low, high)
+        if kind == "uniform":
+            return Uniform(inner.number("low"), inner.number("high"))
+        if kind == "integers":
+            return Integers(int(inner.number("low")), int(inner.number("high")))
+        return _choice(inner)
+
+
+def _choice(section: Section) -> Choice:
+    """Return a choice of plain values."""
+    values = section.value("values")
+    if not isinstance(values, list) or not all(isinstance(item, bool | int | float | str) for item in values):
+        raise section.error(f"{section.path('values')} must be a list of numbers, texts or true and false")
+    weights = section.vector("weights") if "weights" in section else (1.0,) * len(values)
+    return Choice(tuple(values), weights)
+
+
+def _groups(root: Section) -> tuple[Correlated, ...]:
+    """Return the groups of draws that depend on each other."""
+    if "correlated" not in root:
+        return ()
+    found = []
+    for section in root.sections("correlated"):
+        draws = section.section("draws")
+        each = {path: draws.section(path) for path in draws.keys}
+        normals = {path: Normal(one.number("mean"), one.number("std")) for path, one in each.items()}
+        with section.located("correlation"):
+            found.append(correlated(normals, section.value("correlation")))
+    return tuple(found)
+
+
+def _require_apart(
+    root: Section, draws: Mapping[str, Any], groups: tuple[Correlated, ...], sampler: Sampler
+) -> None:
+    """Reject a path that is drawn twice, and draws beside a table that has the values already."""
+    grouped = [path for group in groups for path in group.normals]
+    for path in grouped:
+        if path in draws or grouped.count(path) > 1:
+            raise root.error(f"{path} is drawn twice", "correlated")
+    if sampler.kind == LIST and (draws or groups):
+        raise root.error("sampler list has all values in its file: leave draws and correlated out", "sampler")
+    if sampler.kind not in (RANDOM, LIST) and not (draws or groups):
+        raise root.error(f"sampler {sampler.kind} needs draws", "sampler")
+    if sampler.kind not in (RANDOM, *COUNTED, LIST) and groups:
+        raise root.error(f"sampler {sampler.kind} needs independent draws: leave correlated out", "sampler")
+
+
+def _stop(root: Section) -> StopRule | None:
+    """Return when to stop early."""
+    if "stop" not in root:
+        return None
+    section = root.section("stop")
+    looks = tuple(int(look) for look in section.vector("looks"))
+    if list(looks) != sorted(set(looks)) or not looks:
+        raise section.error(f"{section.path('looks')} must be whole numbers that rise", "looks")
+    return StopRule(section.number("half_width"), looks)
+
+
+def _keep(root: Section) -> Keep:
+    """Return what is kept beyond rows."""
+    if "keep" not in root:
+        return Keep()
+    section = root.section("keep")
+    known = CAMPAIGN_FIELDS.optional["keep"].optional["trajectories"].choices  # type: ignore[union-attr]
+    given: dict[str, Any] = {}
+    if "trajectories" in section:
+        given["trajectories"] = section.name("trajectories", "choice", known)
+    if "worst" in section:
+        given["worst"] = int(section.number("worst"))
+    return Keep(**given)
+
+
+def _limits(root: Section) -> Limits:
+    """Return the limits of a case."""
+    if "limits" not in root:
+        return Limits()
+    section = root.section("limits")
+    given: dict[str, Any] = {
+        **{key: int(section.number(key)) for key in ("ticks", "retries") if key in section},
+        **{key: section.number(key) for key in ("wall_time", "memory") if key in section},
+    }
+    return Limits(**given)
+
+
+def csv_file_of(path: Path) -> Path | None:
+    """Return the table that a campaign file names, None if it names none."""
+    root = Section.read(path, spec=CAMPAIGN_FIELDS)
+    if "sampler" not in root or isinstance(root.value("sampler"), str):
+        return None
+    section = root.section("sampler")
+    return path.parent / section.section(LIST).text("file") if LIST in section else None

@@ -1,0 +1,109 @@
+"""Frozen campaign: its file with every scenario and table that it names, which nothing outside changes."""
+
+import hashlib
+import json
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from sms_handover.campaign.definition.campaign_file import Campaign, csv_file_of, read_campaign
+from sms_handover.campaign.definition.fields import EXTENDABLE, LIST
+from sms_handover.configuration.documents import as_yaml
+from sms_handover.configuration.package_files import config_file
+from sms_handover.configuration.scenario_file import scenario_names
+from sms_handover.configuration.yaml_reader import read_yaml
+from sms_handover.errors import ConfigurationError, UnknownNameError
+from sms_handover.simulation.scenario_yaml import scenario_yaml
+
+CAMPAIGN_FILE = "campaign.yaml"
+_TABLE, _SCENARIOS = "cases.csv", "scenarios"
+_SUFFIX = ".yaml"
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """The texts of a campaign by the names of their files, without a number of cases that may grow."""
+
+    files: Mapping[str, str]
+
+    @property
+    def text(self) -> str:
+        """All of it as JSON, the same for the same campaign."""
+        return json.dumps(self.files, sort_keys=True, ensure_ascii=True)
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of all that its rows depend on, as hexadecimal digits."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+    def campaign(self, cases: int | None = None) -> Campaign:
+        """Return the campaign with so many cases."""
+        with tempfile.TemporaryDirectory(prefix="sms_handover_campaign_") as folder:
+            return self.unpacked(Path(folder), cases)
+
+    def unpacked(self, folder: Path, cases: int | None = None) -> Campaign:
+        """Write the files below a folder; return the campaign, whose scenarios have their paths there."""
+        for name, text in self.files.items():
+            path = folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+        return read_campaign(folder / CAMPAIGN_FILE, cases)
+
+
+def campaign_path(source: str) -> Path:
+    """Return the file of a shipped campaign, or of one given by its path; raises UnknownNameError."""
+    shipped = {path.stem: path for path in config_file("campaigns").glob(f"*{_SUFFIX}")}
+    if source in shipped:
+        return shipped[source]
+    path = Path(source)
+    if path.is_file():
+        return path
+    if path.suffix == _SUFFIX:
+        raise ConfigurationError(f"there is no campaign file {path}")
+    raise UnknownNameError("campaign", source, sorted(shipped))
+
+
+def freeze(path: Path) -> tuple[Frozen, int | None]:
+    """Return a campaign file as it is now, and the number of cases that it gives.
+
+    Raises ConfigurationError with file and line of what is wrong.
+    """
+    campaign = read_campaign(path)
+    content = read_yaml(path)
+    extendable = campaign.sampler.kind in EXTENDABLE
+    if extendable:  # more cases are not another campaign
+        content.pop("cases", None)
+    files: dict[str, str] = {}
+    scenarios: dict[str, object] = {}
+    for name, chosen in campaign.scenarios.items():
+        source = chosen.source
+        if source not in scenario_names():
+            source = str((path.parent / source).resolve())
+        file = f"{_SCENARIOS}/{name}{_SUFFIX}"
+        try:
+            files[file] = scenario_yaml(source)
+        except ConfigurationError as error:
+            raise ConfigurationError(f"{path}: scenario {name!r}: {error}") from error
+        scenarios[name] = {"scenario": file, "values": dict(chosen.values)} if chosen.values else file
+    content["scenarios"] = scenarios
+    table = csv_file_of(path)
+    if table is not None:
+        files[_TABLE] = table.read_text(encoding="utf-8")
+        content["sampler"] = {LIST: {"file": _TABLE}}
+    files[CAMPAIGN_FILE] = as_yaml(content)
+    return Frozen(files), campaign.cases if extendable else None
+
+
+def read_frozen(folder: Path) -> Frozen:
+    """Return the campaign that was frozen below a folder; raises ConfigurationError."""
+    names = [CAMPAIGN_FILE, _TABLE, *(f"{_SCENARIOS}/{p.name}" for p in (folder / _SCENARIOS).glob("*"))]
+    try:
+        files = {
+            name: (folder / name).read_text(encoding="utf-8") for name in names if (folder / name).is_file()
+        }
+    except (OSError, ValueError) as error:
+        raise ConfigurationError(f"{folder} cannot be read as a campaign: {error}") from error
+    if CAMPAIGN_FILE not in files:
+        raise ConfigurationError(f"{folder} is no campaign folder: it has no {CAMPAIGN_FILE}")
+    return Frozen(files)

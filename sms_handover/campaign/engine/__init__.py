@@ -1,0 +1,1 @@
+"""Engine: what hands cases to processes, here or on a cluster, and takes rows back."""

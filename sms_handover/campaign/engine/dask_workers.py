@@ -1,0 +1,181 @@
+"""Workers of a Dask cluster: one that is made here on 127.0.0.1, or one whose scheduler is given by URL.
+
+Every worker starts a process of its own for cases and watches it; what Dask does beyond handing out chunks of
+tasks is to start a worker again that was killed.
+"""
+
+import json
+import logging
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import asdict
+from itertools import islice
+from queue import Empty, SimpleQueue
+from time import monotonic
+from typing import Any
+
+import dask
+import distributed
+
+from sms_handover.campaign.cases.case_process import CASE_PROGRAM, CaseProcess, Done
+from sms_handover.campaign.cases.case_row import Beside, Row, Task, row_of
+from sms_handover.campaign.definition.campaign_file import Limits
+from sms_handover.campaign.definition.frozen import Frozen
+from sms_handover.errors import SmsHandoverError
+
+_HERE = "127.0.0.1"
+_PLUGIN = "sms_handover_cases"
+_CHUNK_S = 2.0  # [s] of wall time that a chunk of cases takes
+_LARGEST_CHUNK = 50  # [-] cases
+_WAITING = 2  # [-] chunks of each worker that are handed out
+_DEATHS = 20  # [-] of workers that one chunk survives
+_CLOSE_S = 1.5  # [s] that a cluster has to end by itself
+_TIMEOUT = "30s"  # to reach a scheduler
+_Answer = tuple[str, dict[str, Any], bytes]
+
+
+class CasePlugin(distributed.WorkerPlugin):
+    """What each worker has for the campaign: processes for cases, one for each of its threads."""
+
+    name = _PLUGIN
+
+    def __init__(
+        self, files: dict[str, str], cases: int | None, seed: int, limits: Limits, program: Sequence[str]
+    ) -> None:
+        """Take what the processes need."""
+        self._files, self._cases, self._seed = files, cases, seed
+        self._limits, self._program = limits, tuple(program)
+
+    def setup(self, worker: Any) -> None:
+        """Start without a process."""
+        self._idle: SimpleQueue[CaseProcess] = SimpleQueue()
+
+    def teardown(self, worker: Any) -> None:
+        """End the processes."""
+        with suppress(Empty):
+            while True:
+                self._idle.get_nowait().close()
+
+    @contextmanager
+    def process(self) -> Iterator[CaseProcess]:
+        """Yield a process that nobody else uses."""
+        try:
+            process = self._idle.get_nowait()
+        except Empty:
+            frozen = Frozen(self._files)
+            process = CaseProcess(frozen, self._cases, self._seed, self._limits, self._program)
+        try:
+            yield process
+        finally:
+            self._idle.put(process)
+
+
+def run_chunk(tasks: Sequence[tuple[int, str, str]]) -> list[_Answer]:
+    """Carry out some tasks on a worker; return row, what is beside it, and trajectory of each."""
+    worker = distributed.get_worker()
+    plugin: Any = worker.plugins[_PLUGIN]
+    with plugin.process() as process:
+        done = [process.run(Task(*task)) for task in tasks]
+    return [(one.row.text, asdict(one.beside), one.trajectory) for one in done]
+
+
+class DaskWorkers:
+    """Workers of a cluster; at most a few chunks for each of them are handed out at a time."""
+
+    def __init__(
+        self,
+        frozen: Frozen,
+        cases: int | None,
+        *,
+        workers: int = 0,
+        scheduler: str = "",
+        program: Sequence[str] = CASE_PROGRAM,
+    ) -> None:
+        """Make a cluster of so many workers here, or connect to a scheduler.
+
+        Raises SmsHandoverError if there is no scheduler.
+        """
+        self._cluster: Any = None
+        campaign = frozen.campaign(cases)
+        plugin = CasePlugin(dict(frozen.files), cases, campaign.seed, campaign.limits, program)
+        dask.config.set({"distributed.scheduler.allowed-failures": _DEATHS})
+        if not scheduler:
+            self._cluster = distributed.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                host=_HERE,
+                dashboard_address=None,
+                memory_limit=None,  # the process of cases is watched by us
+                silence_logs=logging.CRITICAL,
+            )
+        try:
+            self._client = distributed.Client(self._cluster or scheduler, timeout=_TIMEOUT)
+            self._client.register_plugin(plugin, name=_PLUGIN)
+        except OSError as error:
+            self.close()
+            raise SmsHandoverError(f"scheduler {scheduler} cannot be reached: {error}") from error
+
+    def run(self, tasks: Iterable[Task]) -> Iterator[Done]:
+        """Yield finished cases as they come; raises SmsHandoverError where workers die again and again."""
+        left, self._chunk_size, number = iter(tasks), 1, 0
+        running = distributed.as_completed()
+        waiting, began = 0, dict[str, float]()
+
+        def hand_out() -> bool:
+            nonlocal number, waiting
+            chunk = [tuple(task) for task in islice(left, self._chunk_size)]
+            if not chunk:
+                return False
+            number += 1
+            key = f"{_PLUGIN}-{number}"
+            began[key] = monotonic()
+            running.add(self._client.submit(run_chunk, chunk, key=key, pure=False))
+            waiting += 1
+            return True
+
+        while True:
+            while waiting < _WAITING * max(self._threads, 1) and hand_out():
+                pass
+            if not waiting:
+                return
+            future = next(running)
+            waiting -= 1
+            answers = self._result(future)
+            future.release()
+            walls = [beside["wall"] for _, beside, _ in answers]
+            mean = max(sum(walls) / len(walls), _CHUNK_S / _LARGEST_CHUNK)
+            self._chunk_size = max(1, min(_LARGEST_CHUNK, round(_CHUNK_S / mean)))
+            yield from (_done(answer) for answer in answers)
+
+    def close(self) -> None:
+        """End the cluster, or leave the one of others as it was."""
+        client = getattr(self, "_client", None)
+        if client is not None:
+            with suppress(Exception):
+                if self._cluster is None:
+                    client.unregister_worker_plugin(_PLUGIN)
+                client.close(timeout=_CLOSE_S)
+        if self._cluster is not None:
+            with suppress(Exception):
+                self._cluster.close(timeout=_CLOSE_S)
+
+    @property
+    def _threads(self) -> int:
+        """The number of cases that run at the same time."""
+        return sum(self._client.nthreads().values())
+
+    def _result(self, future: Any) -> list[_Answer]:
+        """Return what a chunk gave."""
+        try:
+            answers: list[_Answer] = future.result()
+        except distributed.KilledWorker as error:
+            raise SmsHandoverError("workers die again and again: see what kills them") from error
+        return answers
+
+
+def _done(answer: _Answer) -> Done:
+    """Return a finished case as the serial workers give it."""
+    text, beside, trajectory = answer
+    row: Row = row_of(json.loads(text))
+    return Done(row, Beside(**beside), trajectory)

@@ -1,0 +1,86 @@
+"""Plan of a campaign before it runs: its draws, their ranges, and what it takes by its first case."""
+
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from sms_handover.analysis.layout import Row, Section, layout
+from sms_handover.campaign.cases.case import Cases
+from sms_handover.campaign.cases.case_metrics import known_metrics
+from sms_handover.campaign.cases.case_row import Row as CaseRow
+from sms_handover.campaign.cases.case_row import Status, Task
+from sms_handover.campaign.cases.retained import trajectory
+from sms_handover.campaign.definition.campaign_file import Campaign
+from sms_handover.campaign.definition.distributions import range_in_words
+from sms_handover.campaign.definition.fields import ALL, NONE
+from sms_handover.campaign.definition.frozen import freeze
+from sms_handover.errors import ConfigurationError, UnknownNameError
+
+_S_PER_H = 3600.0  # [s/h]
+_MB = 1e6  # [byte]
+
+
+def plan_in_words(path: Path) -> str:
+    """Return draws, ranges, and the CPU time and disk that a campaign takes, as text.
+
+    The first case of each scenario runs under each law. Raises ConfigurationError where the campaign cannot
+    be run: a value that no scenario has, or that cannot be read back, an unknown metric.
+    """
+    frozen, number = freeze(path)
+    with tempfile.TemporaryDirectory(prefix="sms_handover_check_") as folder:
+        cases = Cases(frozen, number, Path(folder))
+        campaign, count = cases.campaign, cases.samples.count
+        cpu, size, kept = 0.0, 0.0, 0.0
+        for scenario in campaign.scenarios:
+            _require_metrics(cases, scenario, path)
+            for law in campaign.laws:
+                result = cases.run(Task(0, scenario, law))
+                _require_run(result.row, path)
+                cpu += result.beside.cpu
+                size += len(result.row.text)
+                kept += (
+                    len(trajectory(result.run)) if result.run and campaign.keep.trajectories != NONE else 0
+                )
+    runs = count * campaign.runs_per_case
+    at_most = "" if campaign.keep.trajectories == ALL else ", if all fail"
+    trajectories = f"; trajectories {count * kept / _MB:.3g} MB{at_most}" if kept else ""
+    lines = [
+        *layout(("distribution", "from 0.1 % to 99.9 %"), [Section("Drawn value", tuple(_draws(campaign)))])[
+            1:
+        ],
+        "",
+        f"{count} cases x {len(campaign.scenarios)} scenarios x {len(campaign.laws)} laws = {runs} runs",
+        f"CPU time about {count * cpu / _S_PER_H:.3g} h, by the first case; "
+        f"journal about {count * size / _MB:.3g} MB{trajectories}",
+    ]
+    return "\n".join(lines)
+
+
+def _draws(campaign: Campaign) -> Iterator[Row]:
+    """Yield each drawn value with its distribution and range."""
+    for path, one in campaign.draws.items():
+        yield Row(path, (str(one), range_in_words(one)))
+    for group in campaign.groups:
+        for path, normal in group.normals.items():
+            yield Row(path, (f"{normal}, correlated", range_in_words(normal)))
+    if campaign.sampler.rows:
+        for path in campaign.paths:
+            numbers = [row[path] for row in campaign.sampler.rows]
+            span = [value for value in numbers if isinstance(value, int | float)]
+            yield Row(path, ("of a table", f"{min(span):.6g} to {max(span):.6g}" if span else "texts"))
+
+
+def _require_metrics(cases: Cases, scenario: str, path: Path) -> None:
+    """Raise UnknownNameError unless a scenario has all metrics that the campaign names."""
+    campaign = cases.campaign
+    known = dict.fromkeys(known_metrics(cases.scenario(Task(0, scenario, campaign.laws[0]))))
+    campaign.success.require_known(known)
+    for metric in (*campaign.metrics, campaign.worst_by):
+        if metric not in known:
+            raise UnknownNameError("metric", metric, known, str(path), "sms-handover list metrics")
+
+
+def _require_run(row: CaseRow, path: Path) -> None:
+    """Raise ConfigurationError if the first case could not even be run."""
+    if row.status in (Status.REJECTED, Status.ERROR):
+        raise ConfigurationError(f"{path}: {row.task}: {row.cause}")

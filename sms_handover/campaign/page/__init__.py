@@ -1,0 +1,1 @@
+"""Page of a campaign: one self-contained HTML document."""

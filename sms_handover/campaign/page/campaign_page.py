@@ -1,0 +1,102 @@
+"""Page of a campaign: one HTML document that needs no network, as that of runs is."""
+
+from dataclasses import dataclass
+
+from sms_handover import __version__
+from sms_handover.campaign.cases.case import in_words, inputs_in_words
+from sms_handover.campaign.cases.case_metrics import USUAL
+from sms_handover.campaign.cases.case_row import Row
+from sms_handover.campaign.page.campaign_plots import campaign_plots
+from sms_handover.campaign.record.campaign_folder import CampaignFolder
+from sms_handover.campaign.statistics.case_columns import Group, columns_of
+from sms_handover.campaign.statistics.tables import (
+    TEST_HEAD,
+    outcome_sections,
+    paired_section,
+    sensitivity_sections,
+)
+from sms_handover.campaign.statistics.worst_cases import failures_by_cause, rerun_command, worst_of
+from sms_handover.report.engine import plotly_script, render, web_file
+from sms_handover.report.security import content_security_policy
+from sms_handover.report.styles import RunStyle, run_styles
+
+PAGE = "index.html"
+_WORST = 5  # [-] cases of each law
+_MOST_CAUSES = 20  # [-]
+_SCRIPTS = ("data.js", "colours.js", "campaign.js")
+
+
+@dataclass(frozen=True)
+class Headed:
+    """What the head of a column of a table shows of a law."""
+
+    style: RunStyle
+
+
+@dataclass(frozen=True)
+class CaseLine:
+    """A case in a list: what came of it, its draws, and the command that runs it again."""
+
+    text: str
+    inputs: str
+    command: str
+
+
+def campaign_page(folder: CampaignFolder) -> str:
+    """Return the page of a campaign folder; raises MissingDependencyError without what it needs."""
+    campaign, entries = folder.campaign, list(folder.entries())
+    columns = columns_of(entries)
+    plots = campaign_plots(campaign, columns)
+    scripts = (plotly_script(), "\n".join(web_file(name) for name in _SCRIPTS))
+    causes = failures_by_cause(entries).most_common(_MOST_CAUSES)
+    paired = paired_section(columns)
+    return render(
+        "campaign.html.j2",
+        version=__version__,
+        policy=content_security_policy(scripts),
+        style=web_file("report.css"),
+        scripts=scripts,
+        name=campaign.name,
+        description=campaign.description,
+        success=campaign.success.text,
+        rows=len(entries),
+        total=sum(1 for _ in folder.tasks),
+        stop=campaign.stop,
+        runs=[Headed(style) for style in run_styles(campaign.laws, campaign.laws)],
+        sections=outcome_sections(campaign, columns),
+        causes=[(*cause, times) for cause, times in causes],
+        worst=_worst(folder, worst_of(entries, campaign.worst_by, _WORST)),
+        worst_by=campaign.worst_by,
+        tables=[*([(TEST_HEAD, paired)] if paired else []), *sensitivity_sections(campaign, columns)],
+        plots=plots,
+        data={"plots": [plot.data for plot in plots]},
+        draws=_draws(folder),
+        files=folder.frozen.files,
+        manifest=folder.manifest,
+        metrics=USUAL,
+    )
+
+
+def _worst(folder: CampaignFolder, found: dict[Group, list[Row]]) -> list[CaseLine]:
+    """Return the worst cases of each law."""
+    path, metric = folder.path, folder.campaign.worst_by
+    one_scenario = len(folder.campaign.scenarios) == 1
+    return [
+        CaseLine(
+            in_words(row, metric),
+            inputs_in_words(row.inputs),
+            rerun_command(str(path), row.task, one_scenario=one_scenario),
+        )
+        for rows in found.values()
+        for row in rows
+    ]
+
+
+def _draws(folder: CampaignFolder) -> list[tuple[str, str]]:
+    """Return each drawn value with its distribution in words."""
+    campaign = folder.campaign
+    grouped = [
+        (path, f"{one}, correlated") for group in campaign.groups for path, one in group.normals.items()
+    ]
+    listed = [(path, "from a table") for path in campaign.sampler.rows[0]] if campaign.sampler.rows else []
+    return [*((path, str(one)) for path, one in campaign.draws.items()), *grouped, *listed]

@@ -1,0 +1,1 @@
+"""Record of a campaign on disk: folder, manifest, journal, table."""

@@ -1,0 +1,114 @@
+"""Manifest of a campaign: what it was made with, session by session, and how far it is to go."""
+
+import json
+import os
+import platform
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from sms_handover.bag.provenance import package_version, provenance
+from sms_handover.errors import ConfigurationError
+
+MANIFEST = "manifest.json"
+_PACKAGES = ("distributed", "SALib", "scipy", "statsmodels", "pyarrow", "casadi")
+_OWN = ("start", "host")  # of a session, in which sessions may differ
+
+
+@dataclass(frozen=True)
+class Shard:
+    """One of ``of`` parts of a campaign, counted from 1; it has every ``of``-th case."""
+
+    number: int = 1
+    of: int = 1
+
+    def has(self, case: int) -> bool:
+        """Whether a case is of this part."""
+        return case % self.of == self.number - 1
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.of}"
+
+
+def shard_of(text: str) -> Shard:
+    """Return the shard that a text such as ``3/100`` says; raises ConfigurationError."""
+    number, slash, of = text.partition("/")
+    if not (slash and number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of)):
+        raise ConfigurationError(f"shard {text!r} must be NUMBER/OF, such as 3/100, counted from 1")
+    return Shard(int(number), int(of))
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a campaign folder is of: digest of the frozen campaign, its cases, its part, and its sessions."""
+
+    digest: str
+    name: str
+    cases: int | None
+    shard: Shard
+    sessions: tuple[dict[str, str], ...] = ()
+
+    def with_session(self, session: dict[str, str]) -> "Manifest":
+        """Return it with one more session."""
+        return replace(self, sessions=(*self.sessions, session))
+
+    @property
+    def differences(self) -> tuple[str, ...]:
+        """In what of their software and processors the sessions differ, in words."""
+        names = {name for session in self.sessions for name in session} - set(_OWN)
+        found = []
+        for name in sorted(names):
+            values = list(dict.fromkeys(session.get(name, "unknown") for session in self.sessions))
+            if len(values) > 1:
+                found.append(f"{name}: {', then '.join(values)}")
+        return tuple(found)
+
+
+def session() -> dict[str, str]:
+    """Return what identifies software, processor and mathematical library of a session."""
+    return {
+        **provenance(),
+        **{f"version.{name}": package_version(name) for name in _PACKAGES},
+        "host": platform.node(),
+        "processor": _processor(),
+        "libm": " ".join(platform.libc_ver()).strip() or "unknown",
+    }
+
+
+def write_manifest(folder: Path, manifest: Manifest) -> None:
+    """Write the manifest of a folder whole or not at all."""
+    path, unfinished = folder / MANIFEST, folder / f".{MANIFEST}.{os.getpid()}"
+    with unfinished.open("w", encoding="utf-8") as stream:
+        json.dump(asdict(manifest), stream, indent=1)
+        stream.write("\n")
+        stream.flush()
+        os.fsync(stream.fileno())
+    unfinished.replace(path)
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """Return the manifest of a folder; raises ConfigurationError if it has none or a broken one."""
+    path = folder / MANIFEST
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+        shard, sessions = Shard(**values.pop("shard")), tuple(map(dict, values.pop("sessions")))
+        return Manifest(**values, shard=shard, sessions=sessions)
+    except FileNotFoundError:
+        raise ConfigurationError(f"{folder} is no campaign folder: it has no {MANIFEST}") from None
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ConfigurationError(f"{path} cannot be read: {error}") from error
+
+
+def all_sessions(manifests: Sequence[Manifest]) -> tuple[dict[str, str], ...]:
+    """Return the sessions of several folders, each once."""
+    return tuple({json.dumps(one): one for manifest in manifests for one in manifest.sessions}.values())
+
+
+def _processor() -> str:
+    """Return the name of the processor."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(named, platform.machine())

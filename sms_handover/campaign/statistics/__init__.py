@@ -1,0 +1,1 @@
+"""Statistics of a campaign: intervals, paired tests, sensitivities."""

@@ -1,0 +1,64 @@
+"""Text of what came of a campaign, and its figures as plain values."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from sms_handover.analysis.layout import Section, layout
+from sms_handover.campaign.definition.campaign_file import Campaign
+from sms_handover.campaign.statistics.case_columns import CaseColumns, Group
+from sms_handover.campaign.statistics.paired_tests import paired_tests
+from sms_handover.campaign.statistics.percentiles import percentile
+from sms_handover.campaign.statistics.proportion import proportion
+from sms_handover.campaign.statistics.tables import (
+    KEY_METRICS,
+    TEST_HEAD,
+    TESTED,
+    outcome_sections,
+    paired_section,
+)
+
+_SHARES = (0.05, 0.5, 0.95)
+
+
+def campaign_text(campaign: Campaign, columns: Mapping[Group, CaseColumns]) -> str:
+    """Return the tables of a campaign, with a column per law; raises MissingDependencyError."""
+    lines = layout(campaign.laws, outcome_sections(campaign, columns))
+    paired: Section | None = paired_section(columns)
+    lines += layout(TEST_HEAD, [paired]) if paired else []
+    return "\n".join(lines[1:]) + "\n"
+
+
+def campaign_values(campaign: Campaign, columns: Mapping[Group, CaseColumns]) -> dict[str, Any]:
+    """Return the figures of a campaign, ready for ``json.dumps``; None where one is not defined."""
+    groups = []
+    for (scenario, law), one in columns.items():
+        successes = proportion(int(one.succeeded.sum()), len(one.case))
+        metrics = {
+            name: {f"{share:g}": list(map(_plain, percentile(one.metrics[name], share))) for share in _SHARES}
+            for name in (*KEY_METRICS, *campaign.metrics)
+            if name in one.metrics
+        }
+        groups.append(
+            {
+                "scenario": scenario,
+                "law": law,
+                "cases": len(one.case),
+                "success": [successes.share, successes.low, successes.high],
+                "numeric_failures": int(one.numeric_failure.sum()),
+                "percentiles": metrics,
+                "cpu": _plain(float(one.cpu.mean())),
+            }
+        )
+    tests = [
+        {name: _plain(value) if isinstance(value, float) else value for name, value in asdict(test).items()}
+        for test in paired_tests(columns, TESTED)
+    ]
+    return {"campaign": campaign.name, "groups": groups, "paired_tests": tests}
+
+
+def _plain(value: float) -> float | None:
+    """Return a number, None for NaN."""
+    return None if np.isnan(value) else float(value)

@@ -1,0 +1,55 @@
+"""Worst cases of a campaign, and its failures by cause."""
+
+import heapq
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator
+
+from sms_handover.campaign.cases.case_row import Row, Task
+from sms_handover.campaign.record.journal import Entry
+
+_NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
+Group = tuple[str, str]  # scenario and law
+
+
+def worst_of(entries: Iterable[Entry], metric: str, count: int) -> dict[Group, list[Row]]:
+    """Return the cases with the largest value of a metric, by scenario and law, the worst first.
+
+    What has no value, as after a numeric failure, is none of them: it is listed with the failures.
+    """
+    found: dict[Group, list[tuple[float, int, Row]]] = {}
+    for entry in entries:
+        row = entry.row
+        value = row.metrics.get(metric)
+        if value is None:
+            continue
+        heap = found.setdefault(row.task[1:], [])
+        heapq.heappush(heap, (value, -row.task.case, row))
+        if len(heap) > count:
+            heapq.heappop(heap)
+    return {group: [row for _, _, row in sorted(heap, reverse=True)] for group, heap in found.items()}
+
+
+def failures_by_cause(entries: Iterable[Entry]) -> Counter[tuple[str, str, str]]:
+    """Return how often a cause ended a case without success, by law, status and cause without its numbers."""
+    return Counter(
+        (entry.row.task.law, entry.row.status.value, cause_of(entry.row))
+        for entry in entries
+        if not entry.row.succeeded
+    )
+
+
+def cause_of(row: Row) -> str:
+    """Return the cause of a row with its numbers left out, so that like cases have like causes."""
+    return _NUMBER.sub("#", row.cause)
+
+
+def rerun_command(folder: str, task: Task, *, one_scenario: bool) -> str:
+    """Return the command that runs a case again."""
+    scenario = "" if one_scenario else f" --scenario {task.scenario}"
+    return f"sms-handover campaign rerun {folder} {task.case} --law {task.law}{scenario}"
+
+
+def failed(entries: Iterable[Entry]) -> Iterator[Row]:
+    """Yield the rows without success."""
+    return (entry.row for entry in entries if not entry.row.succeeded)

@@ -1,0 +1,31 @@
+"""``sms-handover campaign merge``: merge the folders of shards into one."""
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from sms_handover.campaign.record.campaign_folder import merge
+from sms_handover.campaign.record.outputs import write_outputs
+from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
+
+
+def add_parser(parser: ArgumentParser) -> None:
+    """Describe the command."""
+    parser.description = (
+        "Write a new folder with the rows of several folders of one campaign, such as those of its shards. "
+        "Two rows of one case must be equal."
+    )
+    parser.epilog = (
+        "exit codes: 0 every case has a row; 1 it cannot be written; 2 wrong input; 3 cases are missing"
+    )
+    parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER", help="folder of a campaign")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="FOLDER", help="new folder")
+
+
+def command(options: Namespace) -> int:
+    """Run the command; return the exit code."""
+    with merge(options.output, options.folders) as merged:
+        there, total = sum(1 for _ in merged.entries()), sum(1 for _ in merged.tasks)
+    print(f"{there} of {total} rows")
+    for line in write_outputs(options.output):
+        print(line)
+    return EXIT_OK if there == total else EXIT_LOSS

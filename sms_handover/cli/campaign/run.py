@@ -1,0 +1,134 @@
+"""``sms-handover campaign run``: run a campaign, or go on with one."""
+
+import sys
+from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+from sms_handover.campaign.definition.frozen import campaign_path, freeze
+from sms_handover.campaign.engine.choice import workers_for
+from sms_handover.campaign.engine.run import Tally, run_campaign
+from sms_handover.campaign.engine.scheduler_url import require_safe
+from sms_handover.campaign.record.campaign_folder import open_campaign
+from sms_handover.campaign.record.manifest import Shard, shard_of
+from sms_handover.campaign.record.outputs import write_outputs
+from sms_handover.cli.exit_codes import EXIT_INTERRUPTED, EXIT_OK
+from sms_handover.errors import ConfigurationError
+from sms_handover.terminal.progress import Progress
+
+_MOST_JOBS = 1024
+
+
+def add_parser(parser: ArgumentParser) -> None:
+    """Describe the command."""
+    parser.formatter_class = RawDescriptionHelpFormatter
+    parser.description = (
+        "Run all cases of a campaign that its folder lacks. Each finished case is on disk before it counts,\n"
+        "so the same command goes on after Ctrl-C, a crash, or a full disk. Results depend neither on the\n"
+        "number of workers nor on the order of cases."
+    )
+    parser.epilog = (
+        "examples:\n"
+        "  sms-handover campaign run laws -j 2\n"
+        "  sms-handover campaign run laws -j 2 --cases 500    more cases; those that are there stay\n"
+        "  sms-handover campaign run laws --shard 3/100       every 100th case, for a batch system\n\n"
+        "exit codes: 0 every case has a row; 1 it could not go on; 2 wrong input; 130 interrupted"
+    )
+    parser.add_argument("file", metavar="FILE", help="campaign file, or the name of a shipped campaign")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FOLDER", help="folder of the campaign (default: runs/<name>)"
+    )
+    parser.add_argument(
+        "--cases", type=int, metavar="N", help="number of cases in place of that in the file (random, sobol)"
+    )
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "-j",
+        "--jobs",
+        type=int,
+        default=1,
+        metavar="N",
+        help="cases at the same time; more than 1 needs the extra 'campaign' (default: 1)",
+    )
+    where.add_argument(
+        "--scheduler", default="", metavar="URL", help="take the workers of a Dask scheduler, tls://HOST:PORT"
+    )
+    parser.add_argument(
+        "--trust-network",
+        action="store_true",
+        help="allow a scheduler over plain TCP on another machine: whoever reaches it can run code there",
+    )
+    parser.add_argument(
+        "--shard", default="", metavar="I/N", help="run every N-th case only, the I-th part of N; see merge"
+    )
+
+
+def command(options: Namespace) -> int:
+    """Run the command; return the exit code."""
+    if not 1 <= options.jobs <= _MOST_JOBS:
+        raise ConfigurationError(f"--jobs is {options.jobs}, must be from 1 to {_MOST_JOBS}")
+    if options.trust_network and not options.scheduler:
+        raise ConfigurationError("--trust-network is for --scheduler")
+    if options.scheduler:
+        require_safe(options.scheduler, trust_network=options.trust_network)
+    path = campaign_path(options.file)
+    frozen, cases = freeze(path)
+    cases = cases if options.cases is None else options.cases
+    campaign, shard = frozen.campaign(cases), shard_of(options.shard) if options.shard else Shard()
+    if options.shard and campaign.stop:
+        raise ConfigurationError("a shard knows nothing of the others: leave stop out, or --shard")
+    part = f".shard_{shard.number}_of_{shard.of}" if options.shard else ""
+    folder = options.output or Path("runs") / f"{campaign.name}{part}"
+    with open_campaign(folder, frozen, cases, shard) as opened, Progress() as progress:
+        for fault in opened.faults:
+            progress.print(fault)
+        for difference in opened.manifest.differences:
+            progress.print(f"sessions differ in {difference}: rows are equal bit for bit on equal ones only")
+        shown = _Shown(progress)
+
+        def make() -> Any:
+            return workers_for(frozen, opened.manifest.cases, jobs=options.jobs, scheduler=options.scheduler)
+
+        try:
+            tally = run_campaign(opened, make, shown)
+        except KeyboardInterrupt:
+            progress.stay()
+            print(f"interrupted: the same command goes on; rows are in {folder}", file=sys.stderr)
+            return EXIT_INTERRUPTED
+        progress.show(*_words(tally, ""), 1.0)
+    if tally.stopped_at:
+        print(f"stopped after {tally.stopped_at} cases: every interval is narrow enough")
+    for group in tally.groups:
+        print(f"{group[0]} under {group[1]}: success {tally.proportion(group)} of {tally.rows[group]} cases")
+    for line in write_outputs(folder):
+        print(line)
+    return EXIT_OK
+
+
+class _Shown:
+    """Shows how far a campaign is, its rate, its successes so far and the time left."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress, self._begin = progress, monotonic()
+
+    def __call__(self, tally: Tally) -> None:
+        if not self._progress.due:
+            return
+        rate = (tally.done - tally.before) / max(monotonic() - self._begin, 1e-9)
+        left = (tally.total - tally.done) / max(rate, 1e-9)
+        text, details = _words(tally, f"{rate:.3g}/s, {_duration(left)} left; ")
+        self._progress.show(text, details, tally.done / max(tally.total, 1))
+
+
+def _words(tally: Tally, pace: str) -> tuple[str, str]:
+    """Return how far a campaign is as text, and its successes as details."""
+    successes = "; ".join(f"{law} {tally.proportion((scenario, law))}" for scenario, law in tally.groups)
+    return f"{tally.done} of {tally.total}", f"{pace}{successes}"
+
+
+def _duration(seconds: float) -> str:
+    """Return a duration in hours, minutes and seconds."""
+    minutes, second = divmod(round(seconds), 60)
+    hours, minute = divmod(minutes, 60)
+    return f"{hours}:{minute:02}:{second:02}" if hours else f"{minute}:{second:02}"

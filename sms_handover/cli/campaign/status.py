@@ -1,0 +1,64 @@
+"""``sms-handover campaign status``: how far a campaign is, what failed, which cases are worst."""
+
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from sms_handover.campaign.cases.case import in_words, inputs_in_words
+from sms_handover.campaign.record.campaign_folder import CampaignFolder
+from sms_handover.campaign.record.journal import JOURNAL, JournalFaults
+from sms_handover.campaign.statistics.proportion import proportion
+from sms_handover.campaign.statistics.worst_cases import failed, failures_by_cause, rerun_command, worst_of
+from sms_handover.cli.columns import columns
+from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
+
+_MOST = 50  # [-] failures that are listed
+
+
+def add_parser(parser: ArgumentParser) -> None:
+    """Describe the command."""
+    parser.description = (
+        "Show how far a campaign is, also while it runs; with --failed or --worst its cases too."
+    )
+    parser.epilog = "exit codes: 0 every case has a row; 2 wrong input; 3 cases are missing"
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="folder of a campaign")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument(
+        "--failed", action="store_true", help="list the cases without success, and their causes"
+    )
+    which.add_argument("--worst", type=int, default=0, metavar="K", help="list the K worst cases of each law")
+
+
+def command(options: Namespace) -> int:
+    """Run the command; return the exit code."""
+    folder, faults = CampaignFolder(options.folder), JournalFaults()
+    campaign = folder.campaign
+    entries = list(folder.entries(faults))
+    for fault in faults.in_words(folder.path / JOURNAL):
+        print(fault, file=sys.stderr)
+    total = sum(1 for _ in folder.tasks)
+    print(f"campaign {campaign.name}: {len(entries)} of {total} rows, shard {folder.manifest.shard}\n")
+    head = ("scenario", "law", "rows", "success", "numeric failures")
+    table = []
+    for scenario in campaign.scenarios:
+        for law in campaign.laws:
+            rows = [entry.row for entry in entries if entry.row.task[1:] == (scenario, law)]
+            successes = proportion(sum(row.succeeded for row in rows), len(rows))
+            numeric = sum(row.numeric_failure for row in rows)
+            table.append((scenario, law, str(len(rows)), str(successes), str(numeric)))
+    print(columns([head, *table]))
+    one_scenario = len(campaign.scenarios) == 1
+    if options.failed:
+        causes = failures_by_cause(entries).most_common()
+        print(
+            "\n"
+            + columns([("law", "status", "times", "cause"), *((a, b, str(n), c) for (a, b, c), n in causes)])
+        )
+        for row in list(failed(entries))[:_MOST]:
+            print(f"\n{in_words(row, campaign.worst_by)}\n  {inputs_in_words(row.inputs)}")
+            print(f"  {rerun_command(str(folder.path), row.task, one_scenario=one_scenario)}")
+    for rows in (worst_of(entries, campaign.worst_by, options.worst) if options.worst else {}).values():
+        for row in rows:
+            print(f"\n{in_words(row, campaign.worst_by)}\n  {inputs_in_words(row.inputs)}")
+            print(f"  {rerun_command(str(folder.path), row.task, one_scenario=one_scenario)}")
+    return EXIT_OK if len(entries) == total else EXIT_LOSS

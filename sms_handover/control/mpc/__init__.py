@@ -1,0 +1,1 @@
+"""Predictive control with constraints: plans by a quadratic program, and what follows them."""

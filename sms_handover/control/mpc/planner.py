@@ -1,0 +1,71 @@
+"""Planner: one real-time iteration, a sequential quadratic step about the plan before [Diehl2005]."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from time import perf_counter
+
+from sms_handover.control.mpc.constraints import Limits
+from sms_handover.control.mpc.cost import PlanCost
+from sms_handover.control.mpc.distance_rows import DistanceModel
+from sms_handover.control.mpc.horizon import Horizon
+from sms_handover.control.mpc.momentum import BaseStart
+from sms_handover.control.mpc.parameters import MpcGains
+from sms_handover.control.mpc.placement import placements
+from sms_handover.control.mpc.prediction import PredictionModel
+from sms_handover.control.mpc.quadratic_program import Solution, solve
+from sms_handover.control.mpc.sensitivity import Sensitivity
+from sms_handover.control.mpc.tool_errors import ToolErrorModel
+from sms_handover.control.protocol import Distances
+from sms_handover.model.robot_model import RobotModel
+from sms_handover.types import Array, PreviewedTargets
+
+
+@dataclass(frozen=True, eq=False)
+class PlanStart:
+    """Where a plan begins: joint angles and rates (n,), and what the base's motion depends on."""
+
+    q: Array
+    w: Array
+    base: BaseStart
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One iteration: what the program gave, and how long its parts took, s of wall time."""
+
+    solution: Solution
+    linearization_time: float
+    program_time: float
+
+
+class Planner:
+    """Plans under one set of parameters; owns work space, so it is not to be shared between threads."""
+
+    def __init__(
+        self, robot: RobotModel, gains: MpcGains, distances: Distances | None, initial_rotation: Array
+    ) -> None:
+        """Keep the base's attitude about an initial one (3, 3); raises ConfigurationError."""
+        self.gains = gains
+        self.horizon = Horizon.growing(gains.plan_horizon, gains.plan_intervals, gains.plan_first_interval)
+        self.prediction = PredictionModel(robot)
+        self._tools, self._cost = ToolErrorModel(robot), PlanCost(robot, gains, self.horizon)
+        self._limits = Limits(robot, gains, initial_rotation)
+        apart = distances is not None and gains.least_distance > 0.0
+        self._distances = (
+            DistanceModel(robot, distances, gains.distance_pairs) if distances and apart else None
+        )
+
+    def step(self, start: PlanStart, accelerations: Array, targets: Sequence[PreviewedTargets]) -> Step:
+        """Return one iteration about accelerations (N, n), towards targets at all instants but the first."""
+        begun = perf_counter()
+        horizon = self.horizon
+        prediction = self.prediction.predict(horizon, start.base, start.q, start.w, accelerations)
+        placed = placements(prediction)
+        errors = self._tools.at(placed[1:], targets)
+        distances = self._distances.at(placed, targets) if self._distances else None
+        sensitivity = Sensitivity(horizon, prediction)
+        hessian, gradient = self._cost.quadratic(prediction, accelerations, sensitivity, errors, targets)
+        constraints = self._limits.constraints(horizon, prediction, sensitivity, distances)
+        linearized = perf_counter()
+        solution = solve(hessian, gradient, constraints, self.gains.program_iterations)
+        return Step(solution, linearized - begun, perf_counter() - linearized)

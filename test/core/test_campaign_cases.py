@@ -1,0 +1,173 @@
+"""Cases of a campaign: their rows, what is read back, and how a case ends that ends badly."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sms_handover.analysis.equality import compare_runs, run_digest
+from sms_handover.campaign.cases.case import Cases
+from sms_handover.campaign.cases.case_process import CaseProcess
+from sms_handover.campaign.cases.case_row import Row, Status, Task, row_of
+from sms_handover.campaign.cases.read_back import is_same, read_back
+from sms_handover.campaign.cases.retained import trajectory
+from sms_handover.campaign.definition.campaign_file import Limits
+from sms_handover.campaign.definition.frozen import freeze
+from sms_handover.errors import ConfigurationError, SmsHandoverError
+from sms_handover.simulation import loop as loops
+from sms_handover.simulation.loop import Loop
+from sms_handover.simulation.scenario import load_scenario
+from sms_handover.simulation.simulate import simulate
+
+from .campaigns import MASS, STUB, rows_of, run_here, written
+
+TASK = Task(0, "smooth", "nmpc")
+
+
+def cases_of(folder: Path, **changes: Any) -> Cases:
+    """Return the cases of a campaign that is written below a folder."""
+    return Cases(*freeze(written(folder / "file", **changes)), folder / "unpacked")
+
+
+def test_without_uncertainty_a_case_is_the_run_of_simulate(tmp_path: Path) -> None:
+    cases = cases_of(tmp_path, draws={MASS: {"normal": {"mean": 240, "std": 0}}})
+    result = cases.run(TASK)
+    run = simulate(load_scenario("smooth", {"common.duration": 0.04, "law": "nmpc"}))
+    assert result.run is not None and compare_runs(result.run, run) == ()
+    assert result.row.run_digest == run_digest(run) and result.row.status is Status.SUCCEEDED
+    other = simulate(load_scenario("smooth", {"common.duration": 0.04, "law": "pid"}))
+    assert run_digest(other) != result.row.run_digest
+
+
+def test_a_row_is_a_pure_function(tmp_path: Path) -> None:
+    cases = cases_of(tmp_path, laws=["nmpc", "pid"])
+    tasks = [Task(case, "smooth", law) for case in range(2) for law in ("nmpc", "pid")]
+    first = {task: cases.run(task).row.digest for task in tasks}
+    assert {task: cases.run(task).row.digest for task in reversed(tasks)} == first
+    assert len(set(first.values())) == 4
+    rows = {task: cases.run(task).row for task in tasks}
+    assert rows[tasks[0]].inputs == rows[tasks[1]].inputs and rows[tasks[0]].seed == rows[tasks[1]].seed
+    row = rows[tasks[0]]
+    assert row_of(json.loads(row.text)) == row and row_of(json.loads(row.text)).text == row.text
+
+
+DRAWN: dict[str, float | str] = {
+    "truth.robot.base.mass": 251.0,
+    "model.robot.base.mass": 233.0,
+    "robot.base.com[1]": 0.01,
+    "robot.arms.arm_a.gripper.mass": 0.7,
+    "robot.arms.arm_b.rotor_inertia[2]": 0.25,
+    "truth.robot.arms.arm_a.description.joints[1].link.mass": 1.2,
+    "truth.robot.arms.arm_a.description.joints[3].link.com[2]": -0.0151,
+    "robot.arms.arm_b.mount.xyz[1]": -0.301,
+    "deputy.in_world.xyz[0]": 1.049,
+    "truth.deputy.in_world.rpy[2]": 0.02,
+    "deputy.size[0]": 0.11,
+    "deputy.mass": 4.0,
+    "truth.deputy.twist_in_world.angular[1]": 0.01,
+    "schedule.phases.carry.duration": 21.0,
+    "plant.grasp_position_tolerance": 0.02,
+    "controller.rolling_period": 1.1,
+    "law": "pid",
+    "seed": 7,
+    "common.tick": 0.002,
+}
+
+
+@pytest.mark.parametrize("path", DRAWN)
+def test_what_is_read_back_is_what_was_set(path: str) -> None:
+    at_rest = {"deputy.twist_in_world": {"linear": [0.0, 0.0, 0.0], "angular": [0.0, 0.0, 0.0]}}
+    loop = Loop(load_scenario("smooth", {**at_rest, path: DRAWN[path]}))
+    before = Loop(load_scenario("smooth", at_rest))
+    assert is_same(DRAWN[path], read_back(loop, path))
+    assert not is_same(DRAWN[path], read_back(before, path))
+
+
+def test_masses_are_read_back_from_what_the_plant_integrates() -> None:
+    loop = Loop(load_scenario("smooth", {"truth.robot.base.mass": 251.0}))
+    assert read_back(loop, "model.robot.base.mass") == 240.0
+    loop.scenario.truth.robot.pin.inertias[1].mass = 7.0
+    assert read_back(loop, "truth.robot.base.mass") == 7.0
+
+
+@pytest.mark.parametrize("path", ["deputy.size", "robot.name", "schedule.phases.carry.name", "robot.no"])
+def test_what_cannot_be_read_back_cannot_be_drawn(path: str) -> None:
+    with pytest.raises(ConfigurationError, match=r"so it cannot be drawn|is no single value"):
+        read_back(Loop(load_scenario("smooth")), path)
+
+
+def test_a_draw_that_does_not_arrive_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cases = cases_of(tmp_path)
+    scenario = load_scenario("smooth", {"common.duration": 0.04})
+    monkeypatch.setattr(cases, "scenario", lambda task: scenario)
+    row = cases.run(TASK).row
+    assert row.status is Status.ERROR and f"{MASS} was drawn as" in row.cause
+
+
+def test_a_draw_that_no_scenario_can_have_is_a_row(tmp_path: Path) -> None:
+    row = cases_of(tmp_path, draws={MASS: {"uniform": {"low": -2, "high": -1}}}).run(TASK).row
+    assert (row.status, row.numeric_failure, row.mission_failure) == (Status.REJECTED, True, False)
+    assert "mass is -1." in row.cause and "must be > 0" in row.cause
+
+
+def test_a_mission_failure_is_no_numeric_failure(tmp_path: Path) -> None:
+    row = cases_of(tmp_path, success="complete").run(TASK).row
+    assert (row.status, row.numeric_failure, row.mission_failure) == (Status.MISSION_FAILED, False, True)
+    assert row.cause.startswith("ended at 0.04 s") and row.run_digest
+
+
+def test_a_run_beyond_its_ticks_is_a_row(tmp_path: Path) -> None:
+    row = cases_of(tmp_path, limits={"ticks": 10}).run(TASK).row
+    assert (row.status, row.cause, row.run_digest) == (Status.LIMIT, "more than 10 ticks", "")
+
+
+def test_numbers_that_are_not_finite_are_a_numeric_failure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cases = cases_of(tmp_path)
+    data = loops.Loop._advance
+
+    def broken(loop: Loop, most: int) -> Any:
+        ticks = data(loop, most)
+        rows = replace(ticks.rows, v=np.full_like(ticks.rows.v, np.nan))
+        return replace(ticks, rows=rows)
+
+    monkeypatch.setattr(loops.Loop, "_advance", broken)
+    row = cases.run(TASK).row
+    assert (row.status, row.cause) == (Status.NUMERIC_FAILURE, "numbers that are not finite")
+
+
+def test_bad_cases_end_as_rows_with_their_causes(tmp_path: Path) -> None:
+    limits = {"wall_time": 3.0, "memory": 100.0, "retries": 1}
+    file = written(tmp_path, name="bad", cases=5, limits=limits)
+    run_here(file, tmp_path / "out", program=STUB)
+    rows = {task.case: row for task, row in rows_of(tmp_path / "out").items()}
+    assert (rows[1].status, rows[1].cause) == (Status.LIMIT, "more than 3 s of wall time")
+    assert (rows[2].status, rows[2].cause) == (Status.DIED, "its process ended by signal SIGKILL")
+    assert (rows[3].status, rows[3].cause) == (Status.LIMIT, "more than 100 MB of memory")
+    assert [rows[case].run_digest for case in range(5)] == ["00", "", "", "", "00"]
+
+
+def test_a_process_that_cannot_start_is_an_error(tmp_path: Path) -> None:
+    frozen, number = freeze(written(tmp_path))
+    with pytest.raises(SmsHandoverError, match="cannot start: its process ended with exit code 1"):
+        CaseProcess(frozen, number, 3, Limits(), ("/bin/false",)).run(TASK)
+
+
+def test_a_trajectory_has_a_row_per_reference(tmp_path: Path) -> None:
+    run = cases_of(tmp_path).run(TASK).run
+    assert run is not None
+    file = tmp_path / "trajectory.npz"
+    file.write_bytes(trajectory(run))
+    with np.load(file, allow_pickle=False) as arrays:
+        np.testing.assert_array_equal(arrays["stamp_ns"], run.reference_ns)
+        np.testing.assert_array_equal(arrays["joint_position"][1], run.joint_position[20])
+
+
+def test_rows_that_differ_have_different_digests() -> None:
+    row = Row(TASK, 1, {"a": 1.0}, Status.SUCCEEDED, "", {"x": 0.1}, "0")
+    changes: list[dict[str, Any]] = [{"seed": 2}, {"inputs": {"a": 1.0 + 3e-16}}, {"metrics": {"x": None}}]
+    assert len({row.digest, *(replace(row, **change).digest for change in changes)}) == 4

@@ -1,0 +1,264 @@
+"""Runs of campaigns: the same rows whoever carries them out and whatever happens to them meanwhile."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from errno import ENOSPC
+from pathlib import Path
+
+import psutil
+import pytest
+
+from sms_handover.campaign.cases.case import Cases
+from sms_handover.campaign.definition.frozen import freeze
+from sms_handover.campaign.engine.choice import workers_for
+from sms_handover.campaign.engine.dask_workers import DaskWorkers
+from sms_handover.campaign.engine.run import run_campaign
+from sms_handover.campaign.engine.scheduler_url import require_safe
+from sms_handover.campaign.record.campaign_folder import CampaignFolder, merge, open_campaign
+from sms_handover.campaign.record.journal import JOURNAL
+from sms_handover.campaign.record.manifest import Shard
+from sms_handover.errors import ConfigurationError, SmsHandoverError
+
+from .campaigns import STUB, command, digests_of, rows_of, run_here, written
+
+CASES = 20
+PATIENCE_S = 120.0
+
+
+def until(condition: object, what: str) -> None:
+    """Wait until a condition holds."""
+    assert callable(condition)
+    latest = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < latest, f"it never came to {what}"
+        time.sleep(0.02)
+
+
+def journal_lines(folder: Path) -> int:
+    """Return how many lines a journal has."""
+    path = folder / JOURNAL
+    return path.read_bytes().count(b"\n") if path.exists() else 0
+
+
+def family(pid: int) -> list[psutil.Process]:
+    """Return the processes below one."""
+    try:
+        return list(psutil.Process(pid).children(recursive=True))
+    except psutil.NoSuchProcess:
+        return []
+
+
+@contextmanager
+def ended_at_last(child: "subprocess.Popen[str]") -> Iterator[list[psutil.Process]]:
+    """Yield a list for processes that must have ended with a child."""
+    below: list[psutil.Process] = []
+    try:
+        yield below
+    finally:
+        child.kill()
+        child.wait()
+    until(lambda: not [one for one in below if one.is_running() and one.status() != "zombie"], "no orphan")
+
+
+@pytest.mark.slow
+def test_rows_depend_on_no_worker_order_or_kill(tmp_path: Path) -> None:
+    """One process; the same backwards; 2 workers with kill -9 of one, then of the driver; 1 worker."""
+    file = written(tmp_path, cases=CASES)
+    run_here(file, tmp_path / "serial")
+    expected = digests_of(tmp_path / "serial")
+    assert len(expected) == CASES == len(set(expected.values()))
+
+    cases = Cases(*freeze(file), tmp_path / "unpacked")
+    for task in list(reversed(expected))[::4]:
+        assert cases.run(task).row.digest == expected[task]
+
+    out = tmp_path / "killed"
+    child = command("campaign", "run", str(file), "-o", str(out), "-j", "2", stderr=subprocess.DEVNULL)
+    with ended_at_last(child) as below:
+        until(lambda: journal_lines(out) >= 2, "two rows")
+        below.extend(family(child.pid))
+        assert_only_local([*below, psutil.Process(child.pid)])
+        workers = [one for one in below if "spawn_main" in " ".join(one.cmdline())]
+        workers[-1].kill()
+        known = journal_lines(out)
+        until(lambda: journal_lines(out) >= min(known + 4, CASES - 2), "more rows")
+        below.extend(family(child.pid))
+        child.send_signal(signal.SIGKILL)
+    with (out / JOURNAL).open("ab") as stream:
+        stream.write(b'{"row":{"task":[1')  # as a writer that was killed leaves it
+    assert 0 < len(rows_of(out)) <= CASES
+
+    frozen, number = freeze(file)
+    with open_campaign(out, frozen, number, Shard()) as opened:
+        assert "17 bytes of an unfinished last line are cut off" in opened.faults[0]
+        run_campaign(opened, lambda: DaskWorkers(frozen, number, workers=1), lambda tally: None)
+    assert digests_of(out) == expected
+    assert journal_lines(out) == CASES, "no case twice"
+
+
+def assert_only_local(processes: list[psutil.Process]) -> None:
+    """Assert from the socket table that processes listen and speak on 127.0.0.1 only."""
+    found = 0
+    for process in processes:
+        for connection in process.net_connections("inet") if process.is_running() else ():
+            ends = [end.ip for end in (connection.laddr, connection.raddr) if end]
+            assert set(ends) <= {"127.0.0.1"}, (process.cmdline(), connection)
+            found += 1
+    assert found, "a cluster has sockets"
+
+
+def test_shards_and_more_cases_leave_the_rows(tmp_path: Path) -> None:
+    file = written(tmp_path, cases=8, laws=["nmpc", "pid"])
+    run_here(file, tmp_path / "whole", program=STUB)
+    for number in (3, 1, 2):
+        tally = run_here(file, tmp_path / f"shard{number}", shard=Shard(number, 3), program=STUB)
+        assert tally.done == tally.total == 2 * len(range(number - 1, 8, 3))
+    with merge(tmp_path / "merged", [tmp_path / f"shard{number}" for number in (1, 2, 3)]):
+        pass
+    assert digests_of(tmp_path / "merged") == digests_of(tmp_path / "whole")
+    assert run_here(file, tmp_path / "merged", cases=12, program=STUB).before == 16
+    more = digests_of(tmp_path / "merged")
+    assert len(more) == 24 and digests_of(tmp_path / "whole").items() <= more.items()
+    assert CampaignFolder(tmp_path / "merged").cases == 12
+
+
+def test_folders_of_other_campaigns_do_not_mix(tmp_path: Path) -> None:
+    run_here(written(tmp_path / "a"), tmp_path / "one", program=STUB)
+    with pytest.raises(ConfigurationError, match=r"holds another campaign, which differs in campaign.yaml"):
+        run_here(written(tmp_path / "b", seed=4), tmp_path / "one", program=STUB)
+    with pytest.raises(ConfigurationError, match="holds shard 1/1"):
+        run_here(written(tmp_path / "a"), tmp_path / "one", shard=Shard(1, 2), program=STUB)
+    run_here(written(tmp_path / "b", seed=4), tmp_path / "other", program=STUB)
+    with pytest.raises(ConfigurationError, match="hold different campaigns"):
+        merge(tmp_path / "merged", [tmp_path / "one", tmp_path / "other"])
+    (tmp_path / "one" / "campaign.yaml").write_text("name: forged\n", encoding="utf-8")
+    with pytest.raises(ConfigurationError, match="the frozen campaign was changed"):
+        CampaignFolder(tmp_path / "one")
+    with pytest.raises(ConfigurationError, match="something else than a campaign"):
+        run_here(written(tmp_path / "a"), tmp_path / "b", program=STUB)
+
+
+def test_a_corrupted_line_is_named_and_done_again(tmp_path: Path) -> None:
+    file, out = written(tmp_path, cases=6), tmp_path / "out"
+    run_here(file, out, program=STUB)
+    expected, path = digests_of(out), out / JOURNAL
+    lines = path.read_bytes().splitlines(keepends=True)
+    lines[1] = lines[1].replace(b'"grasp_error":0.001', b'"grasp_error":0.002')  # valid JSON, wrong value
+    lines[4] = b"\x00" * 30 + b"\n"
+    path.write_bytes(b"".join(lines))
+    frozen, number = freeze(file)
+    with open_campaign(out, frozen, number, Shard()) as opened:
+        assert [fault.partition(" is corrupted")[0] for fault in opened.faults] == [
+            f"{path}, line 2",
+            f"{path}, line 5",
+        ]
+        with pytest.raises(ConfigurationError, match="is written to by another run of the campaign"):
+            open_campaign(out, frozen, number, Shard())
+    assert len(rows_of(out)) == 4
+    assert run_here(file, out, program=STUB).before == 4
+    assert digests_of(out) == expected and len((out / "broken.jsonl").read_bytes().splitlines()) == 2
+
+
+def test_a_forged_row_is_no_row(tmp_path: Path) -> None:
+    """Nothing in a folder is run or unpickled: what is no row is named, whatever it is."""
+    file, out = written(tmp_path, cases=2), tmp_path / "out"
+    run_here(file, out, program=STUB)
+    evil = b"cos\nsystem\n(S'touch " + str(tmp_path / "owned").encode() + b"'\ntR.\n"
+    for name in (JOURNAL, "manifest.json", "campaign.yaml"):
+        (out / name).write_bytes(evil if name == JOURNAL else (out / name).read_bytes())
+    assert rows_of(out) == {}
+    (out / "manifest.json").write_bytes(evil)
+    with pytest.raises(ConfigurationError, match="cannot be read"):
+        CampaignFolder(out)
+    assert not (tmp_path / "owned").exists()
+    sources = (Path(__file__).parents[2] / "sms_handover" / "campaign").rglob("*.py")
+    text = "\n".join(path.read_text(encoding="utf-8") for path in sources)
+    assert not [
+        word for word in ("import pickle", "loads(pickle", "allow_pickle=True", "eval(") if word in text
+    ]
+
+
+def test_a_full_disk_is_a_clear_error_and_the_same_command_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, out, writes, write = written(tmp_path, cases=6), tmp_path / "out", list[int](), os.write
+
+    def full(descriptor: int, data: bytes) -> int:
+        writes.append(len(data))
+        if len(writes) == 4:
+            write(descriptor, data[:40])  # what there was still room for
+            raise OSError(ENOSPC, os.strerror(ENOSPC))
+        return write(descriptor, data)
+
+    with monkeypatch.context() as patched:
+        patched.setattr("sms_handover.campaign.record.journal.os.write", full)
+        with pytest.raises(SmsHandoverError, match="No space left on device; make room, then the same"):
+            run_here(file, out, program=STUB)
+    assert len(rows_of(out)) == journal_lines(out) == 3
+    run_here(file, out, program=STUB)
+    run_here(file, tmp_path / "good", program=STUB)
+    assert digests_of(out) == digests_of(tmp_path / "good")
+
+
+def test_it_stops_at_a_look_whatever_the_order(tmp_path: Path) -> None:
+    stop = {"half_width": 0.28, "looks": [4, 8, 12]}
+    file = written(tmp_path, cases=40, stop=stop)
+    tally = run_here(file, tmp_path / "out", program=STUB)
+    assert tally.stopped_at == 8 and sorted(task.case for task in rows_of(tmp_path / "out")) == [*range(8)]
+    assert run_here(file, tmp_path / "out", program=STUB).done == 8, "the same command has nothing to do"
+
+
+def test_ctrl_c_leaves_within_seconds_and_says_how_to_go_on(tmp_path: Path) -> None:
+    file, out = written(tmp_path, cases=1000), tmp_path / "out"
+    child = command("campaign", "run", str(file), "-o", str(out), stderr=subprocess.PIPE)
+    with ended_at_last(child) as below:
+        until(lambda: journal_lines(out) >= 1, "a row")
+        below.extend(family(child.pid))
+        assert below
+        child.send_signal(signal.SIGINT)
+        _, said = child.communicate(timeout=PATIENCE_S)
+    assert child.returncode == 130 and "interrupted: the same command goes on" in said
+    assert "Traceback" not in said
+
+
+@pytest.mark.parametrize(
+    ("url", "trusted", "told"),
+    [
+        ("tls://cluster:8786", False, ""),
+        ("tcp://127.0.0.1:8786", False, ""),
+        ("tcp://localhost:8786", False, ""),
+        ("tcp://10.0.0.1:8786", True, ""),
+        ("tcp://10.0.0.1:8786", False, "is plain TCP to another machine"),
+        ("ws://10.0.0.1:8786", True, "must be of the form"),
+        ("tls://cluster", False, "must be of the form"),
+    ],
+)
+def test_a_scheduler_is_reached_safely_or_on_request(url: str, trusted: bool, told: str) -> None:
+    if told:
+        with pytest.raises(ConfigurationError, match=told):
+            require_safe(url, trust_network=trusted)
+    else:
+        require_safe(url, trust_network=trusted)
+
+
+def test_workers_that_cannot_be_reached_are_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    frozen, number = freeze(written(tmp_path))
+    monkeypatch.setattr("sms_handover.campaign.engine.dask_workers._TIMEOUT", "1s")
+    with pytest.raises(SmsHandoverError, match="cannot be reached"):
+        workers_for(frozen, number, jobs=1, scheduler="tcp://127.0.0.1:1")
+
+
+def test_without_the_extra_one_line_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frozen, number = freeze(written(tmp_path))
+    monkeypatch.setitem(sys.modules, "sms_handover.campaign.engine.dask_workers", None)
+    with pytest.raises(SmsHandoverError, match=r"need distributed, .* 'sms_handover\[campaign\]'"):
+        workers_for(frozen, number, jobs=2)
+    assert json.loads(frozen.text)

@@ -1,0 +1,155 @@
+"""Statistics of campaigns against known answers."""
+
+from collections.abc import Sequence
+from math import nan, pi, sin
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+from statsmodels.stats.proportion import proportion_confint
+
+from sms_handover.campaign.definition.campaign_file import Campaign, read_campaign
+from sms_handover.campaign.sampling.samples import Samples
+from sms_handover.campaign.statistics.case_columns import CaseColumns
+from sms_handover.campaign.statistics.paired_tests import paired_tests
+from sms_handover.campaign.statistics.pareto import pareto_front
+from sms_handover.campaign.statistics.percentiles import percentile
+from sms_handover.campaign.statistics.proportion import proportion
+from sms_handover.campaign.statistics.sensitivity import sensitivities
+
+from .campaigns import written
+
+PATHS = ("plant.grasp_position_tolerance", "plant.grasp_angle_tolerance", "plant.grasp_speed_tolerance")
+
+
+def test_wilson_is_that_of_statsmodels_and_covers() -> None:
+    """Its coverage averaged over p is within 0.94 to 0.96, of few cases and many."""
+    for trials in (10, 50, 400):
+        intervals = [proportion(k, trials) for k in range(trials + 1)]
+        theirs = np.array([proportion_confint(k, trials, method="wilson") for k in range(trials + 1)])
+        ours = np.array([(one.low, one.high) for one in intervals])
+        np.testing.assert_allclose(ours, theirs, atol=1e-12)
+        shares = np.linspace(0.005, 0.995, 199)
+        held = (ours[:, :1] <= shares) & (shares <= ours[:, 1:])
+        chances = binom.pmf(np.arange(trials + 1)[:, np.newaxis], trials, shares)
+        assert 0.94 < float((held * chances).sum(axis=0).mean()) < 0.96
+    assert tuple(proportion(0, 0)) == (0, 0, 0.0, 1.0) and str(proportion(0, 0)) == "none yet"
+
+
+def columns(
+    metric: Sequence[float] = (), succeeded: Sequence[bool] = (), first: int = 0, **inputs: Any
+) -> CaseColumns:
+    """Return made-up columns of cases in a row."""
+    count = max(len(metric), len(succeeded))
+    values = np.array(metric, dtype=float) if len(metric) else np.full(count, nan)
+    return CaseColumns(
+        np.arange(first, first + count),
+        np.array(succeeded, dtype=bool) if len(succeeded) else np.ones(count, dtype=bool),
+        np.zeros(count, dtype=bool),
+        np.ones(count),
+        {"grasp_error": values},
+        {name: np.asarray(column) for name, column in inputs.items()},
+    )
+
+
+def test_laws_are_compared_case_by_case() -> None:
+    """Discordant pairs 3 and 9: McNemar's exact p is 2 P(X <= 3) of Bin(12, 1/2); Holm doubles the least."""
+    one = [True] * 3 + [False] * 9 + [True] * 20
+    other = [False] * 3 + [True] * 9 + [True] * 20
+    rng = np.random.default_rng(2)
+    base = rng.normal(size=32)
+    laws = {
+        ("s", "a"): columns(list(base), one),
+        ("s", "b"): columns(list(base + 0.3 + 0.01 * rng.normal(size=32)), other),
+    }
+    success, error = paired_tests(laws, ["grasp_error"])
+    assert success.p == pytest.approx(2.0 * binom.cdf(3, 12, 0.5))
+    assert success.cases == 32
+    assert success.difference == pytest.approx(-6 / 32)
+    assert error.p == pytest.approx(2.0 ** (1 - 32), rel=1e-6)  # every difference has the same sign
+    assert error.difference == pytest.approx(-0.3, abs=0.02)
+    assert [error.adjusted, success.adjusted] == pytest.approx([2 * error.p, success.p])
+
+
+def test_only_cases_that_both_laws_have_are_paired() -> None:
+    laws = {
+        ("s", "a"): columns([1.0, 2.0, 3.0, nan], [True] * 4),
+        ("s", "b"): columns([5.0, 5.0], [True] * 2, first=2),
+    }
+    success, error = paired_tests(laws, ["grasp_error"])
+    assert (success.cases, error.cases, error.difference) == (2, 1, -2.0)
+    assert np.isnan(success.p), "no case tells them apart"
+
+
+def test_percentiles_have_intervals_that_cover() -> None:
+    """Of 100 samples of 200 normal draws about 95 hold the true percentile."""
+    rng, truth, held = np.random.default_rng(5), 1.2815515655446004, 0
+    for _ in range(100):
+        found = percentile(rng.normal(size=200), 0.9)
+        held += found.low <= truth <= found.high
+    assert 87 <= held <= 100
+    assert np.isnan(percentile(np.array([nan]), 0.5).value)
+    alone = percentile(np.array([2.0, 2.0, nan]), 0.5)
+    assert alone.value == 2.0 and np.isnan(alone.low)
+
+
+def test_the_pareto_front_is_what_nothing_is_better_than() -> None:
+    costs = np.array(
+        [[1, 5], [2, 3], [2, 4], [4, 1], [4, 1], [5, 0.5], [6, 6], [nan, 0], [1, 6]], dtype=float
+    )
+    expected = [
+        not np.isnan(row).any()
+        and not any(
+            (other <= row).all() and (other < row).any() for other in costs if not np.isnan(other).any()
+        )
+        for row in costs
+    ]
+    assert pareto_front(costs).tolist() == expected
+    assert sum(expected) == 5
+
+
+def campaign_of(folder: Path, sampler: object) -> Campaign:
+    """Return a campaign with three uniform draws in [-pi, pi], as Ishigami's function takes."""
+    draws = {path: {"uniform": {"low": -pi, "high": pi}} for path in PATHS}
+    return read_campaign(written(folder, sampler=sampler, cases=None, draws=draws))
+
+
+def ishigami(campaign: Campaign) -> CaseColumns:
+    """Return Ishigami's function of every case, a = 7, b = 0.1."""
+    samples = Samples(campaign)
+    drawn = [[float(value) for value in samples.inputs(case).values()] for case in range(samples.count)]
+    values = [sin(x) + 7.0 * sin(y) ** 2 + 0.1 * z**4 * sin(x) for x, y, z in drawn]
+    return columns(values, **dict(zip(PATHS, np.array(drawn).T, strict=True)))
+
+
+def test_sobol_indices_of_ishigami_are_within_their_intervals(tmp_path: Path) -> None:
+    """S = 0.3139, 0.4424, 0 and S_T = 0.5576, 0.4424, 0.2437 [Saltelli2010]."""
+    campaign = campaign_of(tmp_path, {"saltelli": {"base": 1024}})
+    found = sensitivities(campaign, ishigami(campaign), "grasp_error")
+    for one, first, total in zip(found, (0.3139, 0.4424, 0.0), (0.5576, 0.4424, 0.2437), strict=True):
+        assert one.kind == "sobol" and abs(one.first - first) < one.first_half < 0.12
+        assert abs(one.second - total) < one.second_half < 0.12
+
+
+def test_morris_finds_what_matters(tmp_path: Path) -> None:
+    campaign = campaign_of(tmp_path, {"morris": {"trajectories": 8}})
+    samples = Samples(campaign)
+    drawn = np.array([list(samples.shares(case).values()) for case in range(samples.count)])
+    linear = columns(list(3.0 * drawn[:, 0] - drawn[:, 1]), **dict(zip(PATHS, drawn.T, strict=True)))
+    found = sensitivities(campaign, linear, "grasp_error")
+    effects = [one.first for one in found]
+    assert effects == pytest.approx([3.0 * 0.98, 0.98, 0.0]) and found[0].second == pytest.approx(
+        0.0, abs=1e-9
+    )
+
+
+def test_a_failed_case_leaves_the_correlation(tmp_path: Path) -> None:
+    campaign = campaign_of(tmp_path, {"saltelli": {"base": 16}})
+    values = ishigami(campaign)
+    values.metrics["grasp_error"][3] = nan
+    assert {one.kind for one in sensitivities(campaign, values, "grasp_error")} == {"correlation"}
+    drawn = np.linspace(0.0, 1.0, 20)
+    (one,) = sensitivities(campaign, columns(list(drawn**3), x=drawn), "grasp_error")
+    assert one.first == pytest.approx(1.0) and one.second < 1e-6

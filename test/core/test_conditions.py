@@ -1,0 +1,184 @@
+"""Conditions of a run: each acts, none moves another, all are repeated by reset, snapshot and seed."""
+
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sms_handover.analysis.conservation import physics_residuals
+from sms_handover.conditions.conditions import IDEAL
+from sms_handover.configuration.conditions_content import condition_names
+from sms_handover.errors import ConfigurationError, UnknownNameError
+from sms_handover.run_data import RunData
+from sms_handover.simulation.loop import Loop
+from sms_handover.simulation.scenario import Scenario, load_scenario
+from sms_handover.simulation.simulate import simulate
+from sms_handover.simulation.snapshot import plain
+
+_ROTOR: dict[str, Any] = {"rotor_inertia": 0.31}
+_FORCE = {"force": [0.5, 0.1, 0.0], "torque": [0.0, 0.1, 0.0]}
+_ORBIT = {"radius": 6.778e6, "radial": [1.0, 0.2, 0.0], "normal": [0.0, 0.0, 1.0]}
+EFFECTS: dict[str, dict[str, Any]] = {
+    "friction.viscous": {"friction.viscous": 0.2},
+    "friction.coulomb": {"friction.coulomb": 0.05},
+    "torque.gain": {"torque.gain": 0.05},
+    "torque.offset": {"torque.offset": 0.05},
+    "torque.step": {"torque.step": 0.01},
+    "torque.noise_density": {"torque.noise_density": 0.003},
+    "command.delay": {"command.delay": 0.003},
+    "command.dropped": {"command.dropped": 0.2},
+    "constant": {"wrenches.leak.constant": _FORCE},
+    "thruster_misfire": {
+        "wrenches.misfire.thruster_misfire": {
+            **{"force": [1.0, 0.0, 0.0], "point": [0.0, 0.5, 0.0]},
+            **{"start": 0.01, "duration": 0.02},
+        }
+    },
+    "history": {"wrenches.told.history": {"rows": [[0.0, 1, 0, 0, 0, 0, 0], [1.0, 0, 1, 0, 0, 0, 1]]}},
+    "gravity_gradient": {"wrenches.gravity.gravity_gradient": _ORBIT},
+    "relative_orbit": {"wrenches.hill.relative_orbit": {**_ORBIT, "reference": [3.0, 0.0, 0.0]}},
+    "model_error.base": {"model_error.base.mass": 0.05},
+    "model_error.links": {"model_error.links.com": 0.005},
+    "model_error.mounts": {"model_error.mounts.angle": 0.002},
+}
+EVERYTHING = {path: value for effect in EFFECTS.values() for path, value in effect.items()}
+
+
+def _scenario(effects: dict[str, Any], seconds: float = 0.06, **more: Any) -> Scenario:
+    """Return a short handover towards step targets, with rotors, under some effects."""
+    conditions = {f"conditions.{path}": value for path, value in {**_ROTOR, **effects}.items()}
+    return load_scenario("colliding", {"common.duration": seconds, **conditions, **more})
+
+
+@pytest.fixture(scope="module")
+def ideal_run() -> RunData:
+    """The run with rotors and nothing else."""
+    return simulate(_scenario({}))
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_every_effect_acts(effect: str, ideal_run: RunData) -> None:
+    run = simulate(_scenario(EFFECTS[effect]))
+    assert np.abs(run.joint_velocity - ideal_run.joint_velocity).max() > 1e-12
+
+
+def test_momentum_and_energy_are_accounted_for_with_everything_on() -> None:
+    """Less what wrenches have given and friction has taken, within the bounds of docs/verification.md."""
+    residuals = physics_residuals(simulate(_scenario(EVERYTHING, 0.2)))
+    assert residuals.linear_momentum < 1e-12
+    assert residuals.angular_momentum < 1e-11
+    assert residuals.energy < 1e-8
+
+
+@pytest.mark.parametrize("law", ["nmpc", "pid"])
+def test_reset_snapshot_and_seed_repeat_the_noise(law: str) -> None:
+    loop = Loop(_scenario(EVERYTHING, law=law))
+
+    def rest() -> list[Any]:
+        return [plain(loop.advance_period().rows) for _ in range(2)]
+
+    first, (snapshot, second) = rest(), (loop.snapshot(), rest())
+    loop.reset()
+    assert rest() == first
+    loop.restore(snapshot)
+    assert rest() == second
+    loop.reset(seed=5)
+    assert rest() != first
+    other = Loop(_scenario(EVERYTHING, law=law))
+    other.restore(snapshot)
+    assert [plain(other.advance_period().rows) for _ in range(2)] == second
+
+
+def test_one_effect_moves_no_draw_of_another() -> None:
+    """What is drawn for an effect is the same beside every other one: all pairs of those that draw."""
+
+    def draws(given: dict[str, Any]) -> dict[str, Any]:
+        scenario = _scenario(given)
+        loop, robot = Loop(scenario), scenario.truth.robot.description
+        found: dict[str, Any] = {"model_error.base": robot.base.inertia.mass}
+        found["model_error.links"] = [link.inertia.com for arm in robot.arms for link in arm.links]
+        found["model_error.mounts"] = [arm.mount.rpy for arm in robot.arms]
+        effects = loop._plant._effects
+        if effects and effects._motor:
+            found["torque.noise_density"] = [effects._motor._noise.normal(k).tolist() for k in range(5)]
+        if effects and effects._path:
+            found["command.dropped"] = [effects._path._losses.uniform(k).tolist() for k in range(5)]
+        return found
+
+    random = [name for name in EFFECTS if name.startswith(("model_error", "torque.n", "command.d"))]
+    alone = {name: draws(EFFECTS[name]) for name in random}
+    for one, other in combinations(random, 2):
+        both = draws({**EFFECTS[one], **EFFECTS[other]})
+        for name in (one, other):
+            if name in both:
+                assert both[name] == alone[name][name], (one, other)
+
+
+def test_ideal_conditions_are_the_default_and_nothing() -> None:
+    assert load_scenario("smooth").truth.conditions is IDEAL
+    named = load_scenario("smooth", {"common.conditions": "ideal"})
+    assert named.truth.conditions is IDEAL
+    assert named.truth is named.model
+
+
+def test_the_model_knows_rotors_and_nothing_else() -> None:
+    scenario = _scenario(EVERYTHING)
+    assert scenario.model.conditions is IDEAL
+    known, true = scenario.model.robot, scenario.truth.robot
+    assert np.all(known.pin.armature[6:] == 0.31) and np.all(true.pin.armature[6:] == 0.31)
+    assert known.description.base.inertia == load_scenario("colliding").truth.robot.description.base.inertia
+    assert true.description.base.inertia.mass != known.description.base.inertia.mass
+
+
+def test_every_level_runs_with_every_kind_of_robot() -> None:
+    for level in condition_names():
+        for name in ("planar", "six_joints", "three_arms"):
+            simulate(load_scenario(name, {"common.conditions": level, "common.duration": 0.04}))
+
+
+def test_conditions_come_from_a_file_a_scenario_and_paths_in_this_order(tmp_path: Path) -> None:
+    (tmp_path / "drag.csv").write_text("0, 1, 0, 0, 0, 0, 0\n2, 3, 0, 0, 0, 0, 0\n")
+    file = tmp_path / "mine.yaml"
+    file.write_text(
+        "rotor_inertia: 0.3\nfriction: {coulomb: 0.1, viscous: 0.2}\n"
+        "wrenches: {drag: {history: {file: drag.csv}}}\n"
+    )
+    scenario = tmp_path / "scenario.yaml"
+    scenario.write_text("extends: smooth\nconditions: {extends: mine.yaml, friction: {viscous: 0.4}}\n")
+    found = load_scenario(scenario, {"conditions.friction.coulomb": [0.2] * 14}).truth.conditions
+    assert found.friction is not None
+    assert found.friction.viscous.tolist() == [0.4] * 14
+    assert found.friction.coulomb.tolist() == [0.2] * 14
+    assert found.friction.stiction.tolist() == [0.2] * 14
+    wrench = found.wrenches["drag"].over(0.5, 1.0, None)  # type: ignore[arg-type]
+    assert wrench.force.tolist() == [2.0, 0.0, 0.0]
+    given = load_scenario(scenario, {"common.conditions": "ideal"})
+    assert given.truth.conditions is IDEAL
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"friction.coulomb": 0.1}, "friction needs the inertia of rotors, and that of arm_a_joint_1 is 0"),
+        ({"torque.step": 0.1}, r"torque\.step needs the inertia of rotors"),
+        ({"torque.noise_density": 0.1}, r"torque\.noise_density needs the inertia of rotors"),
+        ({"rotor_inertia": 0.3, "friction.coulomb": -1}, r"coulomb is -1 N m, must be >= 0 N m"),
+        ({"rotor_inertia": 0.3, "friction.coulomb": [1.0]}, r"coulomb is \[1.0\], must be 14 numbers in N m"),
+        ({"command.delay": 0.0005}, "delay is 0.0005 s, must be a multiple of the tick of 0.001 s"),
+        ({"wrenches.w.constant": {"force": [0, 0, 0]}}, r"wrenches\.w\.constant\.torque is missing"),
+        ({"wrenches.w": {}}, "wrench 'w' must have exactly one of constant"),
+        ({"wrenches.w.history.rows": [[0, 1]]}, "row 0 is .*must be 7 numbers"),
+    ],
+)
+def test_an_error_says_what_is_wrong_and_how_to_mend_it(values: dict[str, Any], message: str) -> None:
+    with pytest.raises(ConfigurationError, match=message):
+        Loop(load_scenario("smooth", {f"conditions.{path}": value for path, value in values.items()}))
+
+
+def test_an_unknown_level_or_value_is_told_with_the_nearest() -> None:
+    with pytest.raises(UnknownNameError, match="did you mean 'nominal'"):
+        load_scenario("smooth", {"common.conditions": "nominl"})
+    with pytest.raises(UnknownNameError, match=r"conditions\.friction\.coulomb"):
+        load_scenario("smooth", {"conditions.friction.colomb": 0.1})

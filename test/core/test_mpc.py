@@ -1,0 +1,345 @@
+"""The predictive law: what it predicts, its derivatives, its program, the limits it keeps."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sms_handover.control.mpc import quadratic_program
+from sms_handover.control.mpc.constraints import Constraint
+from sms_handover.control.mpc.distance_rows import DistanceModel
+from sms_handover.control.mpc.horizon import Horizon
+from sms_handover.control.mpc.law import MpcController, MpcState
+from sms_handover.control.mpc.momentum import BaseStart, base_start
+from sms_handover.control.mpc.placement import placements
+from sms_handover.control.mpc.plan import Plan
+from sms_handover.control.mpc.prediction import Prediction, PredictionModel
+from sms_handover.control.mpc.quadratic_program import solve
+from sms_handover.control.mpc.sensitivity import Sensitivity
+from sms_handover.control.mpc.tool_errors import ToolErrorModel
+from sms_handover.control.protocol import inner_of
+from sms_handover.errors import ConfigurationError, MissingDependencyError
+from sms_handover.graph.events import PLAN_FAILED
+from sms_handover.model.conserved import conserved_quantities
+from sms_handover.model.reduced import reduced_inverse_dynamics
+from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
+from sms_handover.run_data import RunData
+from sms_handover.simulation.loop import Loop
+from sms_handover.simulation.near_pairs import NearPairs
+from sms_handover.simulation.scenario import Scenario, load_scenario
+from sms_handover.simulation.simulate import simulate
+from sms_handover.simulation.snapshot import plain, structured
+from sms_handover.simulation.wiring import make_clearance
+from sms_handover.trajectory.preview import TargetPreview
+from sms_handover.types import Array, PlanReport, PlanStatus, PreviewedTargets, Twist
+
+from .conftest import Draw
+
+HORIZON = Horizon.growing(1.6, 10, 0.05)
+STEP = 1e-6  # [rad/s^2] of central differences; their error is about 1e-9 here
+
+
+def scenario_of(name: str, seconds: float, **controller: object) -> Scenario:
+    """Return the beginning of a shipped scenario under the predictive law."""
+    return load_scenario(name, {"common": {"duration": seconds}, "controller": {"law": "mpc", **controller}})
+
+
+def controller_of(loop: Loop) -> MpcController:
+    """Return the predictive controller of a loop."""
+    inner = inner_of(loop._controller)
+    assert isinstance(inner, MpcController)
+    return inner
+
+
+@pytest.fixture
+def moving(robot: RobotModel, draw: Draw) -> tuple[BaseStart, Array, Array, Array, Array]:
+    """A start with momentum, joint angles and rates, accelerations, and the configuration it belongs to."""
+    q, v = draw.q(), draw.v(0.3)
+    return base_start(robot, q, v), q[BASE_NQ:], v[BASE_NV:], draw.random.uniform(-0.3, 0.3, (10, 14)), q
+
+
+def test_intervals_grow_and_fill_the_horizon() -> None:
+    ratios = HORIZON.intervals[1:] / HORIZON.intervals[:-1]
+    assert HORIZON.intervals[0] == pytest.approx(0.05, abs=1e-12)
+    assert HORIZON.times[-1] == pytest.approx(1.6, abs=1e-12)
+    np.testing.assert_allclose(ratios, ratios[0], rtol=1e-12)
+    with pytest.raises(ConfigurationError, match=r"must be <= plan_horizon / plan_intervals = 0.04 s"):
+        Horizon.growing(0.4, 10, 0.05)
+
+
+def test_momentum_stays_what_it_was(
+    robot: RobotModel, moving: tuple[BaseStart, Array, Array, Array, Array]
+) -> None:
+    """The predicted configuration and velocity have the momenta and the centre of mass of a free robot."""
+    start, joints, rates, accelerations, _ = moving
+    predicted = PredictionModel(robot).predict(HORIZON, start, joints, rates, accelerations)
+    velocity = [np.concatenate(pair) for pair in zip(predicted.twist, predicted.w, strict=True)]
+    for time, place, v in zip(HORIZON.times, placements(predicted), velocity, strict=True):
+        found = conserved_quantities(robot, place.q, v)
+        drift = time / robot.mass * start.linear_momentum
+        np.testing.assert_allclose(found.linear_momentum, start.linear_momentum, atol=1e-12)
+        np.testing.assert_allclose(found.angular_momentum, start.angular_momentum, atol=1e-12)
+        np.testing.assert_allclose(found.centre_of_mass, start.centre_of_mass + drift, atol=1e-12)
+
+
+def test_efforts_are_those_of_the_inverse_dynamics(
+    robot: RobotModel, moving: tuple[BaseStart, Array, Array, Array, Array]
+) -> None:
+    start, joints, rates, accelerations, _ = moving
+    predicted = PredictionModel(robot).predict(HORIZON, start, joints, rates, accelerations)
+    for k in range(HORIZON.count):
+        q = np.concatenate([np.zeros(6), [1.0], predicted.q[k]])
+        v = np.concatenate([predicted.twist[k], predicted.w[k]])
+        expected = reduced_inverse_dynamics(robot, q, v, accelerations[k])
+        np.testing.assert_allclose(predicted.effort[k], expected, rtol=0.0, atol=1e-11)
+
+
+def test_the_attitude_is_that_of_small_steps(
+    robot: RobotModel, moving: tuple[BaseStart, Array, Array, Array, Array]
+) -> None:
+    """A hundred intervals of a hundredth of the length agree with ten to the second order of the step."""
+    start, joints, rates, accelerations, _ = moving
+    model, coarse = PredictionModel(robot), Horizon(np.full(10, 0.02))
+    fine = Horizon(np.full(100, 0.002))
+    one = model.predict(coarse, start, joints, rates, accelerations).rotation[-1]
+    other = model.predict(fine, start, joints, rates, np.repeat(accelerations, 10, axis=0)).rotation[-1]
+    assert np.linalg.norm(pin.log3(one.T @ other)) < 2e-5
+
+
+def outputs(
+    prediction: Prediction, tools: ToolErrorModel, apart: DistanceModel, targets: list[PreviewedTargets]
+) -> dict[str, Array]:
+    """Return every output of a prediction that a plan has rows for."""
+    placed = placements(prediction)
+    return {
+        "effort": prediction.effort,
+        "omega": prediction.omega,
+        "phi": prediction.phi,
+        "tools": tools.at(placed[1:], targets).errors,
+        "distances": apart.at(placed, targets).distance,
+    }
+
+
+def test_rows_are_the_derivatives_of_the_outputs(
+    robot: RobotModel, draw: Draw, moving: tuple[BaseStart, Array, Array, Array, Array]
+) -> None:
+    """By central differences along random changes of all accelerations, with momentum, and a held deputy."""
+    start, joints, rates, accelerations, q = moving
+    schedule = load_scenario("smooth").model.schedule
+    distances = NearPairs(make_clearance(robot, schedule))
+    tools, apart = ToolErrorModel(robot), DistanceModel(robot, distances, 2)
+    model, still = PredictionModel(robot), Twist(np.zeros(3), np.zeros(3))
+    here = robot.tools_at(q)
+    goals = {arm: draw.near(here[arm], 0.2) for arm in robot.arms}
+    grasp = schedule.deputy.grasp_frames["end_a"]
+    target = PreviewedTargets(
+        goals, dict.fromkeys(goals, still), joints, rates, "arm_a", grasp, frozenset({"arm_a"})
+    )
+    targets = [target] * HORIZON.count
+
+    def at(change: Array) -> Prediction:
+        return model.predict(HORIZON, start, joints, rates, accelerations + change)
+
+    about = at(np.zeros_like(accelerations))
+    sensitivity, placed, later = Sensitivity(HORIZON, about), placements(about), slice(1, 11)
+    rows = {
+        "effort": sensitivity.rows(about.effort_by, slice(0, 10)),
+        "omega": sensitivity.rows(about.omega_by, slice(0, 11)),
+        "phi": sensitivity.phi,
+        "tools": sensitivity.rows(tools.at(placed[1:], targets).by, later),
+        "distances": sensitivity.rows(apart.at(placed, targets).by, later),
+    }
+    bounds = {"effort": 1e-8, "omega": 1e-8, "phi": 1e-7, "tools": 1e-7, "distances": 2e-4}
+    for _ in range(3):
+        change = draw.random.normal(size=accelerations.shape)
+        forward = outputs(at(STEP * change), tools, apart, targets)
+        backward = outputs(at(-STEP * change), tools, apart, targets)
+        for name, by in rows.items():
+            numeric = (forward[name] - backward[name]) / (2.0 * STEP)
+            np.testing.assert_allclose(
+                by @ change.ravel(), numeric, rtol=0.0, atol=bounds[name], err_msg=name
+            )
+
+
+def constraint(matrix: Array, low: Array, high: Array, *, soft: bool) -> Constraint:
+    """Return rows about zero with a name each."""
+    names = tuple(f"{'soft' if soft else 'hard'} {row}" for row in range(len(matrix)))
+    return Constraint(names, np.zeros(len(matrix)), matrix, low, high, low, high, np.ones(len(matrix)), soft)
+
+
+def test_the_program_meets_its_optimality_conditions(draw: Draw) -> None:
+    """Hard rows hold, soft ones are exceeded by little, the gradient is a sum of binding rows."""
+    root = draw.random.normal(size=(20, 20))
+    hessian, gradient = root @ root.T + np.eye(20), draw.vector(20, 30.0)
+    free = np.linalg.solve(hessian, -gradient)
+    hard = constraint(np.eye(20), np.full(20, -0.3), np.full(20, 0.3), soft=False)
+    found = solve(hessian, gradient, [hard], 300)
+    assert found.status is PlanStatus.SOLVED and found.active and found.kkt_residual < 1e-10
+    assert np.abs(found.change).max() <= 0.3 + 1e-9 < np.abs(free).max()
+    bound = np.abs(np.abs(found.change) - 0.3) < 1e-9
+    assert found.active == tuple(f"hard {row}" for row in np.flatnonzero(bound))
+    slope = hessian @ found.change + gradient
+    assert np.abs(slope[~bound]).max() < 1e-8 and (slope[bound] * found.change[bound] <= 0.0).all()
+    wide = constraint(np.eye(20), np.full(20, -9e9), np.full(20, 9e9), soft=False)
+    np.testing.assert_allclose(solve(hessian, gradient, [wide], 300).change, free, atol=1e-9)
+
+
+def test_rows_that_contradict_each_other_are_named(draw: Draw) -> None:
+    """A soft one is exceeded and reported; between hard ones there is no plan, and the worst is named."""
+    one = np.ones((1, 3))
+    upper = constraint(one, np.array([-9e9]), np.array([-1.0]), soft=False)
+    lower = constraint(one, np.array([2.0]), np.array([9e9]), soft=True)
+    soft = solve(np.eye(3), np.zeros(3), [upper, lower], 300)
+    assert soft.status is PlanStatus.SOLVED
+    assert soft.largest_slack_row == "soft 0" and abs(soft.largest_slack - 3.0) < 1e-6
+    hard = solve(
+        np.eye(3), np.zeros(3), [upper, constraint(one, *map(np.array, ([2.0], [9e9])), soft=False)], 300
+    )
+    assert hard.status is PlanStatus.INFEASIBLE and hard.largest_slack_row == "hard 0"
+    assert hard.change.size == 0
+
+
+def test_without_its_solver_the_law_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> object:
+        raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+    monkeypatch.setattr(quadratic_program, "import_module", missing)
+    with pytest.raises(MissingDependencyError, match=r"pip install 'sms_handover\[mpc\]'"):
+        Loop(scenario_of("paper", 1.0))
+
+
+LIMITS = {
+    "joint_rate_limit": 0.2,  # rad/s
+    "base_rate_limit": 0.0052,  # rad/s
+    "base_attitude_limit": 0.006,  # rad
+}
+
+
+def peaks(run: RunData) -> dict[str, float]:
+    """Return what the limits are for."""
+    turned = [pin.log3(pin.Quaternion(row[3:]).matrix()) for row in run.base_pose[::20]]
+    return {
+        "joint_rate_limit": float(np.abs(run.joint_velocity).max()),
+        "base_rate_limit": float(np.abs(run.base_twist[:, 3:]).max()),
+        "base_attitude_limit": float(np.abs(turned).max()),
+    }
+
+
+@pytest.fixture(scope="module")
+def free() -> RunData:
+    """The beginning of the paper's task without limits but those of the robot."""
+    return simulate(scenario_of("paper", 1.6))
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_a_limit_is_kept_that_binds(name: str, free: RunData) -> None:
+    """Within 1 % over the step of the paper's task; without it, it would be exceeded."""
+    run = simulate(scenario_of("paper", 1.6, **{name: LIMITS[name]}))
+    assert peaks(run)[name] <= 1.01 * LIMITS[name] < 0.9 * peaks(free)[name]
+    word = name.removesuffix("_limit").replace("joint_", "").replace("_", " ")
+    assert any(word in row for plan in run.plans for row in plan.active)
+    slack = max(run.plans, key=lambda plan: plan.largest_slack)
+    assert 0.0 < slack.largest_slack < 0.02 * LIMITS[name] and word in slack.largest_slack_row
+    assert all(plan.largest_slack == 0.0 for plan in free.plans)
+
+
+def test_a_plan_begins_where_the_robot_will_be() -> None:
+    """One period of delay, predicted: joints, rates and attitude are met when the plan comes into use."""
+    loop = Loop(scenario_of("paper", 1.0))
+    controller = controller_of(loop)
+    for _ in range(25):
+        loop.advance_period()
+    state, coming = loop.state, controller.state.coming
+    assert coming is not None and coming.begin_ns == state.stamp_ns
+    assert np.abs(state.joint_velocity).max() > 0.1
+    np.testing.assert_allclose(coming.q, state.joint_position, rtol=0.0, atol=1e-5)
+    np.testing.assert_allclose(coming.w, state.joint_velocity, rtol=0.0, atol=1e-3)
+
+
+def test_a_plan_is_followed_from_node_to_node(draw: Draw) -> None:
+    """It is the double integrator in closed form, and stands after its end; its means give its rates back."""
+    q, w, a = draw.joints(), draw.vector(14), draw.random.normal(size=(10, 14))
+    plan = Plan(1, 0, q, w, a, HORIZON.intervals)
+    for interval, start, mean in zip(HORIZON.intervals, HORIZON.times[:-1], a, strict=True):
+        now = plan.after(float(start))
+        then = now[0] + interval * now[1] + 0.5 * interval**2 * mean
+        np.testing.assert_allclose(plan.after(float(start + interval - 1e-12))[0], then, atol=1e-9)
+    assert not plan.after(plan.end_s + 1.0)[1:].any()
+    shifted = plan.resampled(HORIZON, 30_000_000)
+    rates = plan.after(0.03)[1] + np.cumsum(HORIZON.intervals[:, None] * shifted, axis=0)
+    expected = [plan.after(0.03 + float(time))[1] for time in HORIZON.times[1:]]
+    np.testing.assert_allclose(rates, expected, atol=1e-12)
+
+
+def test_solves_that_fail_are_carried_by_the_plan_before_then_the_arms_brake() -> None:
+    """At the limit of iterations the old plan is used and counted; after five in a row the arms brake."""
+    loop = Loop(scenario_of("paper", 4.0))
+    for _ in range(30):
+        loop.advance_period()
+    before = loop.snapshot()
+    failing = Loop(scenario_of("paper", 4.0, program_iterations=1, joint_rate_limit=0.05, failed_plans=5))
+    failing.restore(before)
+    reports, rates, events = list[PlanReport](), list[float](), list[str]()
+    while not failing.finished and failing.state.stamp_ns < 2_000_000_000:
+        ticks = failing.advance_period()
+        assert ticks.plan is not None
+        reports.append(ticks.plan)
+        rates.append(float(np.abs(ticks.rows.v[-1, BASE_NV:]).max()))
+        events += [event.kind for told in ticks.excesses.values() for event in told]
+    statuses = [report.status for report in reports]
+    assert statuses[:4] == [PlanStatus.ITERATION_LIMIT] * 4 and statuses[4] is PlanStatus.BRAKING
+    assert [report.reused_plans for report in reports[:5]] == [1, 2, 3, 4, 5]
+    assert [report.plan_age for report in reports[:3]] == pytest.approx([0.0, 0.02, 0.04])
+    assert rates[0] > 0.1 and rates[-1] < 1e-3
+    assert events.count(PLAN_FAILED) == 2  # the old plan is carried on, then the arms brake
+
+
+def test_the_state_has_every_bit_of_the_rest() -> None:
+    """Through JSON and back, in the middle of a motion, between two plans."""
+    loop = Loop(scenario_of("smooth", 1.0))
+    for _ in range(15):
+        loop.advance_period()
+    loop.advance()
+    snapshot = loop.snapshot()
+    controller = structured(MpcState, json.loads(json.dumps(snapshot.controller)))
+    other = Loop(scenario_of("smooth", 1.0))
+    other.restore(replace(snapshot, controller=plain(controller)))
+    for _ in range(3):
+        one, two = loop.advance_period(), other.advance_period()
+        for column in ("q", "v", "effort"):
+            assert getattr(one.rows, column).tobytes() == getattr(two.rows, column).tobytes()
+
+
+@pytest.mark.parametrize("law", ["quintic", "step"])
+def test_the_preview_is_what_the_generator_will_say(law: str) -> None:
+    """A second ahead, within phases and into those that begin without commands; held and free deputy."""
+    scenario = load_scenario("smooth", {"trajectory.time_law": law, "common.dynamics": "compiled"})
+    robot, schedule = scenario.model.robot, scenario.model.schedule
+    loop, preview, expected = Loop(scenario), TargetPreview(robot, schedule), dict[int, PreviewedTargets]()
+    compared = 0
+    while not loop.finished:
+        state, period = loop.state, loop.advance_period().period
+        assert period is not None
+        now_ns, targets = period.phase.stamp_ns, period.targets_in_world
+        preview.update(period.phase, period.reference, targets, state.q)
+        for event in period.events:
+            preview.grasped(event)
+        if now_ns % 500_000_000 == 0:
+            expected[now_ns + 1_000_000_000] = preview.ahead([now_ns, now_ns + 1_000_000_000])[1]
+        told = expected.get(now_ns)
+        before = schedule.phases[schedule.phase_index(max(now_ns - 1_000_000_000, 0))]
+        phase = schedule.phases[schedule.phase_index(now_ns)]
+        if told is None or (phase is not before and phase.commands):
+            continue
+        for arm in robot.arms:
+            if arm in told.tool_in_world:
+                off = np.linalg.norm(told.tool_in_world[arm].position - targets[arm].position)
+                assert off < 4e-3, (now_ns, arm)  # what the base and the other arm move by
+                compared += 1
+            else:
+                part = robot.arm_joints[arm]
+                off = np.abs(told.joint_position[part] - period.reference.position[part]).max()
+                assert off < 2e-3, (now_ns, arm)
+    assert compared > 100
