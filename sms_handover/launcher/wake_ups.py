@@ -30,8 +30,8 @@ class WakeUps:
     def missed(self, tick_s: float, *, composed: bool) -> float:
         """Return which part of the ticks is to be expected to miss what it needs, 0 to 1.
 
-        With a process per node that is a command in time. ``composed`` is whether plant and controller share a
-        process: nothing is woken between them, and a tick can only begin more than a tick too late.
+        With a process per node that is a command in time. ``composed`` is whether plant and controller share
+        a process: nothing is woken between them, and a tick can only begin more than a tick too late.
         """
         if composed:
             return _part(late > tick_s for late in self.late_s)
