@@ -251,15 +251,15 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "momentum of the robot left out of the joint rates",
         "trajectory/generator",
-        "twists = self._without_drift(state, twists)",
+        "twists = self._motion.without_drift(state.q, state.v, twists)",
         "twists = dict(twists)",
         "payload",
     ),
     _core(
         "payload known at the state of the grasp already",
         "control/controller",
-        "stamp_ns > self._news[0].stamp_ns",
-        "stamp_ns >= self._news[0].stamp_ns",
+        "stamp_ns <= self._news[0].stamp_ns",
+        "stamp_ns < self._news[0].stamp_ns",
         "payload",
     ),
     _core(
