@@ -88,7 +88,7 @@ def test_what_is_awaited_is_handed_over_first(bench: Bench, spins: bool) -> None
     source = inputs._sources["awaited"]
     for name, publisher in publishers.items():
         publisher.publish(String(data=name))
-    assert inputs._take_first(source, monotonic + (0.05 if spins else 10.0))
+    assert inputs._take_first(source, monotonic() + (0.05 if spins else 10.0))
     assert heard == ["awaited"] and inputs.wakes == 1
     inputs.poll()
     assert heard == ["awaited", "other"]
