@@ -1,6 +1,7 @@
 """A loop spins where that pays off, gives way to others, and takes what it awaits before anything else."""
 
 import os
+from time import monotonic
 
 import pytest
 from rclpy.node import Node
@@ -35,15 +36,15 @@ class Clock:
 
 
 def test_it_gives_way_between_any_two_looks(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock, looks = Clock(monkeypatch), []
-    assert not AdaptiveSpin(0.0105).find(lambda: bool(looks.append(clock.yields)))
+    clock, looks = Clock(monkeypatch), list[int]()
+    assert not AdaptiveSpin(0.0105).find(lambda: bool(looks.append(clock.yields)))  # type: ignore[func-returns-value]
     assert looks == list(range(10)) and clock.yields == 10
 
 
 def test_it_stops_after_misses_and_tries_again_later(monkeypatch: pytest.MonkeyPatch) -> None:
     Clock(monkeypatch)
-    spin, looked = AdaptiveSpin(0.002), []
-    found = [spin.find(lambda n=n: bool(looked.append(n))) for n in range(210)]  # type: ignore[misc]
+    spin, looked = AdaptiveSpin(0.002), list[int]()
+    found = [spin.find(lambda n=n: bool(looked.append(n))) for n in range(210)]  # type: ignore[misc,func-returns-value]
     assert not any(found)
     assert sorted(set(looked)) == [0, 1, 2, *range(203, 206)]
     assert AdaptiveSpin(0.002).find(lambda: True)
@@ -83,12 +84,11 @@ def test_what_is_awaited_is_handed_over_first(bench: Bench, spins: bool) -> None
         inputs.subscribe(String, name, LOSSLESS, lambda data, sent_ns, sender, n=name: heard.append(n))  # type: ignore[misc]
     bench.until(lambda: all(p.get_subscription_count() for p in publishers.values()), "the subscriptions")
     inputs.awaited = lambda: "awaited"
-    monotonic = spinning.monotonic()
-    inputs._hot_until = monotonic + 10.0
+    inputs._hot_until = monotonic() + 10.0
     source = inputs._sources["awaited"]
     for name, publisher in publishers.items():
         publisher.publish(String(data=name))
-    assert inputs._take_first(source, monotonic + (0.05 if spins else 10.0))
+    assert inputs._take_first(source, monotonic() + (0.05 if spins else 10.0))
     assert heard == ["awaited"] and inputs.wakes == 1
     inputs.poll()
     assert heard == ["awaited", "other"]
