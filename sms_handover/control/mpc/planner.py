@@ -50,10 +50,10 @@ class Planner:
         self.prediction = PredictionModel(robot)
         self._tools, self._cost = ToolErrorModel(robot), PlanCost(robot, gains, self.horizon)
         self._limits = Limits(robot, gains, initial_rotation)
-        apart = distances is not None and gains.least_distance > 0.0
-        self._distances = (
-            DistanceModel(robot, distances, gains.distance_pairs) if distances and apart else None
-        )
+        self._distances: DistanceModel | None = None
+        if distances and gains.least_distance > 0.0:
+            least = (1.0 + gains.limit_margin) * gains.least_distance
+            self._distances = DistanceModel(robot, distances, gains.distance_pairs, least)
 
     def step(self, start: PlanStart, accelerations: Array, targets: Sequence[PreviewedTargets]) -> Step:
         """Return one iteration about accelerations (N, n), towards targets at all instants but the first."""
