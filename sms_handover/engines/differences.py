@@ -80,8 +80,8 @@ def _compared(run: RunData, motion: Motion, bounds: Bounds) -> Iterator[_Compare
         given = np.array([event.impulse for event in events])
         stamps = np.array([event.stamp_ns for event in events], dtype=np.int64)
         for name, unit, bound, part in (
-            ("impulse", "N s", bounds.linear_momentum, slice(3)),
-            ("impulsive moment", "N m s", bounds.angular_momentum, slice(3, 6)),
+            ("impulse", "N s", bounds.impulse, slice(3)),
+            ("impulsive moment", "N m s", bounds.impulse, slice(3, 6)),
         ):
             pair = motion.impulses[:, part], given[:, part]
             yield _Compared(name, unit, bound, _distances, stamps, [pair])
