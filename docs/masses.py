@@ -101,9 +101,9 @@ on. What they take the deputy to be is `model.deputy.*`, which is what it is unl
 - **nmpc** cancels the inertia that it knows, $u = H^* (\\ldots) + c^*$. With the right payload the arms move
   as without one, at larger torques. If the payload makes an inertia $k$ times what the law takes it for, the
   error obeys $k \\ddot e + A_2 \\dot e + A_1 e = 0$: never unstable, but softer and less damped. A mass that
-  is wrong by a factor of two has $k$ near two in the worst direction, and both grasps succeed. A law that does
-  not know of the mass at all is another matter: a wrist turns a thousandth of a kg m^2 of gripper, so that
-  1 kg in the hand is some 25 times that. Errors then decay in more than the phase lasts, and the hand that
+  is wrong by a factor of two has $k$ near two in the worst direction, and both grasps succeed. A law that
+  does not know of the mass at all is another matter: a wrist turns a thousandth of a kg m^2 of gripper, so
+  that 1 kg in the hand is some 25 times that. Errors then decay in more than the phase lasts, and the hand that
   shall take over does not meet the grasp frame.
 - **pid** has constant gains. The loop of a joint that moves the inertia $I$ with $K_P = 2$ N m/rad,
   $K_I = 1$ N m/(rad s), $K_D = 1.5$ N m s/rad is stable for $I < K_P K_D / K_I = 3$ kg m^2 (Routh's criterion
@@ -128,8 +128,9 @@ largest $k$ of a law that does not know it, and $2 k / A_2$, the time in which i
 Scenario `paper`, whose targets jump, with larger bodies for larger masses, since no satellite weighs 24 kg
 in 0.0034 m^3:
 {sizes}
-(the largest masses of the CubeSat Design Specification, rev. 14), uniform boxes, with the grasp frames where they were. Distance of the deputy's grasp frame from the hand at the capture and
-at the transfer, farthest turn of the base, largest torque from the capture on. A run ends where a grasp
+(the largest masses of the CubeSat Design Specification, rev. 14), uniform boxes, with the grasp frames where
+they were. Distance of the deputy's grasp frame from the hand at the capture and at the transfer, farthest
+turn of the base, largest torque from the capture on. A run ends where a grasp
 misses, so what would follow is not in its figures.
 
 ### nmpc
