@@ -103,8 +103,8 @@ on. What they take the deputy to be is `model.deputy.*`, which is what it is unl
   error obeys $k \\ddot e + A_2 \\dot e + A_1 e = 0$: never unstable, but softer and less damped. A mass that
   is wrong by a factor of two has $k$ near two in the worst direction, and both grasps succeed. A law that
   does not know of the mass at all is another matter: a wrist turns a thousandth of a kg m^2 of gripper, so
-  that 1 kg in the hand is some 25 times that. Errors then decay in more than the phase lasts, and the hand that
-  shall take over does not meet the grasp frame.
+  that 1 kg in the hand is some 25 times that. Errors then decay in more than the phase lasts, and the hand
+  that shall take over does not meet the grasp frame.
 - **pid** has constant gains. The loop of a joint that moves the inertia $I$ with $K_P = 2$ N m/rad,
   $K_I = 1$ N m/(rad s), $K_D = 1.5$ N m s/rad is stable for $I < K_P K_D / K_I = 3$ kg m^2 (Routh's criterion
   of $I s^3 + K_D s^2 + K_P s + K_I$). Joints are coupled, so that several of some 1.6 kg m^2 are too much
