@@ -39,8 +39,10 @@ class ObservedTorque:
         """Go back to a former :attr:`memory`; an empty one is that of the start of a run."""
         size = self._robot.pin.nv
         self._begun = memory.size > 0
-        parts = np.array(memory).reshape(3, size) if self._begun else np.zeros((3, size))
-        self._integral, self._flow, self._estimate = parts
+        parts: Array = np.array(memory).reshape(3, size) if self._begun else np.zeros((3, size))
+        self._integral: Array = parts[0]
+        self._flow: Array = parts[1]
+        self._estimate: Array = parts[2]
 
     def __call__(self, q: Array, v: Array, desired: Array, feedback: Array) -> Array:
         """Return the joint efforts (n,) N m, not limited."""
