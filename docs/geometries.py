@@ -6,7 +6,6 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from math import sqrt
 from pathlib import Path
 
 import matplotlib
@@ -21,6 +20,7 @@ from docs.geometry_search import Found, Tally, possible
 from docs.geometry_trial import Bench
 from docs.tables import table
 from sms_handover.analysis.claims import PEAK_TORQUE
+from sms_handover.campaign.statistics.proportion import proportion
 from sms_handover.control.nmpc import NMPC
 from sms_handover.control.pid import PID
 from sms_handover.units import MM_PER_M
@@ -29,7 +29,6 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGE, FIGURE = ROOT / "docs" / "geometries.md", ROOT / "docs" / "images" / "geometries.svg"
 FOLDER = ROOT / "build" / "geometries"
 SEED, COUNT = 16, 60
-_Z = 1.959963984540054  # [-] the normal deviate of a two-sided 95 % interval
 _FEW = 30  # [-] geometries below which the page says that there are few
 _MOST_CAUSES = 8  # [-] rows of the table of failures
 
@@ -46,17 +45,6 @@ class Row:
     rate: float  # [-] share of its limit
     simulated: int
     failures: dict[str, int]
-
-
-def wilson(successes: int, trials: int) -> tuple[float, float]:
-    """Return Wilson's interval of 95 % for a proportion [Wilson1927]: both bounds in [0, 1]."""
-    if trials == 0:
-        return 0.0, 1.0
-    share, spread = successes / trials, _Z**2 / trials
-    centre = share + spread / 2.0
-    half = _Z * sqrt(share * (1.0 - share) / trials + spread / (4.0 * trials))
-    low, high = ((centre + sign * half) / (1.0 + spread) for sign in (-1.0, 1.0))
-    return max(0.0, low), min(1.0, high)
 
 
 def rows_of(file: Path) -> list[Row]:
@@ -102,7 +90,7 @@ def page(rows: Sequence[Row], seed: int) -> str:
     simulated = sum(row.simulated for row in rows)
     claims = [(name, *_share(rows, name)) for name in rows[0].claims]
     all_hold = sum(all(row.claims.values()) for row in rows)
-    low, high = wilson(all_hold, number)
+    _, _, low, high = proportion(all_hold, number)
     causes = Counter[str]()
     for row in rows:
         causes.update(row.failures)
@@ -181,7 +169,7 @@ def draw(rows: Sequence[Row], file: Path) -> None:
     names = list(rows[0].claims)
     for place, name in enumerate(names):
         held = sum(row.claims[name] for row in rows)
-        low, high = wilson(held, len(rows))
+        _, _, low, high = proportion(held, len(rows))
         left.plot([100.0 * low, 100.0 * high], [place, place], color="0.4", linewidth=2.0)
         left.plot(100.0 * held / len(rows), place, "o", color="tab:blue")
     left.set_yticks(range(len(names)), names)
@@ -203,7 +191,7 @@ def draw(rows: Sequence[Row], file: Path) -> None:
 def _share(rows: Sequence[Row], claim: str) -> tuple[str, str, str]:
     """Return in how many geometries a claim holds, as number, share and interval."""
     held = sum(row.claims[claim] for row in rows)
-    low, high = wilson(held, len(rows))
+    _, _, low, high = proportion(held, len(rows))
     return f"{held} of {len(rows)}", _percent(held / len(rows)), f"{_percent(low)} to {_percent(high)}"
 
 

@@ -4,6 +4,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from sms_handover.campaign.definition.fields import CAMPAIGN_FIELDS
 from sms_handover.configuration.conditions_fields import CONDITIONS_FIELDS
 from sms_handover.configuration.field_specification import (
     FLOATS,
@@ -39,6 +40,7 @@ def schemas() -> dict[str, str]:
         "conditions": schema_of(CONDITIONS_FIELDS),
         "parameters": _parameter_files(),
         "scenario": _scenario(),
+        "campaign": schema_of(CAMPAIGN_FIELDS),
     }
     return {
         f"{name}.schema.json": json.dumps({"$schema": _DRAFT, **schema}, indent=1) + "\n"

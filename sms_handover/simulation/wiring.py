@@ -20,6 +20,7 @@ from sms_handover.control.law import Law, LawSetup, Need
 from sms_handover.control.parameters import ControllerParameters, gains_of
 from sms_handover.control.protocol import CheckedController, Controller
 from sms_handover.control.registry import SHIPPED, law_named, require_law
+from sms_handover.control.stability import check_stability
 from sms_handover.errors import ConfigurationError, ScheduleError
 from sms_handover.ik.levenberg_marquardt import FindJoints, find_joints
 from sms_handover.ik.parameters import IkParameters
@@ -33,7 +34,6 @@ from sms_handover.plant.parameters import PlantParameters
 from sms_handover.simulation.near_pairs import NearPairs
 from sms_handover.simulation.parameters import COMPILED, CommonParameters
 from sms_handover.simulation.period_runner import PeriodRunner, PythonRunner
-from sms_handover.simulation.stability import check_stability_by_phase
 from sms_handover.trajectory.generator import TrajectoryGenerator
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.preview import TargetPreview
@@ -135,8 +135,7 @@ def make_controller(
     """
     law, gains = law_named(parameters.law), gains_by_phase(schedule, parameters)
     start = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
-    places = [(start, "at the start configuration")] * len(gains)
-    check_stability_by_phase(law, robot, schedule, gains, ns_to_seconds(common.tick_ns), places)
+    check_stability(law, robot, gains, ns_to_seconds(common.tick_ns), start)  # nothing is carried there
     computed_torque = _computed_torque(law, common, parameters)
     longest_ns = longest_reference_ns(common, parameters)
     preview = TargetPreview(robot, schedule) if Need.PREVIEW in law.needs else None
@@ -166,8 +165,8 @@ def _computed_torque(
         return make
     if Need.PAYLOAD not in law.needs:
         raise ConfigurationError(
-            f"disturbance_bandwidth is {bandwidth:g} 1/s, must be 0 under control law {law.name!r}, "
-            "which has no model of the dynamics"
+            f"disturbance_bandwidth is {bandwidth:g} 1/s, must be 0 under control law {law.name!r}, which "
+            "has no model of the dynamics"
         )
     if bandwidth * dt > 1.0:
         raise ConfigurationError(

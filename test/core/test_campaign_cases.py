@@ -67,6 +67,7 @@ DRAWN: dict[str, float | str] = {
     "truth.deputy.in_world.rpy[2]": 0.02,
     "deputy.size[0]": 0.11,
     "deputy.mass": 4.0,
+    "common.conditions": "nominal",
     "truth.deputy.twist_in_world.angular[1]": 0.01,
     "schedule.phases.carry.duration": 21.0,
     "plant.grasp_position_tolerance": 0.02,
@@ -91,6 +92,20 @@ def test_masses_are_read_back_from_what_the_plant_integrates() -> None:
     assert read_back(loop, "model.robot.base.mass") == 240.0
     loop.scenario.truth.robot.pin.inertias[1].mass = 7.0
     assert read_back(loop, "truth.robot.base.mass") == 7.0
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("conditions.friction.coulomb", 0.1),
+        ("conditions.command.delay", 0.004),
+        ("conditions.model_error.base.mass", 0.02),
+    ],
+)
+def test_conditions_are_read_back_from_the_plant(path: str, value: float) -> None:
+    nominal = {"common.conditions": "nominal"}
+    assert read_back(Loop(load_scenario("smooth", {**nominal, path: value})), path) == value
+    assert read_back(Loop(load_scenario("smooth", nominal)), path) != value
 
 
 @pytest.mark.parametrize("path", ["deputy.size", "robot.name", "schedule.phases.carry.name", "robot.no"])

@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from errno import ENOSPC
 from pathlib import Path
 
@@ -15,6 +16,8 @@ import psutil
 import pytest
 
 from sms_handover.campaign.cases.case import Cases
+from sms_handover.campaign.cases.case_process import Done
+from sms_handover.campaign.cases.case_row import Beside
 from sms_handover.campaign.definition.frozen import freeze
 from sms_handover.campaign.engine.choice import workers_for
 from sms_handover.campaign.engine.dask_workers import DaskWorkers
@@ -137,6 +140,12 @@ def test_folders_of_other_campaigns_do_not_mix(tmp_path: Path) -> None:
     run_here(written(tmp_path / "b", seed=4), tmp_path / "other", program=STUB)
     with pytest.raises(ConfigurationError, match="hold different campaigns"):
         merge(tmp_path / "merged", [tmp_path / "one", tmp_path / "other"])
+    frozen, number = freeze(written(tmp_path / "a"))
+    row = next(iter(rows_of(tmp_path / "one").values()))
+    with open_campaign(tmp_path / "lies", frozen, number, Shard()) as opened:
+        opened.add(Done(replace(row, seed=row.seed + 1), Beside(0.0, 0.0, "elsewhere")))
+    with pytest.raises(ConfigurationError, match="case 0 of smooth under nmpc has another row than"):
+        merge(tmp_path / "merged", [tmp_path / "one", tmp_path / "lies"])
     (tmp_path / "one" / "campaign.yaml").write_text("name: forged\n", encoding="utf-8")
     with pytest.raises(ConfigurationError, match="the frozen campaign was changed"):
         CampaignFolder(tmp_path / "one")
@@ -214,14 +223,17 @@ def test_it_stops_at_a_look_whatever_the_order(tmp_path: Path) -> None:
     assert run_here(file, tmp_path / "out", program=STUB).done == 8, "the same command has nothing to do"
 
 
-def test_ctrl_c_leaves_within_seconds_and_says_how_to_go_on(tmp_path: Path) -> None:
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_ctrl_c_leaves_within_seconds_and_says_how_to_go_on(jobs: str, tmp_path: Path) -> None:
+    """As a terminal sends it: to the driver and to every process of its group."""
     file, out = written(tmp_path, cases=1000), tmp_path / "out"
-    child = command("campaign", "run", str(file), "-o", str(out), stderr=subprocess.PIPE)
+    words = ("campaign", "run", str(file), "-o", str(out), "-j", jobs)
+    child = command(*words, stderr=subprocess.PIPE, start_new_session=True)
     with ended_at_last(child) as below:
         until(lambda: journal_lines(out) >= 1, "a row")
         below.extend(family(child.pid))
         assert below
-        child.send_signal(signal.SIGINT)
+        os.killpg(child.pid, signal.SIGINT)
         _, said = child.communicate(timeout=PATIENCE_S)
     assert child.returncode == 130 and "interrupted: the same command goes on" in said
     assert "Traceback" not in said

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sms_handover.control.computed_torque import ComputedTorque
+from sms_handover.control.computed_torque import ComputedTorque, TrackingEfforts
 from sms_handover.control.disturbance_observer import ObservedTorque
 from sms_handover.model.robot_model import BASE_NQ, RobotModel
 from sms_handover.simulation.loop import Loop
@@ -20,7 +20,8 @@ def test_a_constant_torque_is_found_and_taken_off(robot: RobotModel, scenario: S
     feedback = np.repeat([[40.0], [12.0]], 14, axis=1)
     observed = ObservedTorque(robot, ComputedTorque(robot), BANDWIDTH, TICK)
     errors = {}
-    for name, torque in {"observed": observed, "plain": ComputedTorque(robot)}.items():
+    torques: dict[str, TrackingEfforts] = {"observed": observed, "plain": ComputedTorque(robot)}
+    for name, torque in torques.items():
         plant = make_plant(robot, scenario.truth.schedule, parameters.common, parameters.plant)
         start = np.array(plant.q[BASE_NQ:])
         for tick in range(1500):

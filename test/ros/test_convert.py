@@ -116,7 +116,7 @@ def test_phase_comes_back(commands: tuple[GraspCommand, ...]) -> None:
 def test_event_comes_back(
     command: GraspCommand, status: GraspStatus, errors: tuple[float, float, float]
 ) -> None:
-    capture = {
+    capture: dict[str, Any] = {
         "relative_rate": errors[0],
         "relative_twist": (*errors, 0.1, -0.0, 5e-324),
         "impulse": (*errors, -1.0 / 3.0, 1e308, 0.0),

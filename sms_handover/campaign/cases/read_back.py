@@ -7,11 +7,21 @@ from collections.abc import Callable, Mapping, Sequence
 from math import isclose
 from typing import Any
 
+import numpy as np
 import pinocchio as pin
 
 from sms_handover.campaign.definition.distributions import Value
 from sms_handover.configuration.scenario_file import SHORT
-from sms_handover.configuration.values import DEPUTY, MODEL, ROBOT, ROLES, SCHEDULE, path_of
+from sms_handover.configuration.values import (
+    CONDITIONS,
+    DEPUTY,
+    MODEL,
+    ROBOT,
+    ROLES,
+    SCHEDULE,
+    TRUTH,
+    path_of,
+)
 from sms_handover.errors import ConfigurationError
 from sms_handover.model.parts import Inertia, Origin
 from sms_handover.simulation.loop import Loop
@@ -41,6 +51,13 @@ def read_back(loop: Loop, path: str) -> Value:
     return found
 
 
+def is_exact(loop: Loop, path: str) -> bool:
+    """Whether a value is to come back as it was set: a robot with a model error differs from it."""
+    if loop.scenario.truth.model_error is None:
+        return True
+    return not path.removeprefix(f"{TRUTH}.").startswith(f"{ROBOT}.")
+
+
 def is_same(asked: object, found: object) -> bool:
     """Whether a value that was read back is the one that was asked for."""
     if isinstance(asked, bool) or isinstance(found, bool):
@@ -54,6 +71,8 @@ def _found(loop: Loop, path: str) -> Any:
     """Return what is at a path; raises what a wrong path raises."""
     scenario = loop.scenario
     first, _, rest = path.partition(".")
+    if first == CONDITIONS:
+        return _of_conditions(scenario.truth, path_of(f"{path}:=0")[2])
     if first not in (ROBOT, DEPUTY, SCHEDULE, *ROLES):
         section, name = (SHORT[first], first) if first in SHORT and not rest else (first, rest)
         return getattr(getattr(scenario.parameters, section), name)
@@ -153,6 +172,16 @@ def _of_deputy(loop: Loop, world: World, steps: Sequence[str], *, of_plant: bool
     if steps[0] == "size":
         return float(deputy.size[int(steps[1])])
     return deputy.mass if steps[0] == "mass" else _of_inertia(deputy.body, steps)
+
+
+def _of_conditions(world: World, steps: Sequence[str]) -> Any:
+    """Return a value of the conditions; of one that every joint has, that of the first."""
+    if steps[0] == "model_error":
+        return getattr(getattr(world.model_error, steps[1]), steps[2])
+    if steps[0] not in ("friction", "torque", "command"):
+        raise KeyError(steps[0])
+    value = getattr(getattr(world.conditions, steps[0]), steps[1])
+    return float(value[int(steps[2]) if len(steps) > 2 else 0]) if isinstance(value, np.ndarray) else value
 
 
 def _of_schedule(world: World, steps: Sequence[str]) -> Any:

@@ -6,6 +6,8 @@ tasks is to start a worker again that was killed.
 
 import json
 import logging
+import os
+import signal
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
@@ -40,14 +42,23 @@ class CasePlugin(distributed.WorkerPlugin):
     name = _PLUGIN
 
     def __init__(
-        self, files: dict[str, str], cases: int | None, seed: int, limits: Limits, program: Sequence[str]
+        self,
+        files: dict[str, str],
+        cases: int | None,
+        seed: int,
+        limits: Limits,
+        program: Sequence[str],
+        *,
+        is_here: bool,
     ) -> None:
-        """Take what the processes need."""
+        """Take what the processes need, and whether the worker is one that we started on this machine."""
         self._files, self._cases, self._seed = files, cases, seed
-        self._limits, self._program = limits, tuple(program)
+        self._limits, self._program, self._is_here = limits, tuple(program), is_here
 
     def setup(self, worker: Any) -> None:
-        """Start without a process."""
+        """Start without a process; on this machine Ctrl-C is for the driver, which ends the workers."""
+        if self._is_here:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
         self._idle: SimpleQueue[CaseProcess] = SimpleQueue()
 
     def teardown(self, worker: Any) -> None:
@@ -97,7 +108,9 @@ class DaskWorkers:
         """
         self._cluster: Any = None
         campaign = frozen.campaign(cases)
-        plugin = CasePlugin(dict(frozen.files), cases, campaign.seed, campaign.limits, program)
+        plugin = CasePlugin(
+            dict(frozen.files), cases, campaign.seed, campaign.limits, program, is_here=not scheduler
+        )
         dask.config.set({"distributed.scheduler.allowed-failures": _DEATHS})
         if not scheduler:
             self._cluster = distributed.LocalCluster(
@@ -105,7 +118,8 @@ class DaskWorkers:
                 threads_per_worker=1,
                 processes=True,
                 host=_HERE,
-                dashboard_address=None,
+                dashboard_address=f"{_HERE}:0",  # of the state of the scheduler as text; a free port
+                scheduler_kwargs={"dashboard": False},
                 memory_limit=None,  # the process of cases is watched by us
                 silence_logs=logging.CRITICAL,
             )
@@ -157,8 +171,16 @@ class DaskWorkers:
                     client.unregister_worker_plugin(_PLUGIN)
                 client.close(timeout=_CLOSE_S)
         if self._cluster is not None:
+            self._kill_workers()
             with suppress(Exception):
                 self._cluster.close(timeout=_CLOSE_S)
+
+    def _kill_workers(self) -> None:
+        """End the workers here at once, as asking them takes as long as what they do."""
+        for nanny in self._cluster.workers.values():
+            nanny.auto_restart = False
+            with suppress(OSError, TypeError):  # it has none, or that has ended
+                os.kill(nanny.pid, signal.SIGKILL)
 
     @property
     def _threads(self) -> int:

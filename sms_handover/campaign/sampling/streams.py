@@ -1,8 +1,8 @@
 """Random streams of a campaign, one per case and dotted path, so that no draw moves another."""
 
-import hashlib
-
 import numpy as np
+
+from sms_handover.conditions.random_streams import RandomStreams
 
 _GRID = 2**52  # shares are the middles of so many cells, so that none is 0 or 1
 _RUN_SEED = "seed"  # stands for the seed of the run, which every stream inside the run follows from
@@ -11,8 +11,8 @@ _LARGEST_SEED = 2**53
 
 
 def stream(seed: int, case: int, name: str) -> np.random.Generator:
-    """Return the stream of a name in a case: SeedSequence(seed, spawn_key=(case, digest of the name))."""
-    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(case, _digest(name))))
+    """Return the stream of a name in a case, made as those of the models of a run are."""
+    return RandomStreams(seed, case).parameters(name)
 
 
 def share_of(seed: int, case: int, name: str) -> float:
@@ -27,10 +27,4 @@ def run_seed(seed: int, case: int) -> int:
 
 def design_seed(seed: int) -> int:
     """Return the seed of a design, which spreads all cases together."""
-    sequence = np.random.SeedSequence(seed, spawn_key=(_digest(_DESIGN),))
-    return int(sequence.generate_state(1, np.uint32)[0])
-
-
-def _digest(name: str) -> int:
-    """Return a number that stands for a name."""
-    return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big")
+    return int(RandomStreams(seed).sequence(_DESIGN).generate_state(1, np.uint32)[0])

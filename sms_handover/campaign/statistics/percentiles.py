@@ -7,7 +7,7 @@ import numpy as np
 from sms_handover.campaign.sampling.designs import needed
 from sms_handover.types import Array
 
-_RESAMPLES = 400  # [-]
+_RESAMPLES = 200  # [-]
 _SEED = 0  # of the resampling, so that a page is the same each time
 _MOST = 20_000  # [-] values that are resampled; of more a part, evenly taken
 

@@ -1,0 +1,157 @@
+"""The verbs of campaigns: run, status, rerun, merge, and check, compare and report as they take campaigns."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as parquet
+import pytest
+
+from sms_handover.campaign.definition.campaign_file import read_campaign
+from sms_handover.campaign.definition.frozen import campaign_path
+from sms_handover.cli.main import main
+from sms_handover.simulation.scenario import load_scenario
+from sms_handover.simulation.simulate import simulate
+
+from .campaigns import MASS, STUB, rows_of, run_here, written
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a campaign of two cases under two laws, with all that is kept."""
+    path = tmp_path_factory.mktemp("campaign")
+    keep = {"trajectories": "failures", "worst": 1}
+    changes = {"cases": 2, "laws": ["nmpc", "pid"], "success": "peak_torque < 1e-4", "keep": keep}
+    file = written(path, worst_by="peak_torque", **changes)
+    assert main(["campaign", "run", str(file), "-o", str(path / "out")]) == 0
+    return path / "out"
+
+
+def test_a_folder_has_everything(finished: Path) -> None:
+    rows = rows_of(finished)
+    table = parquet.read_table(finished / "cases.parquet").to_pylist()
+    assert [(one["case"], one["scenario"], one["law"]) for one in table] == sorted(rows)
+    for one in table:
+        row = rows[one["case"], one["scenario"], one["law"]]  # type: ignore[index]
+        assert (one["row_digest"], one["run_digest"], one["seed"]) == (row.digest, row.run_digest, row.seed)
+        assert one[f"input.{MASS}"] == row.inputs[MASS] and one["host"] and one["cpu"] > 0.0
+        assert one["metric.peak_torque"] == row.metrics["peak_torque"]
+        assert (one["success"], one["mission_failure"], one["numeric_failure"]) == (
+            row.succeeded,
+            row.mission_failure,
+            False,
+        )
+    failures = {f"{t.case}_{t.scenario}_{t.law}.npz" for t, row in rows.items() if not row.succeeded}
+    assert failures == {path.name for path in (finished / "trajectories").iterdir()} and len(failures) == 2
+    worst = sorted(path.name for path in (finished / "full").iterdir())
+    assert len(worst) == 2 and {name.split("_")[-1] for name in worst} == {"nmpc.npz", "pid.npz"}
+    row = next(row for task, row in rows.items() if worst[0].startswith(f"{task.case}_smooth_{task.law}"))
+    values = {"common.duration": 0.04, "law": row.task.law, "seed": row.seed, **row.inputs}
+    run = simulate(load_scenario("smooth", values))
+    with np.load(finished / "full" / worst[0], allow_pickle=False) as arrays:
+        np.testing.assert_array_equal(arrays["joint_position"], run.joint_position)
+    assert "sms-handover campaign rerun" in (finished / "index.html").read_text(encoding="utf-8")
+
+
+def test_status_tells_what_failed_and_what_is_worst(
+    finished: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["campaign", "status", str(finished), "--failed"]) == 0
+    said = capsys.readouterr().out
+    assert "campaign tiny: 4 of 4 rows" in said and "mission failed" in said
+    assert main(["campaign", "status", str(finished), "--worst", "1"]) == 0
+    said = capsys.readouterr().out
+    command = next(line.strip() for line in said.splitlines() if line.strip().startswith("sms-handover"))
+    assert main(command.split()[1:]) == 0
+    assert "equal to its row, bit for bit" in capsys.readouterr().out
+
+
+def test_a_row_that_differs_is_told(
+    finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = finished.parent / "campaign.yaml"
+    run_here(file, tmp_path / "stubbed", program=STUB)
+    assert main(["campaign", "rerun", str(tmp_path / "stubbed"), "1", "--law", "pid"]) == 1
+    assert "it DIFFERS from its row" in capsys.readouterr().out
+
+
+def test_laws_are_compared_and_reported(
+    finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "figures.json"
+    assert main(["compare", str(finished), "--json", str(file), "--latex", str(tmp_path / "t.tex")]) == 0
+    said = capsys.readouterr().out
+    assert "success, 95 % interval" in said and "nmpc - pid, share of successes" in said
+    figures = json.loads(file.read_text(encoding="utf-8"))
+    assert [(one["law"], one["cases"], one["success"][0]) for one in figures["groups"]] == [
+        ("nmpc", 2, 0.0),
+        ("pid", 2, 1.0),
+    ]
+    assert figures["paired_tests"][0]["difference"] == -1.0
+    assert main(["report", str(finished), "-o", str(tmp_path / "page.html")]) == 0
+    assert (tmp_path / "page.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["compare", "OUT", "--csv", "-"], "--csv is for runs: the cases of OUT are in its cases.parquet"),
+        (["compare", "OUT", "OUT"], "OUT is a campaign: give it alone"),
+        (["report", "OUT", "--figures", "x"], "the paper's figures are those of runs"),
+        (["campaign", "rerun", "OUT", "2"], "case is 2, must be from 0 to 1"),
+        (["campaign", "rerun", "OUT", "0", "--law", "pdi"], "unknown law 'pdi' (did you mean 'pid'?)"),
+        (["campaign", "rerun", "OUT", "0", "--view"], "--view shows a recording: give --bag too"),
+        (["campaign", "rerun", "OUT", "0", "--bag"], "--bag needs --output FOLDER"),
+        (["campaign", "status", "."], ". is no campaign folder: it has no manifest.json"),
+        (["campaign", "run", "lows"], "unknown campaign 'lows' (did you mean 'laws'?)"),
+        (["campaign", "run", "FILE", "-j", "0"], "--jobs is 0, must be from 1 to 1024"),
+        (["campaign", "run", "FILE", "--shard", "4/3"], "shard '4/3' must be NUMBER/OF"),
+        (["campaign", "run", "FILE", "--trust-network"], "--trust-network is for --scheduler"),
+        (["campaign", "run", "FILE", "--scheduler", "tcp://10.1.1.1:1"], "is plain TCP to another machine"),
+        (["check", "FILE", "--controller", "pid"], "is a campaign, which takes no options"),
+        (["campaign", "merge", "OUT", "-o", "OUT"], "OUT exists: merge into a new folder"),
+    ],
+)
+def test_a_slip_is_one_line(
+    words: list[str], told: str, finished: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    places = {"OUT": str(finished), "FILE": str(finished.parent / "campaign.yaml")}
+    assert main([places.get(word, word) for word in words]) == 2
+    out, err = capsys.readouterr()
+    assert told.replace("OUT", str(finished)) in err and err.count("\n") == 1 and out == ""
+
+
+def test_merge_takes_the_rows_and_makes_the_rest(finished: Path, tmp_path: Path) -> None:
+    assert main(["campaign", "merge", str(finished), "-o", str(tmp_path / "merged")]) == 0
+    assert rows_of(tmp_path / "merged") == rows_of(finished)
+    for name in ("cases.parquet", "index.html", "trajectories"):
+        assert (tmp_path / "merged" / name).exists()
+
+
+def test_check_tells_draws_and_cost(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = written(tmp_path, cases=10_000, metrics=["approach.arm_a.final_error"])
+    assert main(["check", str(file)]) == 0
+    said = capsys.readouterr().out
+    assert "normal, mean 240, std 12" in said and "202.917 to 277.083" in said
+    assert "10000 cases x 1 scenarios x 1 laws = 10000 runs" in said and "CPU time about " in said
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"success": "grasp_eror < 1"}, "unknown metric 'grasp_eror' (did you mean 'grasp_error'?)"),
+        ({"metrics": ["approach.arm_c.final_error"]}, "unknown metric 'approach.arm_c.final_error'"),
+        ({"draws": {"robot.base.mas": {"uniform": {"low": 1, "high": 2}}}}, "unknown path 'robot.base.mas'"),
+        ({"draws": {"schedule.phases.carry.on_miss": {"choice": {"values": ["abort"]}}}}, "cannot be drawn"),
+    ],
+)
+def test_check_finds_what_no_case_could_have(
+    changes: dict[str, object], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["check", str(written(tmp_path, **changes))]) == 2
+    assert told in capsys.readouterr().err
+
+
+def test_the_shipped_campaign_is_one() -> None:
+    campaign = read_campaign(campaign_path("laws"))
+    assert campaign.name == "laws" and len(campaign.laws) >= 2 and campaign.cases
