@@ -244,6 +244,17 @@ def test_a_limit_is_kept_that_binds(name: str, free: RunData) -> None:
     assert all(plan.largest_slack == 0.0 for plan in free.plans)
 
 
+def test_the_limits_of_the_tight_scenario_are_kept_and_needed() -> None:
+    """Up to beyond the middle of the first motion; the closed form exceeds two of them there."""
+    values = {"common.duration": 8.6, "common.tick": 0.02}
+    planned = simulate(load_scenario("tight", values))
+    free = simulate(load_scenario("tight", {**values, "law": "nmpc"}))
+    limits = load_scenario("tight").parameters.controller
+    for name in ("joint_rate_limit", "base_rate_limit"):
+        limit = getattr(limits, name)
+        assert peaks(planned)[name] <= 1.01 * limit < 0.99 * peaks(free)[name]
+
+
 def test_a_plan_begins_where_the_robot_will_be() -> None:
     """One period of delay, predicted: joints, rates and attitude are met when the plan comes into use."""
     loop = Loop(scenario_of("paper", 1.0))
