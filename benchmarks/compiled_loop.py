@@ -118,9 +118,9 @@ def main() -> None:
             question="How fast is a handover in one process with compiled dynamics?",
             notes=[
                 "60 s of simulated time with everything recorded, one case on one core; loading the scenario "
-                "is not in it. All took turns; the shortest processor time counts. The second table has parts "
-                "called from Python one by one, so with the cost of a call; in quiet periods C calls them "
-                "itself. The third has ticks in C while a deputy is held, under a law that knows its mass."
+                "is not in it. All took turns; the shortest processor time counts. The second table has "
+                "parts called from Python one by one, so with the cost of a call; in quiet periods C calls "
+                "them itself. The third has ticks in C while a deputy is held, under a law that knows it."
             ],
             tables=[
                 Table(("run", "s", "times real time", "time over the first"), rows),

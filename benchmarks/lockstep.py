@@ -30,6 +30,7 @@ SOLO = "the same between two nodes of one process"
 ALONE = "one process, no DDS"
 ALONE_COMPILED = "one process, no DDS, compiled dynamics"
 GRAPH = "graph, not recorded"
+ASLEEP = "graph, not recorded, without spinning"
 RECORDED = "graph, recorded"
 COMPOSED = "graph with --compose, not recorded"
 COMPOSED_RECORDED = "graph with --compose, recorded"
@@ -71,6 +72,7 @@ def main() -> None:
             ALONE: partial(alone, PINOCCHIO),
             ALONE_COMPILED: partial(alone, COMPILED_DYNAMICS),
             GRAPH: partial(graph, folder, ["--no-record"]),
+            ASLEEP: partial(graph, folder, ["--no-record", "-p", "common.spin:=0.0"]),
             RECORDED: partial(graph, folder, []),
             COMPOSED: partial(graph, folder, ["--compose", "--no-record"]),
             COMPOSED_RECORDED: partial(graph, folder, ["--compose"]),

@@ -84,7 +84,7 @@ def main() -> None:
             question="How fast can a recorded run be played into a recorder without a loss?",
             notes=[
                 "Two processes over DDS, player and recorder. A rate of 100 asks for more than there is. "
-                "Topics of types that are not installed (`/tf` without tf2_msgs) are left out.",
+                "Topics of types that are not installed are left out.",
             ],
             tables=[Table(heading, rows)],
         )

@@ -1,4 +1,4 @@
-"""Effects of conditions that are not ideal, each alone on the shipped task: a section of docs/conditions.md."""
+"""Effects of conditions, each alone on the shipped task: writes a section of docs/conditions.md."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -111,10 +111,10 @@ def section(found: Mapping[str, Mapping[str, Effect]]) -> str:
     rows = [(name, *(_cell(of_law[law]) for law in LAWS)) for name, of_law in _ranked(found)]
     return f"""\
 This section is written by `make effects`. The smooth handover with rotors of {ROTOR:g} kg m^2, a tick of
-{TICK * MS_PER_S:g} ms, seed {_SEED}, and one effect alone. Distances are those of tool and grasp frame at the grasp and at
-the transfer, the angle is the larger one of both, and the base's is its largest turn. Tolerances are opened, so
-that each effect is followed to the end; **bold** is where a grasp would have missed (10 mm, 2 degrees). Sorted by
-the larger distance under the better law.
+{TICK * MS_PER_S:g} ms, seed {_SEED}, and one effect alone. Distances are those of tool and grasp frame at the
+grasp and at the transfer, the angle is the larger one of both, the base its largest turn. Tolerances are
+opened, so that each effect is followed to the end; **bold** is where a grasp would have missed (10 mm, 2
+degrees). Sorted by the larger distance under the better law.
 
 ![The effects, ranked](images/effects.svg)
 

@@ -13,11 +13,16 @@ from sms_handover.analysis.numbers import angle_between
 from sms_handover.control.nmpc import NMPC
 from sms_handover.control.pid import PID
 from sms_handover.errors import UnstableLoopError
+from sms_handover.model.known_payload import KnownPayload
 from sms_handover.model.poses import se3_of
+from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.run_data import RunData
+from sms_handover.simulation.check import check_scenario
+from sms_handover.simulation.feasibility import check_feasibility
 from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.recorder import RunRecorder
 from sms_handover.simulation.scenario import Scenario, load_scenario
+from sms_handover.simulation.wiring import gains_by_phase
 from sms_handover.types import GraspStatus
 from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
 
@@ -32,6 +37,7 @@ SIZES = {
     "12U": (24.0, (0.226, 0.366, 0.226)),
 }
 FIRST = "colliding"  # the geometry that an earlier prototype was measured in, a 3U at every mass
+_COMMON = {"common.dynamics": "compiled", "common.on_touch": "report"}  # quick; touches are found afterwards
 _FIRST_CASES = (
     *((mass, belief, NMPC.name) for belief in ("known", "unknown") for mass in (1.0, 4.0, 12.0)),
     *((12.0, belief, NMPC.name) for belief in ("half of it", "twice of it")),
@@ -54,13 +60,27 @@ class Case:
 class Outcome:
     """What came of a run: in words, the distance of each grasp in mm, and its largest figures.
 
-    ``turn`` deg is the farthest that the base was from its first attitude, ``peak`` N m the largest torque.
+    ``turn`` deg is the farthest that the base was from its first attitude, ``peak`` N m the largest torque
+    from the capture on.
     """
 
     words: str
     distances: Sequence[float] = ()
     turn: float = 0.0
     peak: float = 0.0
+
+
+@dataclass(frozen=True)
+class Load:
+    """What a mass in the hand does: the largest inertia of a joint in kg m^2, and the largest growth of one.
+
+    ``growth`` is the largest eigenvalue k of H*^-1 H*' of the arm, with the deputy in H*'. A law that does
+    not know it has k e'' + A_2 e' + A_1 e = 0 in that direction: errors decay in ``decay`` = 2 k / A_2 s.
+    """
+
+    inertia: float
+    growth: float
+    decay: float
 
 
 def cases() -> list[Case]:
@@ -82,10 +102,8 @@ def scenario_of(case: Case) -> Scenario:
 
     A larger body has its centre farther from the robot, so that the grasp frames are where they were.
     """
-    values: dict[str, object] = {"law": case.law, "deputy.mass": case.mass}
-    if case.scenario == FIRST:  # its grippers enter the deputy, as if there were none
-        values["common.on_touch"] = "report"
-    else:
+    values: dict[str, object] = {"law": case.law, "deputy.mass": case.mass, **_COMMON}
+    if case.scenario != FIRST:
         values.update(placed(case.scenario, SIZES[size_of(case.mass)][1]))
     factor = BELIEFS[case.belief]
     if factor != 1.0:
@@ -96,15 +114,35 @@ def scenario_of(case: Case) -> Scenario:
 def outcome_of(case: Case) -> Outcome:
     """Return what comes of a case; its run ends with the first grasp that misses."""
     scenario = scenario_of(case)
-    try:
-        run = _run(scenario)
-    except UnstableLoopError:
-        return Outcome("rejected as unstable")
+    if case.law == PID.name and case.scenario != FIRST:  # there it runs, as the prototype did; nmpc is stable
+        try:
+            check_scenario(scenario)
+        except UnstableLoopError:
+            return Outcome("rejected as unstable")
+    run = _run(scenario)
     attitude = run.base_pose[:, 3:]
     turn = float(np.max(angle_between(attitude[:1], attitude))) * DEG_PER_RAD
-    peak = float(np.max(np.abs(run.joint_effort)))
+    held = run.tick_ns > run.grasp_events[0].stamp_ns  # before, no mass is in the hand
+    peak = float(np.max(np.abs(run.joint_effort[held]), initial=0.0))
     distances = tuple(event.position_error * MM_PER_M for event in run.grasp_events)
     return Outcome(_words(case, scenario, run), distances, turn, peak)
+
+
+def load_of(mass: float) -> Load:
+    """Return what a mass in the hand of arm A does to its joints, where phase ``carry`` of ``paper`` ends."""
+    scenario = scenario_of(Case("paper", mass, "known", NMPC.name))
+    robot, schedule = scenario.model.robot, scenario.model.schedule
+    _, end, *_ = check_feasibility(robot, schedule, scenario.parameters.ik)
+    payload = KnownPayload(robot, schedule.deputy)
+    payload.hold(schedule.grips[1])
+    q, part = robot.configuration(end.base_in_world, end.joint_position), robot.arm_joints[payload.grip.arm]
+    bare, loaded = (
+        reduced_dynamics(each, q, np.zeros(each.pin.nv)).inertia[part, part]
+        for each in (robot, payload.robot)
+    )
+    ratio = float(np.max(np.linalg.eigvals(np.linalg.solve(bare, loaded)).real))
+    softer = gains_by_phase(schedule, scenario.parameters.controller)[1]
+    return Load(float(np.diag(loaded).max()), ratio, 2.0 * ratio / softer.velocity_gain)
 
 
 def grown(folder: Path, part: Sequence[Case]) -> Mapping[Case, Outcome]:

@@ -76,7 +76,10 @@ nothing. A reliable subscriber that is too slow blocks the loop: for the state a
 the sampled topics.""",
         "## Topics",
         table(("Topic", "Type", "Rate", "Quality of service", "From", "Needed by", "Content"), topics),
-        "The recorder adds `/tf` to the bag, one message each reference period.",
+        """\
+Of `tf` the plant publishes links and deputy, the trajectory its targets. It and `tf_static` may have other
+publishers too; all of it is recorded, and a reader that hangs loses messages but holds nobody up. Of `/clock`
+and `/diagnostics` what the nodes of this graph publish is recorded.""",
         "## Services",
         table(("Service", "Type", "Offered by", "Called by", "Effect"), services),
     ]

@@ -79,6 +79,9 @@ after the impulse, which MuJoCo computes by its own mass matrices and which is c
 event; a release makes it a body of its own again. A deputy without mass, a missed grasp and a release of it
 move nothing, so they need no replay.
 
+**Conditions**: errors of torques, commands that are late or lost and a model that errs are in the recorded
+efforts and in the description of the bag. Wrenches from outside are computed from the state that MuJoCo has.
+
 A replay is open loop. Where neighbouring motions part exponentially, as with a law that does not know what
 the hand carries and throws its wrist about, rounding grows beyond any bound; the two engines then agree up
 to there, which the times in the list show.

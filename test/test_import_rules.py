@@ -59,7 +59,7 @@ ALLOWED: dict[str, set[str]] = {
     "simulation": {"model", "conditions", *MIDDLE, "compiled", "clearance"},
     "bag": {"messages", "model", "simulation"},
     "analysis": {"model", "trajectory", "clearance", "simulation", "bag", "scene"},
-    "engines": {"model", "plant", "simulation", "analysis"},
+    "engines": {"model", "conditions", "plant", "simulation", "analysis"},
     "scene": {"messages", "model", "trajectory", "clearance", "bag"},
     "playback": {"messages", "bag"},
     "export": {"messages", "model", "clearance", "bag"},

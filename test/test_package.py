@@ -40,9 +40,11 @@ KEYS = {
 }
 # Extras that a user installs with pip: rosdep has no key for them.
 BY_PIP_ONLY = {
+    "Basilisk",
     "SALib",
     "casadi",
     "distributed",
+    "mujoco",
     "pandas",
     "playwright",
     "plotly",

@@ -17,18 +17,20 @@ _NOT_ASKED = -1
 
 @dataclass(frozen=True)
 class PhysicsResiduals:
-    """Largest violation of each conservation law in a run.
+    """Largest violation of each conservation law by robot and deputy together in a run.
 
     ``linear_momentum`` kg m/s and ``angular_momentum`` kg m^2/s, the latter about the centre of mass, are the
     largest changes since the start less what wrenches from outside have given; ``energy`` is the largest
-    |change of kinetic energy - work + heat|,
-    relative to ``peak_kinetic_energy`` J, and NaN if nothing moved.
+    |change of kinetic energy - work + heat|, relative to ``peak_kinetic_energy`` J, and NaN if nothing moved.
+    ``external_work`` J was done by wrenches from outside, ``lost`` J has become heat.
     """
 
     linear_momentum: float
     angular_momentum: float
     energy: float
     peak_kinetic_energy: float
+    external_work: float
+    lost: float
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,8 @@ def physics_residuals(run: RunData, phase: PhaseSpan | None = None) -> PhysicsRe
         angular_momentum=largest(lengths(_change(run.angular_momentum - run.angular_impulse)[rows])),
         energy=largest(np.abs(known - known[:1])) / peak if peak > 0.0 else nan,
         peak_kinetic_energy=peak,
+        external_work=_increase(run.external_work[rows]),
+        lost=_increase(run.lost[rows]),
     )
 
 
@@ -65,6 +69,12 @@ def _change(rows: Array) -> Array:
     """Return rows less the first one that is known."""
     known = rows[complete(rows)][:1]
     return rows - known if len(known) else rows
+
+
+def _increase(rows: Array) -> float:
+    """Return how much the last known value is above the first; 0 if none is known."""
+    known = rows[~np.isnan(rows)]
+    return float(known[-1] - known[0]) if known.size else 0.0
 
 
 def ik_outcomes(run: RunData, phase: PhaseSpan | None = None) -> IkOutcomes:

@@ -44,10 +44,12 @@ _BASE = {
     "drift_attitude_rate": "drift of the attitude: change over duration",
 }
 _PHYSICS = {
-    "largest_linear_momentum": "largest norm of the linear momentum, zero in exact arithmetic",
-    "largest_angular_momentum": "largest norm of the angular momentum about the centre of mass, zero too",
-    "energy_residual": "largest difference of kinetic energy and work done, over the largest kinetic energy",
+    "largest_linear_momentum": "largest change of the linear momentum of robot and deputy: rounding",
+    "largest_angular_momentum": "largest change of their angular momentum about the centre of mass, likewise",
+    "energy_residual": "largest |energy gained - work + heat| over the largest kinetic energy",
     "peak_kinetic_energy": "largest kinetic energy",
+    "external_work": "work of wrenches from outside",
+    "energy_lost": "kinetic energy that has become heat, in grips that close and in joints",
     "ik_solves": "inverse kinematics: reference periods with a solve",
     "ik_failures": "inverse kinematics: solves that did not converge",
     "ik_stalled": "inverse kinematics: solves that ended where no step was an improvement",

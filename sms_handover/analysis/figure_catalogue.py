@@ -22,7 +22,7 @@ FIGURES = (
     FigureKind("base", "position and attitude of the base", "6"),
     FigureKind("joint_error", "error of each joint, per arm", "7, 8"),
     FigureKind("torque", "torque of each joint, per arm", "9, 10"),
-    FigureKind("momentum", "momenta and energy balance, which must stay zero"),
+    FigureKind("momentum", "change of momenta and energy balance, which must stay zero"),
     FigureKind("base_path", "path of the base in space"),
     FigureKind("snapshots", "the handover in pictures, per run", "3"),
 )

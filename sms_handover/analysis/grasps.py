@@ -8,7 +8,7 @@ from sms_handover.types import GraspAction, GraspEvent, GraspStatus
 
 
 class Tolerance(Protocol):
-    """Largest pose error and relative speed at which a grasp succeeds: m, rad, m/s."""
+    """Largest pose error and relative twist at which a grasp succeeds: m, rad, m/s, rad/s."""
 
     @property
     def position(self) -> float:
@@ -21,6 +21,10 @@ class Tolerance(Protocol):
     @property
     def speed(self) -> float:
         """Relative speed in m/s."""
+
+    @property
+    def rate(self) -> float:
+        """Relative angular rate in rad/s; infinite where it was not judged."""
 
 
 @dataclass(frozen=True)

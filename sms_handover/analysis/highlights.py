@@ -44,7 +44,7 @@ def highlights(comparison: Comparison) -> Section:
             *(_cost(label, drifts, partial(_fastest, rate=rate)) for label, rate in _OF_BASE),
             _cost("peak joint torque [N m]", runs, lambda run: largest(run.torque.peak)),
             _cost("control effort [(N m)^2 s]", runs, lambda run: float(run.torque.effort.sum())),
-            row("largest linear momentum [kg m/s]", runs, lambda run: run.physics.linear_momentum),
+            row("largest change of linear momentum [kg m/s]", runs, lambda run: run.physics.linear_momentum),
             row("energy residual, largest |dE - W| / max E [-]", runs, lambda run: run.physics.energy),
         ),
     )

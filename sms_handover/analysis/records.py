@@ -139,7 +139,8 @@ _DRIFT = _attributes(
 _PHYSICS = (
     *_attributes("largest_{}", linear_momentum="kg m/s", angular_momentum="kg m^2/s"),
     *_attributes("{}_residual", energy="-"),
-    *_attributes(peak_kinetic_energy="J"),
+    *_attributes(peak_kinetic_energy="J", external_work="J"),
+    *_attributes("energy_{}", lost="J"),
 )
 _LIMITS: tuple[_Column[LimitUse], ...] = (
     ("largest_rate_share", "-", lambda limits: limits.rate.value),

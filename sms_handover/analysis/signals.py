@@ -104,10 +104,26 @@ def angular_momentum(run: RunData) -> Signal:
     return _signal("angular momentum", "kg m^2/s", run.reference_ns, run.angular_momentum, AXES)
 
 
+def linear_momentum_change(run: RunData) -> Signal:
+    """Return P(t) - P(0) in kg m/s less the impulse from outside, in ``world`` axes; zero up to rounding."""
+    own = run.linear_momentum - run.linear_impulse
+    change = own - _first(own)
+    return _signal("change of linear momentum", "kg m/s", run.reference_ns, change, AXES)
+
+
+def angular_momentum_change(run: RunData) -> Signal:
+    """Return L(t) - L(0) in kg m^2/s about the common centre of mass in ``world`` axes, likewise."""
+    own = run.angular_momentum - run.angular_impulse
+    change = own - _first(own)
+    return _signal("change of angular momentum", "kg m^2/s", run.reference_ns, change, AXES)
+
+
 def energy(run: RunData) -> Signal:
-    """Return kinetic energy E, work W of the torques and heat D in J, each reference period."""
-    account = np.column_stack([run.kinetic_energy, run.work, run.lost])
-    return _signal("energy", "J", run.reference_ns, account, ("kinetic energy", "work", "lost"))
+    """Return kinetic energy, work of the torques and heat in J, and work from outside where there is any."""
+    account = {"kinetic energy": run.kinetic_energy, "work": run.work, "lost": run.lost}
+    if np.any(np.nan_to_num(run.external_work)):
+        account["external work"] = run.external_work
+    return _signal("energy", "J", run.reference_ns, np.column_stack(list(account.values())), tuple(account))
 
 
 def energy_residual(run: RunData) -> Signal:
@@ -134,6 +150,8 @@ _OF_ROBOT = (
     base_turn_rate,
     linear_momentum,
     angular_momentum,
+    linear_momentum_change,
+    angular_momentum_change,
     energy,
     energy_residual,
 )

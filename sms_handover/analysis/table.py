@@ -1,9 +1,9 @@
 """Table of a comparison as plain text: metrics, conservation, and the verdicts on the paper's claims."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from math import isnan
+from math import hypot, isinf, isnan
 from textwrap import wrap
 
 from sms_handover.analysis.base_motion import BaseMotion
@@ -12,6 +12,7 @@ from sms_handover.analysis.clearance import TaskTexts
 from sms_handover.analysis.clearance_rows import clearance_sections
 from sms_handover.analysis.comparison import Comparison, compare
 from sms_handover.analysis.completion import command_in_words
+from sms_handover.analysis.conservation import PhysicsResiduals
 from sms_handover.analysis.grasps import Tolerance
 from sms_handover.analysis.joints import F
 from sms_handover.analysis.layout import MISSING, WIDTH, Row, Section, layout, number, row
@@ -98,9 +99,9 @@ def _grasp_rows(runs: Sequence[RunMetrics], tolerance: Tolerance | None) -> tupl
         label = f"{ns_to_seconds(stamp_ns):g} s: {command_in_words(command)}"
         rows.append(Row(label, tuple(event.status.value if event else MISSING for event in events)))
         if command.action is not GraspAction.RELEASE:
-            for what, value, limit in _REACHED:
-                allowed = f", allowed {limit(tolerance):g}" if tolerance else ""
-                rows.append(_cost(f"  {what}{allowed}", events, value))
+            rows += [_cost(f"  {label}", events, value) for label, value in _reached(events, tolerance)]
+            if any(event and any(event.impulse) for event in events):
+                rows += [_cost(f"  {label}", events, value) for label, value in _PASSED_ON]
     return tuple(rows) or (Row("none"),)
 
 
@@ -127,7 +128,27 @@ _REACHED: tuple[tuple[str, Callable[[GraspEvent], float], Callable[[Tolerance], 
         lambda event: event.relative_speed * MM_PER_M,
         lambda most: most.speed * MM_PER_M,
     ),
+    (
+        "relative rate [deg/s]",
+        lambda event: event.relative_rate * DEG_PER_RAD,
+        lambda most: most.rate * DEG_PER_RAD,
+    ),
 )
+_PASSED_ON: tuple[tuple[str, Callable[[GraspEvent], float]], ...] = (  # with a deputy that has mass
+    ("impulse [N s]", lambda event: hypot(*event.impulse[:3])),
+    ("angular impulse [N m s]", lambda event: hypot(*event.impulse[3:])),
+    ("energy lost [J]", lambda event: event.energy_lost),
+)
+
+
+def _reached(
+    events: Sequence[GraspEvent | None], tolerance: Tolerance | None
+) -> Iterator[tuple[str, Callable[[GraspEvent], float]]]:
+    """Yield the errors at a grasp with what is allowed; older versions did not record the rate."""
+    for what, value, limit in _REACHED:
+        if any(event and not isnan(value(event)) for event in events) or what != _REACHED[-1][0]:
+            judged = tolerance and not isinf(limit(tolerance))
+            yield f"{what}, allowed {limit(tolerance):g}" if tolerance and judged else what, value
 
 
 def _phase_section(comparison: Comparison, name: str) -> Section:
@@ -224,16 +245,22 @@ def _peak_and_rms(metrics: RunMetrics, joint: str) -> str:
 
 
 def _conservation_rows(runs: Sequence[RunMetrics]) -> tuple[Row, ...]:
+    physics = [item.physics for item in runs]
     return (
-        row("largest linear momentum [kg m/s]", runs, lambda item: item.physics.linear_momentum),
-        row("largest angular momentum [kg m^2/s]", runs, lambda item: item.physics.angular_momentum),
-        row("largest |dE - W| / max E [-]", runs, lambda item: item.physics.energy),
-        row("peak kinetic energy [J]", runs, lambda item: item.physics.peak_kinetic_energy),
+        row("largest change of linear momentum [kg m/s]", physics, lambda of: of.linear_momentum),
+        row("largest change of angular momentum [kg m^2/s]", physics, lambda of: of.angular_momentum),
+        row("largest |dE - W| / max E [-]", physics, lambda of: of.energy),
+        row("peak kinetic energy [J]", physics, lambda of: of.peak_kinetic_energy),
+        *(row(label, physics, value) for label, value in _ACCOUNT if any(map(value, physics))),
         row("IK solves", runs, lambda item: float(item.ik.solves)),
         _cost("IK solves that failed", runs, lambda item: float(item.ik.failures)),
     )
 
 
+_ACCOUNT: tuple[tuple[str, Callable[[PhysicsResiduals], float]], ...] = (
+    ("work from outside [J]", lambda physics: physics.external_work),
+    ("energy lost [J]", lambda physics: physics.lost),
+)
 _LOOP: tuple[tuple[str, Callable[[LoopTiming], float]], ...] = (
     ("wall time [s]", lambda loop: loop.wall_duration),
     ("real-time factor [-]", lambda loop: loop.real_time_factor),

@@ -4,11 +4,13 @@ import os
 import sys
 from argparse import ArgumentParser
 from collections.abc import Sequence
+from contextlib import ExitStack
 from importlib import import_module
 
 from sms_handover.cli.exit_codes import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_USAGE
 from sms_handover.cli.verbs import PROGRAM, Call, call_of
 from sms_handover.errors import ConfigurationError, SmsHandoverError
+from sms_handover.launcher.node_server import NodeServer
 from sms_handover.ros.process.environment import (
     draw_to_files,
     drop_current_folder,
@@ -18,6 +20,7 @@ from sms_handover.ros.process.environment import (
 from sms_handover.ros.process.shared_memory_check import avoid_full_shared_memory, require_shared_memory
 from sms_handover.terminal.streams import let_go_of_failed_output, make_streams_safe
 
+_HELP = {"-h", "--help"}
 _WITH_ROS = ("run", "bag play", "bag record")  # import it; others say by their options whether they need it
 
 
@@ -54,17 +57,24 @@ def _run(call: Call) -> int:
     """Import the module of one verb and run it; return the exit code."""
     drop_current_folder(sys.path)
     draw_to_files()
-    if call.verb in _WITH_ROS:
-        _prepare_ros(call)
-    module = import_module(call.module)
-    parser = ArgumentParser(prog=f"{PROGRAM} {call.verb}")
-    module.add_parser(parser)
-    options = parser.parse_args(call.arguments)
-    if hasattr(module, "needs_ros") and module.needs_ros(options):
-        _prepare_ros(call)
-    code = int(module.command(options))
-    sys.stdout.flush()
-    return code
+    with ExitStack() as stack:
+        server = None
+        if call.verb in _WITH_ROS:
+            _prepare_ros(call)
+            if call.verb == "run" and not _HELP & set(call.arguments):
+                server = stack.enter_context(NodeServer())  # it imports at the same time as this process
+            _import_ros()
+        module = import_module(call.module)
+        parser = ArgumentParser(prog=f"{PROGRAM} {call.verb}")
+        module.add_parser(parser)
+        parser.set_defaults(node_server=server)
+        options = parser.parse_args(call.arguments)
+        if hasattr(module, "needs_ros") and module.needs_ros(options):
+            _prepare_ros(call)
+            _import_ros()
+        code = int(module.command(options))
+        sys.stdout.flush()
+        return code
 
 
 def _prepare_ros(call: Call) -> None:
@@ -75,6 +85,10 @@ def _prepare_ros(call: Call) -> None:
     for change in (*prepare_environment(private=private), avoid_full_shared_memory()):
         if change:
             print(f"{PROGRAM} {call.verb}: {change}", file=sys.stderr)
+
+
+def _import_ros() -> None:
+    """Import ROS; raises ConfigurationError where it is not installed."""
     try:
         import_module("rclpy")
     except ImportError as error:

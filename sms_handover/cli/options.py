@@ -34,7 +34,7 @@ def add_scenario_options(parser: ArgumentParser) -> None:
         "--controller",
         type=_law,
         metavar="LAW",
-        help="control law: nmpc, pid, or one of another package (default: that of the scenario)",
+        help="control law: nmpc, pid, mpc, or one of another package (default: that of the scenario)",
     )
     group.add_argument(
         "--schedule", type=Path, metavar="FILE", help="task schedule (default: that of the scenario)"

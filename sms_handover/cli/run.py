@@ -20,8 +20,10 @@ from sms_handover.graph.topics import CONTROLLER, NODES, RECORDER
 from sms_handover.launcher.domain import reservation
 from sms_handover.launcher.launcher import LaunchPlan, launch
 from sms_handover.launcher.run_folder import BAG, LOGS, locked_logs
+from sms_handover.launcher.wake_ups import measure_wake_ups
 from sms_handover.ros.launching.composition import listed, placed
 from sms_handover.ros.process.network_scope import network_scope_to
+from sms_handover.ros.process.realtime import exact_timers
 from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.parameters import LOCKSTEP, REALTIME
 from sms_handover.simulation.scenario import Scenario
@@ -127,6 +129,7 @@ def command(options: Namespace) -> int:
             nodes=here,
             elsewhere=elsewhere,
             scope=scope,
+            server=options.node_server,
         )
         where = options.output or output
         print(f"running on ROS domain {held.domain}, {scope}; output in {where}", flush=True)
@@ -134,6 +137,8 @@ def command(options: Namespace) -> int:
             print(f"this host runs {', '.join(here)}; waiting for {', '.join(elsewhere)}", flush=True)
         if options.without_controller:
             print(_how_to_join(held.domain), flush=True)
+        if options.real_time:
+            print(_forecast(scenario, composed=options.compose), flush=True)
         outcome = launch(plan)
     progress = outcome.progress
     print(outcome.recorder_said, end="")
@@ -146,6 +151,14 @@ def command(options: Namespace) -> int:
         print("messages are missing in the bag, see the table above", file=sys.stderr)
         return EXIT_LOSS
     return task_code(progress.events, progress.run_events, failed=progress.failed)
+
+
+def _forecast(scenario: Scenario, *, composed: bool) -> str:
+    """Return in one line how well this machine will keep real time."""
+    exact_timers()
+    common = scenario.parameters.common
+    wake_ups = measure_wake_ups(common.tick)
+    return wake_ups.forecast(common.tick, common.reference_period, composed=composed)
 
 
 def _own_controller(options: Namespace) -> tuple[str, ...]:

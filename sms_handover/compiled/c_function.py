@@ -2,6 +2,7 @@
 
 import ctypes
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +69,12 @@ class NativeFunction:
 def _loaded(library: Path, name: str) -> Any:
     """Return a function of a library; raises ConfigurationError if there is none."""
     try:
-        return ctypes.PyDLL(str(library))[name]
+        return _opened(library)[name]
     except (OSError, AttributeError) as error:
         raise ConfigurationError(f"cannot load {library}: {error}; remove the file") from error
+
+
+@cache
+def _opened(library: Path) -> ctypes.PyDLL:
+    """Return an open library: that takes a millisecond, and a payload that changes asks a dozen times."""
+    return ctypes.PyDLL(str(library))

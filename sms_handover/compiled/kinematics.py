@@ -4,6 +4,7 @@ import ctypes
 from collections.abc import Iterable
 
 import numpy as np
+import pinocchio as pin
 
 from sms_handover.compiled.c_function import CFunction, NativeFunction
 from sms_handover.compiled.example import example_of, require_equal
@@ -67,7 +68,7 @@ class CompiledKinematics:
 
     def carry(self, deputy: MasslessDeputy, q: Array, v: Array) -> None:
         """Move a held deputy with its tool."""
-        self._in_tool[:] = numbers_of(deputy)
+        self._in_tool[:] = numbers_in(deputy.in_tool)
         self._move(q, v, self._arms.index(deputy.holder))
         deputy.carry(*_motion(self._deputy.copy()))
 
@@ -79,9 +80,9 @@ class CompiledKinematics:
         self._motion(at_q, at_v, holder, in_tool, rows, twists, deputy, deputy + POSE_ROW * 8)
 
 
-def numbers_of(deputy: MasslessDeputy) -> Array:
-    """Return the pose of a held deputy in the tool: the rows of its rotation, its origin (12,)."""
-    return np.concatenate([deputy.in_tool.rotation.ravel(), deputy.in_tool.translation])
+def numbers_in(pose: pin.SE3) -> Array:
+    """Return a pose as the functions in C have it: the rows of its rotation, its origin (12,)."""
+    return np.concatenate([pose.rotation.ravel(), pose.translation])
 
 
 def quantities_of(sums: Array) -> ConservedQuantities:

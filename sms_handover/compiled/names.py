@@ -24,4 +24,4 @@ def step_name(scheme: str) -> str:
 TOOL_ROWS, MOTION_ROWS, FIND_JOINTS = "sms_tool_rows", "sms_motion_rows", "sms_find_joints"
 PERIODS, ON_PATH, RESOLVE_RATES = "sms_periods", "sms_on_path", "sms_resolve_rates"
 GENERALIZED_JACOBIAN, CARRIED = "sms_generalized_jacobian", "sms_carried"
-WITHOUT_DRIFT = "sms_without_drift"
+WITHOUT_DRIFT, PLACED = "sms_without_drift", "sms_placed"

@@ -13,7 +13,7 @@ from sms_handover.compiled.kinematics import (
     POSE,
     POSE_ROW,
     TWIST,
-    numbers_of,
+    numbers_in,
     quantities_of,
     sums_of,
 )
@@ -31,7 +31,7 @@ from sms_handover.units import ns_to_seconds
 
 Failures = tuple[int, int]
 Room = Callable[[int], Array]  # where the rows (13 + 4 n,) of so many ticks are to be written
-_HOLD, _JOINTS, _TOOL = range(3)  # how an arm is led, as in native/periods.c
+_HOLD, _JOINTS, _TOOL, _ON_DEPUTY = range(4)  # how an arm is led, as in native/periods.c
 
 
 class CompiledPeriods:
@@ -87,16 +87,18 @@ class CompiledPeriods:
         """Say what holds for all of the periods."""
         quiet = self._quiet
         for index, arm in enumerate(self._arms):
-            quiet["kind"][index] = (
-                _TOOL if arm in course.goals else _JOINTS if arm in course.by_joints else _HOLD
-            )
-            if arm in course.goals:
+            quiet["kind"][index] = _JOINTS if arm in course.by_joints else _HOLD
+            if arm in course.goals or arm in course.on_deputy:
                 quiet["starts"][index] = pose_row(course.starts[arm])
-                quiet["goals"][index] = pose_row(course.goals[arm])
+            if arm in course.goals:
+                quiet["kind"][index], quiet["goals"][index] = _TOOL, pose_row(course.goals[arm])
+            elif arm in course.on_deputy:
+                quiet["kind"][index] = _ON_DEPUTY
+                quiet["in_deputy"][index] = numbers_in(course.on_deputy[arm])
         quiet["joints"], quiet["ends"], quiet["rates"] = course.joints, course.ends, before.velocity
         quiet["damping"], quiet["has_momentum"] = course.damping, course.has_momentum
         quiet["holder"] = self._arms.index(deputy.holder) if deputy.holder else -1
-        quiet["in_tool"] = numbers_of(deputy)
+        quiet["in_tool"] = numbers_in(deputy.in_tool)
         quiet["deputy"] = pose_row(deputy.state.deputy_in_world)
         quiet["deputy_twist"] = deputy.state.twist_deputy_in_world.row
         quiet["failures"], quiet["most_failures"] = failed
@@ -128,7 +130,7 @@ class CompiledPeriods:
 def _quiet(joints: int, arms: int) -> Any:
     """Return the fields of ``quiet_t`` in native/periods.c."""
     reals: dict[str, Any] = {"starts": (arms, POSE_ROW), "goals": (arms, POSE_ROW)}
-    reals |= {"joints": joints, "ends": joints, "rates": joints}
+    reals |= {"in_deputy": (arms, POSE), "joints": joints, "ends": joints, "rates": joints}
     reals |= {"in_tool": POSE, "deputy": POSE_ROW, "deputy_twist": TWIST, "damping": (), "period_s": ()}
     counts: dict[str, Any] = {"kind": arms, "holder": (), "failures": (), "most_failures": ()}
     counts |= {"has_momentum": ()}

@@ -4,12 +4,14 @@ import ctypes
 from collections.abc import Iterable, Mapping
 
 import numpy as np
+import pinocchio as pin
 
 from sms_handover.compiled.c_function import NativeFunction
-from sms_handover.compiled.kinematics import POSE_ROW, TWIST, CompiledKinematics
+from sms_handover.compiled.kinematics import POSE_ROW, TWIST, CompiledKinematics, numbers_in
 from sms_handover.compiled.library import dynamics_library
-from sms_handover.compiled.names import ON_PATH, RESOLVE_RATES, WITHOUT_DRIFT
+from sms_handover.compiled.names import ON_PATH, PLACED, RESOLVE_RATES, WITHOUT_DRIFT
 from sms_handover.compiled.tree import body_tree, inertial_parameters
+from sms_handover.model.poses import pose_row
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.trajectory.time_law import Progress
 from sms_handover.types import Array, Pose, Twist, frozen
@@ -27,6 +29,7 @@ class CompiledToolMotion:
         count, library = len(robot.arms), dynamics_library(robot)
         self._ends, self._progress = np.zeros((2, POSE_ROW)), np.zeros(2)
         self._row, self._twist = np.zeros(POSE_ROW), np.zeros(TWIST)
+        self._placed = NativeFunction(library, PLACED, [ctypes.c_void_p] * 3)
         self._on_path = NativeFunction(library, ON_PATH, [ctypes.c_void_p] * 5)
         self._q, self._parameters = np.zeros(BASE_NQ + robot.n_joints), inertial_parameters(body_tree(robot))
         self._twists, self._led = np.zeros((count, TWIST)), np.zeros(count, dtype=np.int64)
@@ -37,6 +40,13 @@ class CompiledToolMotion:
     def tools_at(self, q: Array, arms: Iterable[str] | None = None) -> Mapping[str, Pose]:
         """Return the poses of the tools of some arms in ``world``, by default of all."""
         return self._kinematics.tools_at(q, arms)
+
+    def placed(self, body_in_world: Pose, frame: pin.SE3, in_frame: pin.SE3) -> Pose:
+        """Return the pose in ``world`` of what is fixed to a body, by its pose in a frame of it."""
+        given = (pose_row(body_in_world), numbers_in(frame * in_frame), self._row)
+        self._placed(*(array.ctypes.data for array in given))
+        row = frozen(self._row.copy())
+        return Pose(row[:3], row[3:])
 
     def on_path(self, start: Pose, goal: Pose, progress: Progress) -> tuple[Pose, Twist]:
         """Return pose and twist on the way from pose to pose."""

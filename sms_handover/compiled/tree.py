@@ -72,6 +72,7 @@ def body_tree(robot: RobotModel) -> tuple[Body, ...]:
     return tuple(_body(model, index, along) for index in range(_BASE, model.njoints))
 
 
+@lru_cache(maxsize=8)
 def tools_of(robot: RobotModel) -> tuple[Tool, ...]:
     """Return the tools in the order of ``robot.arms``."""
     return tuple(_tool(robot, arm) for arm in robot.arms)

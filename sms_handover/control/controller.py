@@ -118,8 +118,8 @@ class JointController(Generic[G]):
         """Go back to a former :attr:`state`."""
         self._entry = state.entry
         self._law.use(self._gains[state.entry[0]])
-        self._law.restore(state.memory)
         self._track.restore(state.track)
         self._news = state.news
         if self._payload.has_mass:
             self._hold(state.grip)
+        self._law.restore(state.memory)

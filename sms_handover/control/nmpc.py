@@ -8,6 +8,7 @@ import numpy as np
 from sms_handover.configuration.parameters import parameter
 from sms_handover.control.computed_torque import ComputedTorque, TrackingEfforts
 from sms_handover.control.controller import JointController
+from sms_handover.control.disturbance_observer import memory_of, restore_memory
 from sms_handover.control.law import JointLaw, Law, LawSetup, LinearFeedback, Need
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import Array
@@ -58,6 +59,20 @@ class NmpcLaw(JointLaw[NmpcGains]):
     def carry(self, robot: RobotModel) -> None:
         """Go on with the inverse dynamics of a robot that carries something else."""
         self._efforts = self._make(robot)
+
+    @property
+    def efforts(self) -> TrackingEfforts:
+        """The computed torque of the robot."""
+        return self._efforts
+
+    @property
+    def memory(self) -> Array:
+        """The memory of the computed torque, empty unless disturbances are observed."""
+        return memory_of(self._efforts)
+
+    def restore(self, memory: Array) -> None:
+        """Go back to a former :attr:`memory`."""
+        restore_memory(self._efforts, memory)
 
     @property
     def feedback(self) -> Array:

@@ -20,6 +20,13 @@ class ControllerParameters(MpcGains, PidGains, NmpcGains):
     law: str = parameter(
         f"control law: {', '.join(SHIPPED)}, or one of another package (entry points {GROUP})"
     )
+    disturbance_bandwidth: float = parameter(
+        "laws with a model of the dynamics: bandwidth of the observer of disturbances, whose estimate is "
+        "taken off the efforts; 0: none",
+        unit="1/s",
+        minimum=0.0,
+        maximum=1e4,
+    )
     reference_hold: float = parameter(
         "real time: how long the desired motion is extrapolated when the next reference is overdue, before "
         "it stops",

@@ -111,13 +111,14 @@ class NearPair:
     """Two bodies between which distance counts, and what carries them: numbers of Pinocchio's joints.
 
     The deputy has joint 0, which never moves. ``contact`` is the arm whose gripper the first or the second
-    body is where the other is the deputy, '' for any other two.
+    body is where the other is the deputy, '' for any other two; ``one_arm`` tells whether one has both.
     """
 
     names: tuple[str, str]
     joints: tuple[int, int]
     contact: str
     has_deputy: bool
+    one_arm: bool
 
 
 class Distances(Protocol):

@@ -18,6 +18,8 @@ from sms_handover.types import BASE_NQ, BASE_NV, Array
 _LACKS = {
     Effect.ROTOR_INERTIA: "its spinning bodies have no rotors",
     Effect.JOINT_STOPS: "its spinning bodies have no stops",
+    Effect.WRENCHES: "it holds a torque in axes of the body, not of the world, over a tick",
+    Effect.FRICTION: "its spinning bodies have springs and dampers only",
     Effect.DEPUTY_MASS: "it gives no mass matrix, by which the impulse of a grasp would follow",
 }
 _TASK = "task"

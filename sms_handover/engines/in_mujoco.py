@@ -8,10 +8,14 @@ import numpy as np
 from sms_handover.engines.mujoco_deputy import MujocoScene
 from sms_handover.engines.protocol import Effect, Motion, Replay
 from sms_handover.frames import tool_frame
+from sms_handover.plant.external_wrenches import sum_over
 from sms_handover.types import Array
 from sms_handover.units import ns_to_seconds
 
-_LACKS = {Effect.JOINT_STOPS: "its joint limits are springs"}
+_LACKS = {
+    Effect.JOINT_STOPS: "its joint limits are springs",
+    Effect.FRICTION: "its dry friction is a soft constraint, without stiction",
+}
 
 
 class InMujoco:
@@ -34,12 +38,16 @@ class InMujoco:
         scene.robot.place(_with_joints(replay.start_q, order), _with_joints(replay.start_v, order))
         efforts, tick_s = replay.efforts[:, order], ns_to_seconds(replay.tick_ns)
         holds, samples = list(replay.holds), set(replay.samples.tolist())
-        taken, impulses, tick = _Samples(replay, order), list[Array](), 0
+        taken, impulses, start = _Samples(replay, order), list[Array](), 0
         for stop in sorted({*samples, *(hold.tick for hold in holds)}):
-            for effort in efforts[tick:stop]:
-                scene.robot.drive(effort)
+            for tick in range(start, stop):
+                scene.robot.drive(efforts[tick])
+                if replay.wrenches:
+                    scene.robot.evaluate()
+                    body = scene.robot.as_body
+                    scene.robot.push(sum_over(replay.wrenches, tick * tick_s, tick_s, body))
                 scene.advance(tick_s)
-            tick = stop
+            start = stop
             if stop in samples:
                 taken.add(scene)
             while holds and holds[0].tick == stop:  # after the state of this tick, before its integration

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
+from sms_handover.conditions.wrench import BodyAtInstant, Wrench
 from sms_handover.model.assembly import RobotDescription
 from sms_handover.model.mjcf import Payload, to_mjcf
 from sms_handover.model.urdf import to_urdf
@@ -46,6 +47,19 @@ class MujocoRobot:
     def drive(self, effort: Array) -> None:
         """Hold joint efforts (n,) from now on."""
         self.data.qfrc_applied[6:] = effort
+
+    def push(self, wrench: Wrench) -> None:
+        """Hold a wrench on the base, about its origin and in ``world`` axes, from now on."""
+        self.data.qfrc_applied[:3] = wrench.force  # at the origin
+        self.data.xfrc_applied[_ROOT, 3:] = wrench.torque
+
+    @property
+    def as_body(self) -> BodyAtInstant:
+        """All of it as one body where it was last evaluated."""
+        xx, yy, zz, xy, xz, yz = self.data.crb[_ROOT, :6]  # about the centre of mass, in world axes
+        inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        at, axes = np.array(self.data.xpos[_ROOT]), np.array(self.data.xmat[_ROOT]).reshape(3, 3)
+        return BodyAtInstant(at, axes, self.mass, self.centre_of_mass, inertia)
 
     def advance(self, step: float, count: int) -> None:
         """Integrate ``count`` steps of ``step`` s with MuJoCo's RK4."""

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from sms_handover.conditions.wrench import WrenchModel
 from sms_handover.model.parts import Inertia
 from sms_handover.types import Array, Pose, Twist, freeze
 
@@ -19,6 +20,8 @@ class Effect(Enum):
     ROTOR_INERTIA = "rotor inertia"
     JOINT_STOPS = "joint stops"
     DEPUTY_MASS = "a deputy with mass"
+    WRENCHES = "wrenches from outside"
+    FRICTION = "joint friction"
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +50,9 @@ class Replay:
     was held over tick k of ``tick_ns``, joints in the order of ``joint_names``. ``samples`` (K,) are the
     numbers of the states to compare, in rising order; 0 is the start, N the last. ``deputy`` is None without
     mass; it changes hands by ``holds``, in order of time, each time with the impulse that leaves no relative
-    twist between hand and body. ``effects`` are those that an engine has to know beyond efforts and links.
+    twist between hand and body. ``wrenches`` act on the base, each held in ``world`` axes over a tick; what
+    they depend on is the state that the engine has. ``effects`` are those that an engine has to know beyond
+    efforts and links.
     """
 
     urdf: str
@@ -62,6 +67,7 @@ class Replay:
     effects: frozenset[Effect]
     deputy: FreeBody | None = None
     holds: tuple[Hold, ...] = ()
+    wrenches: tuple[WrenchModel, ...] = ()
 
     def __post_init__(self) -> None:
         freeze(self, "start_q", "start_v", "efforts")

@@ -33,6 +33,7 @@ def replay_of(run: RunData, scenario: Scenario) -> Replay:
         effects=frozenset(_effects(scenario)),
         deputy=_deputy(scenario),
         holds=_holds(run, tick_ns),
+        wrenches=tuple(scenario.truth.conditions.wrenches.values()),
     )
 
 
@@ -92,4 +93,9 @@ def _effects(scenario: Scenario) -> list[Effect]:
         found.append(Effect.JOINT_STOPS)
     if scenario.truth.schedule.deputy.mass:
         found.append(Effect.DEPUTY_MASS)
+    conditions = scenario.truth.conditions
+    if conditions.wrenches:
+        found.append(Effect.WRENCHES)
+    if conditions.friction is not None:
+        found.append(Effect.FRICTION)
     return found

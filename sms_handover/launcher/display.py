@@ -1,7 +1,7 @@
 """Display of a run: simulated time, phase, speed and the distances of the tools from their targets."""
 
 from collections.abc import Mapping
-from math import isnan
+from math import hypot, isnan
 from time import monotonic
 
 from sms_handover.graph.events import RunEvent
@@ -66,4 +66,6 @@ def grasp_line(event: GraspEvent) -> str:
             f", {event.position_error * MM_PER_M:.3f} mm, {event.angle_error * DEG_PER_RAD:.3f} deg, "
             f"{event.relative_speed * MM_PER_M:.3f} mm/s off"
         )
+    if any(event.impulse):
+        text += f", impulse {hypot(*event.impulse[:3]):.3g} N s, {event.energy_lost:.3g} J lost"
     return f"{text} ({event.detail})" if event.detail else text

@@ -21,6 +21,7 @@ from sms_handover.launcher.display import Display
 from sms_handover.launcher.interrupts import Interrupts, let_go_of_closed_output
 from sms_handover.launcher.lifecycle_driver import LifecycleDriver
 from sms_handover.launcher.monitor import Progress, RunMonitor
+from sms_handover.launcher.node_server import NodeServer
 from sms_handover.launcher.processes import Death, NodeProcesses
 from sms_handover.launcher.shared_memory import SharedMemory
 from sms_handover.launcher.timeouts import ActiveTime, SuspensionMonitor, WaitNotice
@@ -33,6 +34,7 @@ from sms_handover.units import ns_to_seconds
 
 _LOG_FOLDER = "ROS_LOG_DIR"  # environment variable that ROS reads
 _POLL_S = 0.1  # [s] longest wait for a message before the processes are checked again
+_START_POLL_S = 0.02  # [s] likewise, as long as nodes appear, which is no message
 _START_TIMEOUT_S = 60.0  # [s] of wall time until the run must have begun
 _HOSTS_TIMEOUT_S = 600.0  # [s] of wall time likewise, where somebody has to start nodes on other hosts
 _BEGUN_TIMEOUT_S = 10.0  # [s] of wall time for the message that the run has begun, when it is interrupted
@@ -51,7 +53,7 @@ class LaunchPlan:
     ``nodes`` are started here, ``elsewhere`` on other hosts by somebody else; ``bag`` is where the
     recorder writes, None if it is not among ``nodes``. ``controller`` is the command line of an external
     controller; empty if the user starts it, or if it is ours. Every process keeps the ``inherited`` file
-    descriptors open, so that what they lock is free after the last process.
+    descriptors open, so that what they lock is free after the last process. A ``server`` forks our nodes.
     """
 
     scenario: Scenario
@@ -65,6 +67,7 @@ class LaunchPlan:
     nodes: tuple[str, ...] = NODES
     elsewhere: tuple[str, ...] = ()
     scope: NetworkScope = THIS_MACHINE
+    server: NodeServer | None = None
 
     @property
     def external(self) -> frozenset[str]:
@@ -104,7 +107,7 @@ def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outc
         stack.callback(inputs.destroy)
         monitor = RunMonitor(node, plan.scenario.model.robot.arms, inputs)
         processes = stack.enter_context(
-            NodeProcesses(plan.log_folder, graph_environment(plan), plan.inherited)
+            NodeProcesses(plan.log_folder, graph_environment(plan), plan.inherited, plan.server)
         )
         for name, arguments in arguments_of(plan).items():
             if name not in plan.external:
@@ -205,7 +208,7 @@ class _Run:
         notice = WaitNotice()
         while self.monitor.progress.state == RunState.WAITING:
             self.driver.poll()
-            self._poll()
+            self._poll(_START_POLL_S)
             self.memory.note((os.getpid(), *self.processes.ids.values()))
             if self.interrupts.asked:
                 if self.interrupts.at_once or not self.driver.active:
@@ -293,9 +296,9 @@ class _Run:
             self.executor.spin_once(timeout_sec=_SHUTDOWN_POLL_S)
             self.time.update()
 
-    def _poll(self) -> None:
+    def _poll(self, longest_s: float = _POLL_S) -> None:
         """Handle what has arrived, and raise GraphError if a node has died."""
-        self.executor.spin_once(timeout_sec=_POLL_S)
+        self.executor.spin_once(timeout_sec=longest_s)
         self.monitor.poll()
         self.time.update()
         let_go_of_closed_output()

@@ -32,6 +32,7 @@ from sms_handover.messages.values import header_ns, task_phase
 from sms_handover.ros.codecs.events import read_grasp_event, read_run_event
 from sms_handover.ros.codecs.loop_messages import decoded
 from sms_handover.ros.message_types import message_class
+from sms_handover.ros.node.diagnostics import node_of
 from sms_handover.ros.node.message_filter import Decode
 from sms_handover.ros.qos import LATCHED
 from sms_handover.ros.transport.inputs import Inputs
@@ -210,10 +211,11 @@ class RunMonitor:
 
     def _on_diagnostics(self, message: Any) -> None:
         for status in message.status:
+            node = node_of(status.name)
             if status.level == DiagnosticStatus.OK:
-                self.progress.waiting.pop(status.name, None)
+                self.progress.waiting.pop(node, None)
             else:
-                self.progress.waiting[status.name] = status.message
+                self.progress.waiting[node] = status.message
 
 
 def _reader(kind: Any) -> Decode[Any]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sms_handover.launcher.node_log import NodeLog
+from sms_handover.launcher.node_server import NODE_MODULES, ForkedProcess, NodeServer
 from sms_handover.launcher.process_sessions import GRACE_S, SessionGuard, end_sessions
 from sms_handover.ros.process.launcher_process import launcher_environment
 
@@ -45,12 +46,19 @@ class NodeProcesses:
     """
 
     def __init__(
-        self, log_folder: Path, environment: Mapping[str, str], inherited: Sequence[int] = ()
+        self,
+        log_folder: Path,
+        environment: Mapping[str, str],
+        inherited: Sequence[int] = (),
+        server: NodeServer | None = None,
     ) -> None:
-        """Start nothing yet; every process will keep the ``inherited`` file descriptors open."""
-        self._folder, self._inherited = log_folder, inherited
+        """Start nothing yet; every process will keep the ``inherited`` file descriptors open.
+
+        A ``server`` forks the nodes that are ours, which is quicker than to start each by itself.
+        """
+        self._folder, self._inherited, self._server = log_folder, inherited, server
         self._environment = {**os.environ, **environment, **launcher_environment()}
-        self._processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._processes: dict[str, subprocess.Popen[bytes] | ForkedProcess] = {}
         self._logs: dict[str, NodeLog] = {}
         self._guard: SessionGuard | None = None
 
@@ -72,10 +80,15 @@ class NodeProcesses:
         """
         if program and self._guard is None:
             self._guard = SessionGuard(self._inherited)
-        command = program or as_program(f"sms_handover.nodes.{node}")
         log = self._logs[node] = NodeLog(self._folder / f"{node}.log")
+        if not program and self._server is not None:
+            descriptors = (log.stream.fileno(), *self._inherited)
+            forked = self._server.start(node, arguments, self._environment, descriptors)
+            if forked is not None:
+                self._processes[node] = forked
+                return
         self._processes[node] = subprocess.Popen(
-            (*command, *arguments),
+            (*(program or as_program(f"{NODE_MODULES}.{node}")), *arguments),
             stdin=subprocess.DEVNULL,
             stdout=log.stream,
             stderr=subprocess.STDOUT,

@@ -284,9 +284,10 @@ class RecorderNode(GraphNode[RecorderParameters]):
     def _discover_topics(self) -> None:
         """Record topics beyond the graph, with the quality of service that their publishers offer."""
         found = self.get_topic_names_and_types()
-        others = other_graphs(found, self.resolve_topic_name(RUN_STATE))
+        own = self.resolve_topic_name(RUN_STATE)
+        others = of_other_graphs(found, own, self.endpoints.topics)
         for name, type_names in found:
-            if name in self._topics or name.startswith(others):
+            if name in self._topics or name in others:
                 continue
             publishers = self.get_publishers_info_by_topic(name)
             if not publishers:
@@ -307,13 +308,23 @@ class RecorderNode(GraphNode[RecorderParameters]):
         self._recording.receive(name, data, time_ns())
 
 
-def other_graphs(found: Iterable[tuple[str, Sequence[str]]], own: str) -> tuple[str, ...]:
-    """Return how the topics of other graphs begin, known by their run state, which ours has as ``own``.
+def of_other_graphs(
+    found: Iterable[tuple[str, Sequence[str]]], own: str, topics: Iterable[Topic]
+) -> frozenset[str]:
+    """Return which of the topics found belong to another graph: they go into a bag of its own.
 
-    ``found`` are topics with their types. They go into bags of their own.
+    ``found`` are topics with their types. Another graph is known by its run state, which ours has as ``own``;
+    all in its namespace is its, of one without a namespace the ``topics`` that every graph has.
     """
-    states = (name for name, types in found if RUN_STATE_TYPE in types and name != own)
-    return tuple(name.removesuffix(RUN_STATE) for name in states if name not in (own, f"/{RUN_STATE}"))
+    types = dict(found)
+    states = {name for name, kinds in types.items() if RUN_STATE_TYPE in kinds} - {own}
+    begins = tuple(
+        {name.removesuffix(RUN_STATE) for name in states if name.endswith(f"/{RUN_STATE}")} - {"/"}
+    )
+    left = {name for name in types if name.startswith(begins)}
+    if f"/{RUN_STATE}" in states:
+        left |= {f"/{topic.name}" for topic in topics if not topic.is_global}
+    return frozenset(left)
 
 
 def main(args: Sequence[str] | None = None) -> int:

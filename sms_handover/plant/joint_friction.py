@@ -47,7 +47,8 @@ class JointFriction:
         if at.size:
             matrix = solver.solve(np.eye(rate.size)).reshape(inertia.shape)
             rests = np.abs(rate[at]) < _AT_REST
-            dry[at] = _dry(matrix[np.ix_(at, at)], end[at], self._bound(rate)[at], rests)
+            part = matrix if at.size == rate.size else matrix[np.ix_(at, at)]
+            dry[at] = _dry(part, end[at], self._bound(rate)[at], rests)
             end = end + product(matrix, dry)
         return frozen(dry - values.viscous * end)
 

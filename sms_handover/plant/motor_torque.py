@@ -21,13 +21,12 @@ class MotorTorque:
 
     def __init__(self, errors: TorqueErrors, h: float, streams: RandomStreams) -> None:
         self._factor, self._offset = 1.0 + errors.gain, errors.offset
-        self._step = errors.step
         self._stepped = errors.step > 0.0
+        self._step = np.where(self._stepped, errors.step, 1.0)
         self._sigma = errors.noise_density / sqrt(h)  # N m
         self._noise = streams.noise(_NAME, errors.gain.size)
 
     def given(self, tick: int, command: Array) -> Array:
         """Return the torques (n,) N m in a tick under a command (n,) N m."""
-        step = np.where(self._stepped, self._step, 1.0)
-        rounded = np.where(self._stepped, step * np.round(command / step), command)
+        rounded = np.where(self._stepped, self._step * np.round(command / self._step), command)
         return frozen(self._factor * rounded + self._offset + self._sigma * self._noise.normal(tick))

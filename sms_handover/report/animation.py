@@ -7,7 +7,7 @@ from sms_handover.analysis.clearance import RunClearance
 from sms_handover.errors import BagError, SmsHandoverError
 from sms_handover.report.recorded_run import RecordedRun
 from sms_handover.scene.page import animation_html
-from sms_handover.scene.recorded_scene import deputy_size_in
+from sms_handover.scene.recorded_scene import deputy_in, deputy_size_in
 from sms_handover.scene.scene import FRAME_RATE, Scene, make_scene
 
 
@@ -44,4 +44,4 @@ def recorded_scene(run: RecordedRun, clearance: RunClearance | None, frame_rate:
         raise BagError("its bag carries no robot description")
     series = clearance.series if clearance else None
     worst = series.worst_pair if series else None
-    return make_scene(run.data, urdf, deputy_size_in(run.info), frame_rate, worst)
+    return make_scene(run.data, urdf, deputy_size_in(run.info), frame_rate, worst, deputy_in(run.info))

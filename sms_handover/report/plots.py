@@ -90,11 +90,17 @@ _BASE = (
     _Kind("base_speed", "Speed of the base", MM_PER_M, "mm/s", magnitude=True),
     _Kind("base_turn_rate", "Turn rate of the base", DEG_PER_RAD, "deg/s", magnitude=True),
 )
-_PHYSICS = (
+_MOMENTA = (
     _Kind("linear_momentum", "Linear momentum", 1.0, "kg m/s", magnitude=True),
     _Kind("angular_momentum", "Angular momentum about the centre of mass", 1.0, "kg m²/s", magnitude=True),
-    _Kind("energy", "Kinetic energy and work of the torques", 1.0, "J"),
-    _Kind("energy_residual", "Energy gained beyond the work done", 1.0, "J"),
+)
+_CHANGES = (  # by nothing from outside, other than the momenta themselves where a run begins with some
+    _Kind("linear_momentum_change", "Change of the linear momentum", 1.0, "kg m/s", magnitude=True),
+    _Kind("angular_momentum_change", "Change of the angular momentum", 1.0, "kg m²/s", magnitude=True),
+)
+_ENERGY = (
+    _Kind("energy", "Kinetic energy, work of the torques, and heat", 1.0, "J"),
+    _Kind("energy_residual", "Energy gained beyond the work done, less heat", 1.0, "J"),
 )
 
 
@@ -103,6 +109,7 @@ def plot_groups(runs: Sequence[RunData]) -> tuple[PlotGroup, ...]:
     found = [signals.signals_of(run) for run in runs]
     arms = tuple(dict.fromkeys(arm for run in runs for arm in run.arms))
     cuts = [cuts_of(run) for run in runs]
+    with_changes = any(_departs(of_run, kind.key) for of_run in found for kind in _MOMENTA)
 
     def plots(kinds: Sequence[_Kind], names: Sequence[str]) -> tuple[Plot, ...]:
         return tuple(_plot(kind, name, found, cuts) for kind in kinds for name in names)
@@ -125,11 +132,18 @@ def plot_groups(runs: Sequence[RunData]) -> tuple[PlotGroup, ...]:
         ),
         PlotGroup(
             "Conservation",
-            "No external force acts on the robot, so the momenta stay zero and the energy equals the work of "
-            "the joints; the residuals are rounding errors.",
-            plots(_PHYSICS, [""]),
+            "Without forces from outside the momenta of robot and deputy together stay what they were at the "
+            "start, also as the deputy changes hands, and kinetic energy is work less heat; the residuals "
+            "are rounding errors.",
+            plots((*_MOMENTA, *(_CHANGES if with_changes else ()), *_ENERGY), [""]),
         ),
     )
+
+
+def _departs(signals_of_run: Mapping[str, Signal], momentum: str) -> bool:
+    """Return whether a momentum is not its change: it begins with some, or is given some from outside."""
+    now, change = (signals_of_run[key].values for key in (momentum, f"{momentum}_change"))
+    return bool(np.any(np.nan_to_num(now - change)))
 
 
 def _plot(

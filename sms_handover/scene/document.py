@@ -10,6 +10,7 @@ from sms_handover.clearance.worst_pair import WorstPair
 from sms_handover.frames import DEPUTY
 from sms_handover.model.poses import pose_row
 from sms_handover.run_data import Stamps
+from sms_handover.scene.momentum import Momentum
 from sms_handover.scene.scene import Scene
 from sms_handover.scene.shapes import Shape
 from sms_handover.types import Array, GraspAction, GraspEvent, TaskPhase
@@ -27,6 +28,7 @@ def scene_document(name: str, scene: Scene) -> Document:
         **moving_document(scene.stamp_ns, np.concatenate(blocks, axis=1)),
         **task_document(scene.phases, scene.grasp_events),
         **({"clearance": _clearance(scene.worst_pair)} if scene.worst_pair else {}),
+        **({"momentum": _momentum(scene.momentum)} if scene.momentum else {}),
     }
 
 
@@ -64,6 +66,14 @@ def _clearance(worst: WorstPair) -> Document:
         "pair": _base64(index, "<u2"),
         "distances": _base64(worst.distance, "<f4"),
         "points": _base64(worst.points_in_world, "<f4"),
+    }
+
+
+def _momentum(momentum: Momentum) -> Document:
+    """Return, per instant, the centre of mass (T, 3) m and the angular momentum (T, 3) kg m^2/s."""
+    return {
+        "centres": _base64(momentum.centre_of_mass, "<f4"),
+        "angular": _base64(momentum.angular_momentum, "<f4"),
     }
 
 

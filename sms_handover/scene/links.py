@@ -1,5 +1,7 @@
 """Links of a robot described by URDF text: their poses, frame by frame."""
 
+from collections.abc import Iterator
+
 import numpy as np
 import pinocchio as pin
 
@@ -36,14 +38,34 @@ class DescribedRobot:
         ``base_in_world`` is (T, 7) and ``joint_position`` (T, n) rad in the order of ``joint_names``.
         Raises UnknownNameError if the description lacks one of them.
         """
-        columns = joint_columns(self.pin, joint_names)
-        q = pin.neutral(self.pin)
         data = self.pin.createData()
         poses = np.empty((len(base_in_world), len(self._frames), 7))
-        for row, (base, joints) in enumerate(zip(base_in_world, joint_position, strict=True)):
-            q[:BASE_NQ] = base
-            q[columns] = joints
+        for row, q in enumerate(self._configurations(base_in_world, joint_position, joint_names)):
             pin.framesForwardKinematics(self.pin, data, q)
             for place, index in enumerate(self._frames):
                 poses[row, place] = pose_row(pose_of(data.oMf[index]))
         return poses
+
+    @property
+    def mass(self) -> float:
+        """Total mass in kg."""
+        return float(pin.computeTotalMass(self.pin))
+
+    def centres_of_mass(
+        self, base_in_world: Array, joint_position: Array, joint_names: tuple[str, ...]
+    ) -> Array:
+        """Return the centre of mass of the robot in ``world``, (T, 3) m; arguments as those of poses."""
+        data = self.pin.createData()
+        found = self._configurations(base_in_world, joint_position, joint_names)
+        return np.array([np.array(pin.centerOfMass(self.pin, data, q)) for q in found])
+
+    def _configurations(
+        self, base_in_world: Array, joint_position: Array, joint_names: tuple[str, ...]
+    ) -> Iterator[Array]:
+        """Yield the configuration (7 + n,) of each row, every time in the same array."""
+        columns = joint_columns(self.pin, joint_names)
+        q: Array = pin.neutral(self.pin)
+        for base, joints in zip(base_in_world, joint_position, strict=True):
+            q[:BASE_NQ] = base
+            q[columns] = joints
+            yield q

@@ -5,8 +5,9 @@ from pathlib import Path
 from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.run.reader import read_run
 from sms_handover.errors import BagError, ScheduleError
+from sms_handover.scene.momentum import PointMass
 from sms_handover.scene.scene import FRAME_RATE, Scene, make_scene
-from sms_handover.trajectory.schedule_text import deputy_size
+from sms_handover.trajectory.schedule_text import deputy_mass, deputy_size
 from sms_handover.types import Array
 
 
@@ -19,7 +20,16 @@ def read_scene(path: Path, frame_rate: float = FRAME_RATE) -> Scene:
     info = read_info(path)
     if info.urdf_text is None:
         raise BagError(f"{path} carries no robot description, so there is nothing to draw")
-    return make_scene(read_run(path), info.urdf_text, deputy_size_in(info), frame_rate)
+    size, deputy = deputy_size_in(info), deputy_in(info)
+    return make_scene(read_run(path), info.urdf_text, size, frame_rate, deputy=deputy)
+
+
+def deputy_in(info: BagInfo) -> PointMass:
+    """Return what the deputy weighs, from the schedule in a bag; raises BagError."""
+    try:
+        return PointMass(*deputy_mass(info.schedule_text or ""))
+    except ScheduleError as error:
+        raise BagError(f"{info.path} carries no schedule with the mass of the deputy: {error}") from error
 
 
 def deputy_size_in(info: BagInfo) -> Array:

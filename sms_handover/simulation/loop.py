@@ -185,8 +185,7 @@ class Loop:
             self.law = parameters.controller.law
             self._aims = Need.TOOL_TARGETS in law_named(self.law).needs
             self._controller = make_controller(robot, schedule, self._common, parameters.controller)
-        inner = inner_of(self._controller)
-        self._solves = inner if isinstance(inner, Planning) else None
+        self._solves = self.controller if isinstance(self.controller, Planning) else None
         self._plan_events = PlanEvents()
         self._runner = make_runner(self._plant, self._controller, robot, self._common, parameters.plant)
         self._quiet: QuietRunner | None = None
@@ -224,6 +223,11 @@ class Loop:
     def deputy(self) -> DeputyState:
         """The deputy at the same instant."""
         return self._plant.deputy
+
+    @property
+    def controller(self) -> Controller:
+        """What answers the states, without the check of its efforts."""
+        return inner_of(self._controller)
 
     def advance(self) -> Observation:
         """Carry out one tick; raises ConfigurationError after the last one.

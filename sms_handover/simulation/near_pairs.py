@@ -19,6 +19,7 @@ class NearPairs:
                 joints,
                 (one.arm or other.arm) if may_touch(one, other) else "",
                 BodyKind.DEPUTY in (one.kind, other.kind),
+                bool(one.arm) and one.arm == other.arm,
             )
             for (one, other), joints in zip(model.pairs, model.joints, strict=True)
         )

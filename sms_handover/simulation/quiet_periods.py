@@ -10,7 +10,7 @@ from sms_handover.control.protocol import Guidance
 from sms_handover.graph.events import RunEvent
 from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.trajectory.generator import TrajectoryGenerator
-from sms_handover.types import JointReference, PeriodRows, TaskPhase, TickRows
+from sms_handover.types import JointReference, PeriodRows, Pose, TaskPhase, TickRows
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class QuietRunner:
     def run(self, guidance: Guidance, last_tick: int, room: Room | None = None) -> QuietPeriods | None:
         """Carry out the quiet periods from here on, after one with ``guidance``, None if there are none.
 
-        All their ticks are before ``last_tick``. The goals of the phase stand still, and no decision is due.
+        All their ticks are before ``last_tick``. No decision is due in them.
         The rows are written to ``room``, by default to a new array.
         """
         plant, generator, per_period = self._plant, self._generator, self._per_period
@@ -53,7 +53,7 @@ class QuietRunner:
         deputy = plant.deputy_body
         if not (deputy.holder or deputy.rests):
             return None  # it drifts, and C does not move it
-        until_ns = generator.quiet_until(stamp_ns, deputy_rests=deputy.rests)
+        until_ns = generator.quiet_until(stamp_ns)
         if until_ns is None:
             return None
         before = guidance.reference
@@ -61,10 +61,11 @@ class QuietRunner:
         count = min((until_ns - stamp_ns) // period_ns, (last_tick - first) // per_period)
         if count < 1:
             return None
-        course = generator.course(stamp_ns, period_ns, count, plant.deputy.deputy_in_world)
+        course = generator.course(stamp_ns, period_ns, count)
         failures = generator.ik_failures
         rows, periods, failed = self._periods.run(course, before, stamp_ns, deputy, failures, room)
-        generator.failed_so_far(failed)
+        last, deputy_row = int(periods.stamp_ns[-1]), periods.deputy_pose[-1]
+        generator.went_quietly(last, Pose(deputy_row[:3], deputy_row[3:]), failed)
         phases = tuple(_at(course.phase, stamp) for stamp in periods.stamp_ns.tolist())
         latest = range(max(0, len(phases) - 2), len(phases))
         excesses = plant.take_excesses_of(first, rows)

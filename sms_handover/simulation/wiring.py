@@ -1,6 +1,7 @@
 """Wiring: makes plant and controller of a scenario, for nodes and for one process alike."""
 
 import logging
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,13 @@ from sms_handover.compiled.kinematics import CompiledKinematics
 from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.compiled.tool_motion import CompiledToolMotion
 from sms_handover.conditions.conditions import IDEAL, Conditions
-from sms_handover.control.computed_torque import ComputedTorque
-from sms_handover.control.law import LawSetup, Need
+from sms_handover.control.computed_torque import ComputedTorque, TrackingEfforts
+from sms_handover.control.disturbance_observer import ObservedTorque
+from sms_handover.control.law import Law, LawSetup, Need
 from sms_handover.control.parameters import ControllerParameters, gains_of
 from sms_handover.control.protocol import CheckedController, Controller
 from sms_handover.control.registry import SHIPPED, law_named, require_law
+from sms_handover.control.stability import check_stability
 from sms_handover.errors import ConfigurationError, ScheduleError
 from sms_handover.ik.levenberg_marquardt import FindJoints, find_joints
 from sms_handover.ik.parameters import IkParameters
@@ -31,7 +34,6 @@ from sms_handover.plant.parameters import PlantParameters
 from sms_handover.simulation.near_pairs import NearPairs
 from sms_handover.simulation.parameters import COMPILED, CommonParameters
 from sms_handover.simulation.period_runner import PeriodRunner, PythonRunner
-from sms_handover.simulation.stability import check_stability_by_phase
 from sms_handover.trajectory.generator import TrajectoryGenerator
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.preview import TargetPreview
@@ -132,14 +134,9 @@ def make_controller(
     The efforts of a law of another package are checked. Raises ConfigurationError.
     """
     law, gains = law_named(parameters.law), gains_by_phase(schedule, parameters)
-    have = {Need.TOOL_TARGETS, Need.PREVIEW, Need.CLEARANCE, Need.PAYLOAD}
-    missing = sorted(need.value for need in law.needs - have)
-    if missing:
-        raise ConfigurationError(f"control law {law.name!r} needs {missing[0]}, which the loop has not")
     start = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
-    places = [(start, "at the start configuration")] * len(gains)
-    check_stability_by_phase(law, robot, schedule, gains, ns_to_seconds(common.tick_ns), places)
-    computed_torque = CompiledComputedTorque if common.dynamics == COMPILED else ComputedTorque
+    check_stability(law, robot, gains, ns_to_seconds(common.tick_ns), start)  # nothing is carried there
+    computed_torque = _computed_torque(law, common, parameters)
     longest_ns = longest_reference_ns(common, parameters)
     preview = TargetPreview(robot, schedule) if Need.PREVIEW in law.needs else None
     distances = NearPairs(make_clearance(robot, schedule)) if Need.CLEARANCE in law.needs else None
@@ -158,6 +155,26 @@ def make_controller(
     return controller if law.name in SHIPPED else CheckedController(controller, robot.joint_names)
 
 
+def _computed_torque(
+    law: Law[Any], common: CommonParameters, parameters: ControllerParameters
+) -> Callable[[RobotModel], TrackingEfforts]:
+    """Return what makes the computed torque of a robot; raises ConfigurationError."""
+    make = CompiledComputedTorque if common.dynamics == COMPILED else ComputedTorque
+    bandwidth, dt = parameters.disturbance_bandwidth, ns_to_seconds(common.tick_ns)
+    if not bandwidth:
+        return make
+    if Need.PAYLOAD not in law.needs:
+        raise ConfigurationError(
+            f"disturbance_bandwidth is {bandwidth:g} 1/s, must be 0 under control law {law.name!r}, "
+            "which has no model of the dynamics"
+        )
+    if bandwidth * dt > 1.0:
+        raise ConfigurationError(
+            f"disturbance_bandwidth is {bandwidth:g} 1/s, must be <= {1.0 / dt:g} 1/s at a tick of {dt:g} s"
+        )
+    return lambda robot: ObservedTorque(robot, make(robot), bandwidth, dt)
+
+
 def make_runner(
     plant: FreeFloatingPlant,
     controller: Controller,
@@ -174,8 +191,8 @@ def make_runner(
     has_all = parameters.joint_limits != ENFORCE and plant.is_ideal
     if not has_all or not CompiledTicks.fits(plant, controller, known):
         _LOG.warning(
-            "ticks are carried out by Python: C has only our own laws, joints that are alike in truth and "
-            "model, limits that are not enforced, and ideal conditions"
+            "ticks are carried out by Python: C has only laws nmpc and pid without an observer, joints that "
+            "are alike in truth and model, limits that are not enforced, and ideal conditions"
         )
         return PythonRunner(plant, controller)
     return CompiledTicks(plant, controller, known, parameters.integrator, common.tick_ns)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
+import pinocchio as pin
 
 from sms_handover.graph.events import RunEvent
 from sms_handover.model.deputy import DeputyDescription
@@ -65,15 +66,17 @@ class Targets:
 class Course:
     """What leads the arms in quiet periods: the phase, and where its motion begins and ends.
 
-    The tools of some arms go from ``starts`` to ``goals`` in ``world``; the joints (n,) rad of those in
-    ``by_joints`` from ``joints`` to ``ends``; those of the others stay at ``joints``. ``progress`` (k, 2) has
-    the fraction of the motion and its rate in 1/s for each period; ``damping`` is that of the generalised
-    Jacobian. With ``has_momentum`` a deputy with mass may have given the robot some.
+    The tools of some arms go from ``starts`` to ``goals`` in ``world``, or to poses in the deputy wherever it
+    is; the joints (n,) rad of those in ``by_joints`` from ``joints`` to ``ends``; those of the others stay at
+    ``joints``. ``progress`` (k, 2) has the fraction of the motion and its rate in 1/s for each period;
+    ``damping`` is that of the generalised Jacobian. With ``has_momentum`` a deputy with mass may have given
+    the robot some.
     """
 
     phase: TaskPhase
     starts: Mapping[str, Pose]
     goals: Mapping[str, Pose]
+    on_deputy: Mapping[str, pin.SE3]
     by_joints: frozenset[str]
     joints: Array
     ends: Array
@@ -184,21 +187,26 @@ class TrajectoryGenerator:
         """The latest targets in a row that inverse kinematics has not reached, and the number that fails."""
         return self._progress.ik_failures
 
-    def failed_so_far(self, ik_failures: int) -> None:
-        """Record how many of the latest targets in a row were not reached."""
+    def went_quietly(self, stamp_ns: int, deputy_in_world: Pose, ik_failures: int) -> None:
+        """Go on after quiet periods, of which the last began at a time.
+
+        The deputy was at a pose then, and so many of the latest targets in a row were not reached.
+        """
+        self._deputy_twist.at(stamp_ns, deputy_in_world)
         self._progress.failed_so_far(ik_failures)
 
-    def quiet_until(self, stamp_ns: int, *, deputy_rests: bool) -> int | None:
-        """Return up to when nothing has to be decided and goals stand still, None if not even now."""
-        quiet = self._progress.quiet_from(stamp_ns)
-        if quiet is None:
-            return None
-        targets = self._progress.at(stamp_ns).targets.values()
-        if not deputy_rests and any(isinstance(target, GraspFrameTarget) for target in targets):
-            return None
-        return quiet
+    def quiet_until(self, stamp_ns: int) -> int | None:
+        """Return up to when nothing has to be decided, None if not even now.
 
-    def course(self, stamp_ns: int, period_ns: int, count: int, deputy_in_world: Pose) -> Course:
+        A deputy that moves by itself is followed by its twist, which is worked out period by period.
+        """
+        quiet = self._progress.quiet_from(stamp_ns)
+        if quiet is None or not self._deputy_twist.follows:
+            return quiet
+        targets = self._progress.at(stamp_ns).targets.values()
+        return None if any(isinstance(target, GraspFrameTarget) for target in targets) else quiet
+
+    def course(self, stamp_ns: int, period_ns: int, count: int) -> Course:
         """Return what leads the arms in some quiet periods from a time on, the first of ``count``."""
         stage = self._progress.at(stamp_ns)
         motion_s = ns_to_seconds(stage.phase.motion_ns)
@@ -208,10 +216,14 @@ class TrajectoryGenerator:
             done = self._time_law(ns_to_seconds(elapsed_ns), motion_s)
             progress[index] = done.fraction, done.rate
         goals, ends = dict[str, Pose](), np.array(self._joints_at_start)
+        on_deputy = dict[str, pin.SE3]()
         moved = set[str]()
         for arm, target in stage.targets.items():
-            if isinstance(target, ToolTarget | GraspFrameTarget):
-                goals[arm] = goal_in_world(target, self._schedule.deputy, deputy_in_world)
+            if isinstance(target, ToolTarget):
+                goals[arm] = target.tool_in_world
+            elif isinstance(target, GraspFrameTarget):
+                frame, in_frame = _on_deputy(target, self._schedule.deputy)
+                on_deputy[arm] = frame * in_frame
             elif isinstance(target, JointTarget):
                 moved.add(arm)
                 ends[self._robot.arm_joints[arm]] = target.position
@@ -219,6 +231,7 @@ class TrajectoryGenerator:
             stage.task,
             self._tools_at_start,
             goals,
+            on_deputy,
             frozenset(moved),
             self._joints_at_start,
             ends,
@@ -261,6 +274,12 @@ class TrajectoryGenerator:
             self._payload.hold(grip)
             self._motion = self._make_motion(self._payload.robot)
 
+    def _goal(self, target: ToolTarget | GraspFrameTarget, deputy_in_world: Pose) -> Pose:
+        """Return where a tool is to be in ``world``."""
+        if isinstance(target, ToolTarget):
+            return target.tool_in_world
+        return self._motion.placed(deputy_in_world, *_on_deputy(target, self._schedule.deputy))
+
     def _targets_of(self, stage: Stage, state: RobotState, deputy_in_world: Pose) -> Targets:
         """Return the targets of every arm at the time of a state."""
         progress = self._time_law(
@@ -276,7 +295,7 @@ class TrajectoryGenerator:
             start = self._joints_at_start[joints]
             match target:
                 case ToolTarget() | GraspFrameTarget():
-                    goal = goal_in_world(target, self._schedule.deputy, deputy_in_world)
+                    goal = self._goal(target, deputy_in_world)
                     tool = self._tools_at_start[arm]
                     if deputy_twist and isinstance(target, GraspFrameTarget):
                         moves = twist_at(deputy_twist, deputy_in_world.position, goal.position)
@@ -290,14 +309,19 @@ class TrajectoryGenerator:
         return Targets(state.stamp_ns, poses, twists, frozen(position), frozen(velocity))
 
 
+def _on_deputy(target: GraspFrameTarget, deputy: DeputyDescription) -> tuple[pin.SE3, pin.SE3]:
+    """Return the grasp frame of a target in the deputy, and the tool in it."""
+    return se3_of(deputy.grasp_frames[target.grasp_frame]), se3_of(target.tool_in_grasp_frame)
+
+
 def goal_in_world(
     target: ToolTarget | GraspFrameTarget, deputy: DeputyDescription, deputy_in_world: Pose
 ) -> Pose:
     """Return the target pose of a tool in ``world`` for a pose of the deputy."""
     if isinstance(target, ToolTarget):
         return target.tool_in_world
-    frame = deputy.grasp_frames[target.grasp_frame]
-    return pose_of(se3_of(deputy_in_world) * se3_of(frame) * se3_of(target.tool_in_grasp_frame))
+    frame, in_frame = _on_deputy(target, deputy)
+    return pose_of(se3_of(deputy_in_world) * frame * in_frame)
 
 
 def _joint_motion(start: Array, end: Array, progress: Progress) -> tuple[Array, Array]:

@@ -18,6 +18,16 @@ def deputy_size(text: str) -> Array:
         raise ScheduleError(f"the schedule does not say how large the deputy is: {error}") from error
 
 
+def deputy_mass(text: str) -> tuple[float, Array]:
+    """Return the mass in kg of the deputy and its centre of mass (3,) m in it; raises ScheduleError."""
+    try:
+        deputy = load(text)["deputy"]
+        com = check_vector(deputy.get("com", [0.0, 0.0, 0.0]), 3, "deputy.com", "m")
+        return float(deputy["mass"]), read_only(com)
+    except _WRONG as error:
+        raise ScheduleError(f"the schedule does not say what the deputy weighs: {error}") from error
+
+
 def grasping_arms(text: str) -> tuple[frozenset[str], ...]:
     """Return, phase by phase, the arms that go to a grasp frame; raises ScheduleError."""
     try:

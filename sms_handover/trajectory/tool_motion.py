@@ -4,7 +4,9 @@ from collections.abc import Iterable, Mapping
 from typing import Protocol
 
 import numpy as np
+import pinocchio as pin
 
+from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.model.reduced import carried_twist, drift_of_base, generalized_jacobian
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.trajectory.pose_path import PosePath
@@ -17,6 +19,9 @@ class ToolMotion(Protocol):
 
     def tools_at(self, q: Array, arms: Iterable[str] | None = None) -> Mapping[str, Pose]:
         """Return the poses of the tools of some arms in ``world``, by default of all."""
+
+    def placed(self, body_in_world: Pose, frame: pin.SE3, in_frame: pin.SE3) -> Pose:
+        """Return the pose in ``world`` of what is fixed to a body, by its pose in a frame of it."""
 
     def on_path(self, start: Pose, goal: Pose, progress: Progress) -> tuple[Pose, Twist]:
         """Return pose and twist on the way from pose to pose, as :class:`PosePath`."""
@@ -40,6 +45,10 @@ class PinocchioToolMotion:
     def tools_at(self, q: Array, arms: Iterable[str] | None = None) -> Mapping[str, Pose]:
         """Return the poses of the tools of some arms in ``world``, by default of all."""
         return self._robot.tools_at(q, arms)
+
+    def placed(self, body_in_world: Pose, frame: pin.SE3, in_frame: pin.SE3) -> Pose:
+        """Return the pose in ``world`` of what is fixed to a body, by its pose in a frame of it."""
+        return pose_of(se3_of(body_in_world) * frame * in_frame)
 
     def on_path(self, start: Pose, goal: Pose, progress: Progress) -> tuple[Pose, Twist]:
         """Return pose and twist on the way from pose to pose, as :class:`PosePath`."""

@@ -8,6 +8,7 @@ import pytest
 from playwright.sync_api import Page
 
 from sms_handover.analysis.clearance import TaskTexts, run_clearance
+from sms_handover.scene.momentum import Momentum
 from sms_handover.scene.page import animation_html
 from sms_handover.scene.scene import FRAME_RATE, Scene, make_scene
 from sms_handover.simulation.scenario import load_scenario
@@ -252,6 +253,28 @@ def test_what_was_not_recorded_is_not_drawn(browsing: Browsing, scenes: dict[str
     picture(visit.page)
     assert not visit.page.evaluate(visible)
     assert visit.errors == []
+
+
+def test_momentum_is_an_arrow_at_the_centre_of_mass(browsing: Browsing, scenes: dict[str, Scene]) -> None:
+    """Its size is told; a run without momentum has neither arrow nor box to tick."""
+    scene = scenes["nmpc"]
+    angular = np.tile([0.3, 0.0, -0.4], (len(scene.stamp_ns), 1))
+    centres = np.linspace([0.0, 0.0, 0.1], [0.1, 0.0, 0.1], len(scene.stamp_ns))
+    visit = browsing.open(animation_html({"spins": replace(scene, momentum=Momentum(centres, angular))}))
+    page = visit.page
+    seek(page, scene.stamp_ns[-1] / 1e9)
+    drawn = np.array(
+        page.evaluate("['ball', 'head'].map((part) => player.runs[0].momentum[part].position.toArray())")
+    )
+    assert np.abs(drawn[0] - centres[-1]).max() < SINGLE
+    way = drawn[1] - drawn[0]
+    assert np.abs(way / np.linalg.norm(way) - [0.6, 0.0, -0.8]).max() < SINGLE
+    assert "0.500 kg m\u00b2/s" in page.locator("#readout").inner_text()
+    shown = picture(page)
+    page.locator("#momentum").uncheck()
+    assert picture(page) != shown and visit.errors == []
+    plain = browsing.open(animation_html({"rests": scene}))
+    assert not plain.page.locator("#momentum").is_visible() and plain.errors == []
 
 
 def test_the_nearest_bodies_are_marked_and_red_where_they_are_in_each_other(

@@ -151,6 +151,23 @@ def test_the_table_says_what_came_of_everything(pair: dict[str, RunData]) -> Non
     assert "DOES NOT HOLD" not in table
 
 
+def test_what_a_capture_costs_is_told_where_there_was_one(pair: dict[str, RunData]) -> None:
+    """With a deputy without mass no impulse is passed on, and the table does not speak of it."""
+    without = comparison_table(pair, tolerance=TOLERANCE)
+    assert "impulse" not in without and "lost" not in without and "relative rate" not in without
+    first, *others = pair["nmpc"].grasp_events
+    hit = replace(
+        first, relative_rate=np.pi / 180.0, impulse=(3.0, 0.0, -4.0, 0.0, 0.2, 0.0), energy_lost=0.25
+    )
+    lost = np.where(pair["nmpc"].reference_ns > hit.stamp_ns, 0.25, 0.0)
+    runs = {**pair, "nmpc": changed(pair["nmpc"], grasp_events=(hit, *others), lost=lost)}
+    table = comparison_table(runs, tolerance=GraspTolerance(0.010, 0.0349, 0.020, np.pi / 36.0))
+    assert cells(table, "relative rate [deg/s], allowed 5") == ["1", "-"]
+    assert cells(table, "impulse [N s]") == ["5", "0"]
+    assert cells(table, "angular impulse [N m s]") == ["0.2", "0"]
+    assert cells(table, "energy lost [J]") == cells(table, "energy lost [J]", 1) == ["0.25", "0"]
+
+
 def cells(table: str, label: str, place: int = 0) -> list[str]:
     """Return the cells of one of the rows with a label."""
     rows = [line.strip() for line in table.splitlines()]

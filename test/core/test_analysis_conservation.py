@@ -20,6 +20,17 @@ def test_the_largest_momenta_are_found_whatever_their_direction() -> None:
     assert found.angular_momentum == pytest.approx(2e-11)
 
 
+def test_momentum_that_came_from_outside_is_no_residual() -> None:
+    run = make_run()
+    given = np.outer(run.reference_ns / NS, [1.0, -2.0, 0.5])
+    account = {"linear_impulse": given, "angular_impulse": 2.0 * given}
+    found = physics_residuals(
+        changed(run, linear_momentum=given, angular_momentum=2.0 * given + 1e-3, **account)
+    )
+    assert found.linear_momentum == pytest.approx(0.0, abs=1e-12)
+    assert found.angular_momentum == pytest.approx(0.0, abs=1e-12)
+
+
 def test_energy_without_work_is_relative_to_the_peak_energy() -> None:
     run = make_run()
     t = run.reference_ns / NS

@@ -103,6 +103,8 @@ def make_run(
         "kinetic_energy": np.zeros(periods),
         "work": np.zeros(periods),
         "external_work": np.zeros(periods),
+        "linear_impulse": np.zeros((periods, 3)),
+        "angular_impulse": np.zeros((periods, 3)),
         "lost": np.zeros(periods),
         "ik_status": np.zeros(periods, dtype=np.int64),
         "phases": tuple(

@@ -5,6 +5,7 @@ import pytest
 from sms_handover.analysis.numbers import rotation_vectors
 from sms_handover.analysis.signals import (
     Signal,
+    angular_momentum_change,
     base_displacement,
     base_rotation,
     base_speed,
@@ -13,6 +14,7 @@ from sms_handover.analysis.signals import (
     energy_residual,
     joint_error,
     joint_torque,
+    linear_momentum_change,
     orientation_error,
     position_error,
     signals_of,
@@ -152,7 +154,24 @@ def test_the_energy_residual_is_what_the_work_does_not_account_for() -> None:
     t = times(REFERENCE_NS)
     made = changed(make_run(), kinetic_energy=2.0 + 0.3 * t, work=7.0 + 0.1 * t)
     assert energy_residual(made).values[:, 0] == pytest.approx(0.2 * t, abs=1e-12)
-    assert np.array_equal(energy(made).values, np.column_stack([2.0 + 0.3 * t, 7.0 + 0.1 * t]))
+    assert np.array_equal(energy(made).values, np.column_stack([2.0 + 0.3 * t, 7.0 + 0.1 * t, 0.0 * t]))
+
+
+def test_heat_and_work_from_outside_are_accounted_for() -> None:
+    t = times(REFERENCE_NS)
+    account = {"work": 0.3 * t, "external_work": 0.1 * t, "lost": 5.0 + 0.25 * t}
+    made = changed(make_run(), kinetic_energy=2.0 + 0.15 * t, **account)
+    assert energy_residual(made).values == pytest.approx(0.0, abs=1e-12)
+    assert energy(made).labels == ("kinetic energy", "work", "lost", "external work")
+    assert np.array_equal(energy(made).values[:, 3], 0.1 * t)
+
+
+def test_momenta_change_from_what_a_run_begins_with() -> None:
+    t = times(REFERENCE_NS)
+    held = np.column_stack([0.3 + 0.0 * t, 1e-9 * t, -4.0 + 0.0 * t])
+    made = changed(make_run(), linear_momentum=held, angular_momentum=-held)
+    for sign, change in ((1.0, linear_momentum_change(made)), (-1.0, angular_momentum_change(made))):
+        assert np.array_equal(change.values, sign * np.column_stack([0.0 * t, 1e-9 * t, 0.0 * t]))
 
 
 def test_every_signal_of_a_run_is_listed_once_per_arm() -> None:
@@ -164,7 +183,8 @@ def test_every_signal_of_a_run_is_listed_once_per_arm() -> None:
             for name in ("position_error", "orientation_error", "joint_error", "joint_torque")
         ),
         *("base_displacement", "base_rotation", "base_speed", "base_turn_rate"),
-        *("linear_momentum", "angular_momentum", "energy", "energy_residual"),
+        *("linear_momentum", "angular_momentum", "linear_momentum_change", "angular_momentum_change"),
+        *("energy", "energy_residual"),
     ]
     names = [signal.name for signal in found.values()]
     assert len(set(names)) == len(names)

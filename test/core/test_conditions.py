@@ -182,3 +182,20 @@ def test_an_unknown_level_or_value_is_told_with_the_nearest() -> None:
         load_scenario("smooth", {"common.conditions": "nominl"})
     with pytest.raises(UnknownNameError, match=r"conditions\.friction\.coulomb"):
         load_scenario("smooth", {"conditions.friction.colomb": 0.1})
+
+
+@pytest.mark.parametrize("law", ["nmpc", "pid"])
+def test_a_tenth_of_the_friction_of_a_gen3_is_stable_at_a_tick_of_1_ms(law: str) -> None:
+    """At a quarter of the tick the joints are where they were, and none has turned back and forth."""
+    friction = {
+        **{"friction.viscous": 0.2, "friction.coulomb": 0.25},
+        **{"friction.stiction": 0.3, "friction.stribeck_speed": 0.01},
+    }
+    coarse, fine = (
+        simulate(_scenario(friction, 0.3, law=law, **{"common.tick": tick})) for tick in (1e-3, 0.25e-3)
+    )
+    rates = coarse.joint_velocity
+    assert np.abs(rates).max() > 0.01
+    turns = np.count_nonzero((rates[1:] * rates[:-1] < 0.0) & (np.abs(rates[1:]) > 1e-6), axis=0)
+    assert turns.max() <= 2
+    assert np.abs(coarse.joint_position[-1] - fine.joint_position[-1]).max() < 2e-4

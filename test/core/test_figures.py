@@ -126,8 +126,8 @@ def test_joint_errors_and_torques_are_those_of_the_arm(nmpc: RunData, arm: str, 
 def test_the_conserved_are_shown_as_lengths(nmpc: RunData) -> None:
     lines = lines_of(figure_of("momentum", named([nmpc])))
     for name, values in (("linear", nmpc.linear_momentum), ("angular", nmpc.angular_momentum)):
-        size = np.sqrt(np.sum(values**2, axis=1))
-        assert lines[f"run_1/{name}_momentum/None"][1] == pytest.approx(size)
+        size = np.sqrt(np.sum((values - values[0]) ** 2, axis=1))
+        assert lines[f"run_1/{name}_momentum_change/None"][1] == pytest.approx(size)
     balance = nmpc.kinetic_energy - nmpc.work
     assert lines["run_1/energy_residual/None"][1] == pytest.approx(np.abs(balance - balance[0]))
 

@@ -154,10 +154,9 @@ def test_a_target_at_a_deputy_that_moves_has_its_twist(
         np.testing.assert_allclose(twist.linear, velocity, atol=1e-12)
         np.testing.assert_allclose(twist.angular, angular, atol=1e-12)
     state = bench.generator.snapshot()
-    again = [bench.at(0.06)[1].tool_twist_in_world["arm_a"].row]
+    first = bench.at(0.06)[1].tool_twist_in_world["arm_a"].row
     bench.generator.restore(state)
-    again.append(bench.at(0.06)[1].tool_twist_in_world["arm_a"].row)
-    np.testing.assert_array_equal(*again)
+    np.testing.assert_array_equal(bench.at(0.06)[1].tool_twist_in_world["arm_a"].row, first)
     bench.generator.reset()
     initial = bench.schedule.deputy.twist_in_world
     np.testing.assert_array_equal(bench.at(0.0)[1].tool_twist_in_world["arm_a"].angular, initial.angular)

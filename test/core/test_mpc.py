@@ -1,6 +1,7 @@
 """The predictive law: what it predicts, its derivatives, its program, the limits it keeps."""
 
 import json
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +20,6 @@ from sms_handover.control.mpc.prediction import Prediction, PredictionModel
 from sms_handover.control.mpc.quadratic_program import solve
 from sms_handover.control.mpc.sensitivity import Sensitivity
 from sms_handover.control.mpc.tool_errors import ToolErrorModel
-from sms_handover.control.protocol import inner_of
 from sms_handover.errors import ConfigurationError, MissingDependencyError
 from sms_handover.graph.events import PLAN_FAILED
 from sms_handover.model.conserved import conserved_quantities
@@ -48,9 +48,8 @@ def scenario_of(name: str, seconds: float, **controller: object) -> Scenario:
 
 def controller_of(loop: Loop) -> MpcController:
     """Return the predictive controller of a loop."""
-    inner = inner_of(loop._controller)
-    assert isinstance(inner, MpcController)
-    return inner
+    assert isinstance(loop.controller, MpcController)
+    return loop.controller
 
 
 @pytest.fixture
@@ -129,7 +128,7 @@ def test_rows_are_the_derivatives_of_the_outputs(
     start, joints, rates, accelerations, q = moving
     schedule = load_scenario("smooth").model.schedule
     distances = NearPairs(make_clearance(robot, schedule))
-    tools, apart = ToolErrorModel(robot), DistanceModel(robot, distances, 2)
+    tools, apart = ToolErrorModel(robot), DistanceModel(robot, distances, 2, 0.02)
     model, still = PredictionModel(robot), Twist(np.zeros(3), np.zeros(3))
     here = robot.tools_at(q)
     goals = {arm: draw.near(here[arm], 0.2) for arm in robot.arms}
@@ -258,6 +257,22 @@ def test_a_plan_begins_where_the_robot_will_be() -> None:
     np.testing.assert_allclose(coming.w, state.joint_velocity, rtol=0.0, atol=1e-3)
 
 
+def test_targets_are_those_of_the_instants_of_the_plan(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The plan begins a period after the state; its first target is that after its first interval."""
+    loop, asked = Loop(scenario_of("smooth", 1.0)), list[int]()
+    ahead = TargetPreview.ahead
+
+    def spied(preview: TargetPreview, stamps_ns: Iterable[int]) -> tuple[PreviewedTargets, ...]:
+        asked.extend(stamps_ns)
+        return ahead(preview, asked)
+
+    monkeypatch.setattr(TargetPreview, "ahead", spied)
+    loop.advance_period()
+    coming = controller_of(loop).state.coming
+    assert coming is not None and coming.begin_ns == 20_000_000
+    np.testing.assert_allclose(asked, 20_000_000 + 1e9 * coming.horizon.times[1:], rtol=0.0, atol=1.0)
+
+
 def test_a_plan_is_followed_from_node_to_node(draw: Draw) -> None:
     """It is the double integrator in closed form, and stands after its end; its means give its rates back."""
     q, w, a = draw.joints(), draw.vector(14), draw.random.normal(size=(10, 14))
@@ -315,7 +330,9 @@ def test_the_state_has_every_bit_of_the_rest() -> None:
 @pytest.mark.parametrize("law", ["quintic", "step"])
 def test_the_preview_is_what_the_generator_will_say(law: str) -> None:
     """A second ahead, within phases and into those that begin without commands; held and free deputy."""
-    scenario = load_scenario("smooth", {"trajectory.time_law": law, "common.dynamics": "compiled"})
+    duration = {"quintic": 48.0, "step": 12.0}[law]
+    values = {"trajectory.time_law": law, "common.dynamics": "compiled", "common.duration": duration}
+    scenario = load_scenario("smooth", values)
     robot, schedule = scenario.model.robot, scenario.model.schedule
     loop, preview, expected = Loop(scenario), TargetPreview(robot, schedule), dict[int, PreviewedTargets]()
     compared = 0
@@ -342,4 +359,4 @@ def test_the_preview_is_what_the_generator_will_say(law: str) -> None:
                 part = robot.arm_joints[arm]
                 off = np.abs(told.joint_position[part] - period.reference.position[part]).max()
                 assert off < 2e-3, (now_ns, arm)
-    assert compared > 100
+    assert compared > duration

@@ -30,6 +30,8 @@ def test_streams_of_models_cases_and_seeds_and_of_parameters_and_noise_are_apart
         for name in _NAMES
     ]
     draws += [RandomStreams(0).parameters(name).standard_normal(4) for name in _NAMES]
+    draws += [RandomStreams(0).noise(name, 4).uniform(0) for name in _NAMES]
+    draws += [RandomStreams(0).parameters(name).random(4) for name in _NAMES]
     for first, second in combinations(draws, 2):
         assert not np.any(first == second)
 

@@ -8,25 +8,35 @@ from my_controller.law import LAW
 from my_controller.task_space_pd import TaskSpaceGains, TaskSpacePd
 
 from sms_handover.analysis.equality import compare_runs
-from sms_handover.control.law import Law, Need
+from sms_handover.control.law import Law, LawSetup, Need
 from sms_handover.control.nmpc import NMPC
 from sms_handover.control.parameters import ControllerParameters, parameters_with
 from sms_handover.control.pid import PidGains
+from sms_handover.control.protocol import inner_of
 from sms_handover.control.registry import law_named, law_names
 from sms_handover.errors import ConfigurationError, UnknownNameError
 from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.scenario import Scenario, load_parameters, load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.simulation.wiring import gains_by_phase, make_controller
+from sms_handover.trajectory.preview import TargetPreview
 
 from .conftest import SCHEDULE
 from .laws import offer
 
 THIRD = "task_space_pd"
 CLASHING = Law("clashing", "", PidGains, lambda setup: TaskSpacePd(setup.robot))
-WANTING = Law(
-    "wanting", "", TaskSpaceGains, lambda setup: TaskSpacePd(setup.robot), needs=frozenset({Need.PREVIEW})
-)
+
+
+class Wanting(TaskSpacePd):
+    """A law that keeps what it was made with."""
+
+    def __init__(self, setup: LawSetup[TaskSpaceGains]) -> None:
+        super().__init__(setup.robot)
+        self.setup = setup
+
+
+WANTING = Law("wanting", "", TaskSpaceGains, Wanting, needs=frozenset({Need.PREVIEW, Need.CLEARANCE}))
 
 
 @pytest.fixture
@@ -48,7 +58,7 @@ def scenario_of(folder: Path, **controller: object) -> Scenario:
 @pytest.mark.usefixtures("third")
 def test_a_law_of_another_package_runs_by_its_name(tmp_path: Path) -> None:
     """With its gains from the parameters and, by phase, from the schedule; the same bits as by hand."""
-    assert law_names() == ("nmpc", "pid", THIRD) and law_named(THIRD) is LAW
+    assert law_names() == ("nmpc", "pid", "mpc", THIRD) and law_named(THIRD) is LAW
     scenario = scenario_of(tmp_path, damping=6.0)
     gains = gains_by_phase(scenario.truth.schedule, scenario.parameters.controller)
     assert [(g.stiffness, g.damping) for g in gains] == [(5.0, 6.0), (2.0, 6.0), (5.0, 6.0), (5.0, 6.0)]
@@ -116,10 +126,10 @@ def test_what_is_no_law_is_refused(
         load_parameters({"controller": {"law": "odd"}})
 
 
-def test_what_a_law_cannot_have_is_refused(
+def test_a_law_gets_what_it_declares_to_need(
     scenario: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A parameter that the controller has already, and what the loop does not offer."""
+    """Preview and distances of bodies; but no parameter that the controller has already."""
     here = "test.core.test_registry"
     monkeypatch.setitem(__import__("sys").modules, here, __import__("sys").modules[__name__])
     laws = {"clashing": f"{here}:CLASHING", "wanting": f"{here}:WANTING"}
@@ -127,7 +137,7 @@ def test_what_a_law_cannot_have_is_refused(
     with pytest.raises(ConfigurationError, match="'clashing' has a parameter 'proportional', as the contr"):
         load_parameters({"controller": {"law": "clashing"}})
     parameters = load_parameters({"controller": {"law": "wanting"}})
-    with pytest.raises(ConfigurationError, match="'wanting' needs preview, which the loop has not"):
-        make_controller(
-            scenario.truth.robot, scenario.truth.schedule, parameters.common, parameters.controller
-        )
+    robot, schedule = scenario.truth.robot, scenario.truth.schedule
+    made = inner_of(make_controller(robot, schedule, parameters.common, parameters.controller))
+    assert isinstance(made, Wanting) and isinstance(made.setup.preview, TargetPreview)
+    assert made.setup.distances and len(made.setup.distances.pairs) > 100

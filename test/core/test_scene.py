@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from sms_handover.bag.recording import Recording
@@ -14,6 +15,7 @@ from sms_handover.model.poses import pose_distance, pose_of, se3_of
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.run_data import RunData
 from sms_handover.scene.links import DescribedRobot
+from sms_handover.scene.momentum import PointMass
 from sms_handover.scene.recorded_scene import read_scene
 from sms_handover.scene.scene import Scene, frame_stamps, make_scene
 from sms_handover.scene.shapes import read_shapes
@@ -84,6 +86,24 @@ def test_tools_deputy_and_targets_are_the_recorded_ones(scene: Scene, run: RunDa
         assert np.array_equal(scene.target_in_world[arm], run.target_pose[arm][rows])
         for mine, recorded in zip(scene.tool(arm), run.tool_pose[arm][rows], strict=True):
             assert_same(mine, recorded)
+
+
+def test_momentum_is_shown_about_the_centre_of_mass_of_all(run: RunData, scenario: Scenario) -> None:
+    """Of robot and deputy by Pinocchio's inertias; where there is but rounding there is nothing to show."""
+    robot, size = scenario.truth.robot, scenario.truth.schedule.deputy.size
+    assert make_scene(run, robot.urdf, size).momentum is None
+    angular = np.tile([0.1, -0.2, 0.3], (len(run.reference_ns), 1))
+    deputy = PointMass(12.0, np.array([0.0, 0.1, 0.02]))
+    scene = make_scene(replace(run, angular_momentum=angular), robot.urdf, size, deputy=deputy)
+    assert scene.momentum is not None
+    assert np.array_equal(scene.momentum.angular_momentum, angular[: len(scene.stamp_ns)])
+    for row, stamp in enumerate(scene.stamp_ns):
+        tick = int(np.searchsorted(run.tick_ns, stamp))
+        q = np.concatenate([run.base_pose[tick], run.joint_position[tick]])
+        alone = pin.centerOfMass(robot.pin, robot.data, q)
+        held = pin.XYZQUATToSE3(scene.deputy_in_world[row]).act(np.array(deputy.com))
+        expected = (robot.mass * alone + 12.0 * held) / (robot.mass + 12.0)
+        np.testing.assert_allclose(scene.momentum.centre_of_mass[row], expected, rtol=0.0, atol=1e-12)
 
 
 def test_a_phase_is_listed_where_it_begins(scene: Scene) -> None:

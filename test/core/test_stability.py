@@ -11,6 +11,7 @@ from sms_handover.control.stability import check_stability, loop_stability, samp
 from sms_handover.errors import UnstableLoopError
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import BASE_NQ, RobotModel
+from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.wiring import make_controller
 from sms_handover.types import Array
@@ -174,6 +175,13 @@ def test_pid_at_2_ms_is_refused_because_of_a_joint_7() -> None:
     slower = load_scenario("colliding", {"common": {"tick": 0.002}, "controller": {"law": "pid"}})
     with pytest.raises(UnstableLoopError, match=r"0\.002 s is unstable.*first at arm_[ab]_joint_7; use a"):
         _start(slower)
+
+
+def test_a_mass_is_judged_in_the_hand_where_it_is_carried() -> None:
+    """At the start nothing is carried, and a stretched arm is another one than that which will carry it."""
+    _start(load_scenario("paper", {"law": "pid", "deputy.mass": 2.0}))
+    with pytest.raises(UnstableLoopError, match=r"where phase 'carry' ends with the 12 kg .* in arm_a"):
+        check_scenario(load_scenario("massive", {"law": "pid"}))
 
 
 def test_nmpc_at_10_ms_is_accepted() -> None:

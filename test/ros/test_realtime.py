@@ -24,6 +24,18 @@ print(len(threads) > 1, {{cpu for thread in threads for cpu in os.sched_getaffin
 event.set()
 """
 
+_STAND_BACK = """
+import os, threading
+from sms_handover.ros.process.realtime import stand_back
+event = threading.Event()
+threading.Thread(target=event.wait).start()
+begin = os.getpriority(os.PRIO_PROCESS, 0)
+stand_back(2)
+threads = [int(name) for name in os.listdir("/proc/self/task")]
+print(len(threads) > 1, {os.getpriority(os.PRIO_PROCESS, thread) - begin for thread in threads})
+event.set()
+"""
+
 
 def common(**values: object) -> CommonParameters:
     return load_scenario(values={"common": values}).parameters.common
@@ -34,6 +46,11 @@ def test_every_thread_stays_on_the_processor() -> None:
     code = _SHOW.format(values={"cpu": cpu})
     shown = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
     assert shown.split(maxsplit=1) == ["True", f"{{{cpu}}}\n"]
+
+
+def test_every_thread_stands_back() -> None:
+    shown = subprocess.run([sys.executable, "-c", _STAND_BACK], check=True, capture_output=True, text=True)
+    assert shown.stdout == "True {2}\n"
 
 
 def test_nothing_is_asked_for_by_default() -> None:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import tomllib
 from rclpy.node import Node
 from rclpy.qos import QoSDurabilityPolicy, QoSProfile
 from rosbags.typesys import Stores, get_typestore
@@ -102,9 +101,10 @@ def test_the_type_is_that_of_ros() -> None:
 
 
 def test_both_interface_packages_are_built_with_the_same_wheels() -> None:
-    parts = {}
-    for folder in ("interfaces", "interfaces_tf2"):
-        manifest = tomllib.loads((ROOT / folder / "pyproject.toml").read_text(encoding="utf-8"))
-        project = manifest["project"]
-        parts[folder] = manifest["build-system"], project["dependencies"], project["requires-python"]
-    assert parts["interfaces"] == parts["interfaces_tf2"]
+    """Their manifests differ in what they are called only."""
+    manifests = [
+        (ROOT / folder / "pyproject.toml").read_text(encoding="utf-8").splitlines()
+        for folder in ("interfaces", "interfaces_tf2")
+    ]
+    different = [pair for pair in zip(*manifests, strict=True) if pair[0] != pair[1]]
+    assert [first.split(" = ")[0] for first, _ in different] == ["name", "description"]

@@ -9,6 +9,7 @@ from sms_handover.bag.info import read_info
 from sms_handover.graph.topics import CONTROLLER, DIAGNOSTICS, IK, PLANT, TRAJECTORY, Rate, graph_topics
 from sms_handover.messages.message_types import MessageTypes
 from sms_handover.messages.values import header_ns
+from sms_handover.ros.node.diagnostics import node_of
 
 from .conftest import LAWS, TICKS
 from .runs import Ended
@@ -44,7 +45,7 @@ def test_a_node_is_woken_once_for_what_it_waits_for(bag: Path) -> None:
         decoded = types.deserialize(message.data, message.type)
         for status in decoded.status:
             told = {value.key: value.value for value in status.values}
-            last[status.name] = header_ns(decoded), int(told["wakes"])
+            last[node_of(status.name)] = header_ns(decoded), int(told["wakes"])
     for node, allowed in WAKES.items():
         stamp_ns, wakes = last[node]
         assert stamp_ns >= (TICKS - 21) * 1_000_000, f"{node} has told at its end"

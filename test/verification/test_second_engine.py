@@ -21,6 +21,18 @@ from test.verification.conftest import Record
 _HEAVIER = 1.001  # [-] what a link weighs that is to be noticed
 _SHORT = {"common": {"duration": 2.0}}  # [s]
 _TURN = [1e-3, -5e-4, 7e-4]  # [rad/s]
+_WRENCHES = {
+    "gravity": {"gravity_gradient": {"radius": 6.778e6, "radial": [1, 0, 0], "normal": [0, 0, 1]}},  # m
+    "misfire": {
+        "thruster_misfire": {"force": [1, 0.5, 0.3], "point": [0, 0.5, 0.2], "start": 0.5, "duration": 0.05}
+    },  # N, m, s
+    "leak": {"constant": {"force": [0, -0.01, 0.002], "torque": [0.01, 0.02, -0.01], "point": [0.1, 0, 0]}},
+}
+_EFFECTS: dict[Effect, dict[str, object]] = {
+    Effect.ROTOR_INERTIA: {"robot.arms.arm_a.rotor_inertia": [0.1, 0.2]},  # kg m^2
+    Effect.WRENCHES: {"conditions.wrenches": _WRENCHES},
+    Effect.FRICTION: {"conditions": {"rotor_inertia": 0.3, "friction": {"coulomb": 0.1, "stiction": 0.1}}},
+}
 _SCENARIOS = ("planar", "one_arm")  # every shipped one: make engines
 
 
@@ -83,17 +95,25 @@ def _more(inertia: Inertia) -> Inertia:
     return replace(inertia, mass=_HEAVIER * inertia.mass)
 
 
-def test_rotors_are_known_or_said_not_to_be(engine: Engine) -> None:
-    """MuJoCo has them as armature, Basilisk's spinning bodies have none."""
-    rotors = {"robot.arms.arm_a.rotor_inertia": [0.1, 0.2]}  # kg m^2
-    scenario = load_scenario("planar", {**_SHORT, **rotors})
+@pytest.mark.parametrize("effect", [Effect.ROTOR_INERTIA, Effect.WRENCHES, Effect.FRICTION])
+def test_an_effect_is_known_or_said_not_to_be(engine: Engine, effect: Effect, record: Record) -> None:
+    """MuJoCo has rotors and pushes the base; Basilisk's spinning bodies have no rotors, to name one."""
+    scenario = load_scenario("planar", {**_SHORT, **_EFFECTS[effect]})
     verdict = verdict_of(engine, simulate(scenario), scenario, "planar")
-    told = (
-        ""
-        if Effect.ROTOR_INERTIA not in engine.lacks
-        else "rotor inertia: its spinning bodies have no rotors"
-    )
-    assert verdict.unsupported == told and verdict.agrees == (not told)
+    lacked = min((each for each in engine.lacks if each in _present(effect)), key=_name, default=None)
+    assert verdict.unsupported == (f"{_name(lacked)}: {engine.lacks[lacked]}" if lacked else "")
+    for each in verdict.differences:
+        claim = f"planar with {_name(effect)}: {each.quantity}"
+        record(claim, each.largest, each.bound, unit=each.unit, against=engine.title)
+
+
+def _name(effect: Effect) -> str:
+    return effect.value
+
+
+def _present(effect: Effect) -> set[Effect]:
+    """Return the effects of a case: friction needs rotors."""
+    return {effect, Effect.ROTOR_INERTIA} if effect is Effect.FRICTION else {effect}
 
 
 @pytest.mark.parametrize(

@@ -14,8 +14,8 @@ _ROW_HEIGHT = 0.95  # [in] of a row of panels with one joint each
 _REST_HEIGHT = 0.8  # [in] of the legend and the labels at the edges
 
 _CONSERVED = (
-    Quantity("linear_momentum", None, "$|P|$ (kg m/s)", logarithmic=True),
-    Quantity("angular_momentum", None, "$|L|$ (kg m$^2$/s)", logarithmic=True),
+    Quantity("linear_momentum_change", None, r"$|\Delta P|$ (kg m/s)", logarithmic=True),
+    Quantity("angular_momentum_change", None, r"$|\Delta L|$ (kg m$^2$/s)", logarithmic=True),
     Quantity("energy_residual", None, r"$|\Delta E - W|$ (J)", logarithmic=True),
 )
 
@@ -54,7 +54,7 @@ def draw_torque(runs: Sequence[DrawnRun], arm: str) -> Figure:
 
 
 def draw_momentum(runs: Sequence[DrawnRun]) -> Figure:
-    """Return both momenta and the energy that no work accounts for; all of them must stay zero."""
+    """Return the change of both momenta and the energy that no work or heat accounts for; all stay zero."""
     return _draw(runs, (_CONSERVED,), rows=3, size=(COLUMN, 3.6))  # [in]
 
 

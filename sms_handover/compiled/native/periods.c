@@ -1,10 +1,11 @@
 /* Quiet reference periods: what simulation/loop.py does in each while nothing has to be decided. */
 
-enum { HOLD = 0, JOINTS = 1, TOOL = 2 }; /* how an arm is led, as in compiled/periods.py */
+enum { HOLD = 0, JOINTS = 1, TOOL = 2, ON_DEPUTY = 3 }; /* how an arm is led, as in compiled/periods.py */
 
 /* All fields have 8 bytes; compiled/periods.py has the same order. */
 typedef struct {
   double starts[ARMS * POSE_ROW], goals[ARMS * POSE_ROW]; /* in world, of arms led by their tool */
+  double in_deputy[ARMS * POSE];        /* the goals in the deputy, of arms led to it */
   double joints[N], ends[N];            /* rad, where the phase began and where it leads, of the others */
   double rates[N];                      /* rad/s of the reference of the period before */
   double in_tool[POSE];                 /* the deputy in the tool that holds it */
@@ -46,9 +47,11 @@ static void refer(const ticks_t *t, const ik_settings_t *settings, quiet_t *quie
   int any = 0, all = 1, moving = 0;
   for (int arm = 0; arm < ARMS; arm++) {
     int first = first_joint[arm];
-    led[arm] = quiet->kind[arm] == TOOL;
+    led[arm] = quiet->kind[arm] == TOOL || quiet->kind[arm] == ON_DEPUTY;
     if (led[arm]) {
       double *twist = twists + TWIST * arm;
+      if (quiet->kind[arm] == ON_DEPUTY)
+        placed(quiet->deputy, quiet->in_deputy + POSE * arm, quiet->goals + POSE_ROW * arm);
       any = 1;
       on_path(quiet->starts + POSE_ROW * arm, quiet->goals + POSE_ROW * arm, fraction, rate,
               p->targets + POSE_ROW * arm, twist);

@@ -40,6 +40,24 @@ static void pose_of(const double *row, double *pose) {
   memcpy(pose + 9, row, 3 * sizeof *row);
 }
 
+/* Row of what is fixed to a body, at the pose `in_body`. */
+static void placed(const double *body, const double *in_body, double *row) {
+  double A[POSE], pose[POSE];
+  const double *B = in_body;
+  pose_of(body, A);
+  for (int i = 0; i < 3; i++) {
+    for (int j = 0; j < 3; j++)
+      pose[3 * i + j] = A[3 * i] * B[j] + A[3 * i + 1] * B[3 + j] + A[3 * i + 2] * B[6 + j];
+    pose[9 + i] = A[9 + i] + (A[3 * i] * B[9] + A[3 * i + 1] * B[10] + A[3 * i + 2] * B[11]);
+  }
+  row_of(pose, row);
+}
+
+void sms_placed(const double *body, const double *in_body, double *row, double *w) {
+  (void)w;
+  placed(body, in_body, row);
+}
+
 /* Rows (ARMS, 7) of the tools at q. */
 void sms_tool_rows(const double *q, double *rows, double *w) {
   double poses[ARMS * POSE];

@@ -56,7 +56,6 @@ class Limits:
         self._lower, self._upper = robot.lower, robot.upper
         self._base_rate = inside * gains.base_rate_limit
         self._attitude = inside * gains.base_attitude_limit
-        self._least = (1.0 + gains.limit_margin) * gains.least_distance
 
     def constraints(
         self,
@@ -128,13 +127,14 @@ class Limits:
     ) -> Constraint:
         """Return the soft rows of distances."""
         rows = sensitivity.rows(distances.by, later)
-        least = np.full(distances.distance.shape, self._least)
+        least = distances.least
         high = np.full_like(least, np.inf)
         names = [f"distance {name}" for node in distances.names for name in node]
         flat = rows.reshape(-1, rows.shape[-1])
         wide = (least - left[:, None] * np.maximum(least - distances.at_start, 0.0)).ravel()
         value, low, top = distances.distance.ravel(), least.ravel(), high.ravel()
-        return Constraint(tuple(names), value, flat, wide, top, low, top, np.abs(low), soft=True)
+        scale = np.full_like(low, self._gains.least_distance)
+        return Constraint(tuple(names), value, flat, wide, top, low, top, scale, soft=True)
 
 
 def _flat(

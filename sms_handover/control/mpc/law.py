@@ -11,6 +11,7 @@ from time import perf_counter
 import numpy as np
 import pinocchio as pin
 
+from sms_handover.control.disturbance_observer import memory_of, restore_memory
 from sms_handover.control.law import Law, LawSetup, LinearFeedback, Need
 from sms_handover.control.mpc.braking import braking_plan
 from sms_handover.control.mpc.momentum import base_start, base_velocity
@@ -40,7 +41,7 @@ class MpcState:
     """Everything that later efforts depend on: plans, counts, the preview, and the initial attitude (3, 3).
 
     ``coming`` takes the place of ``plan`` when it begins; ``failures`` counts solves in a row without a plan;
-    ``news`` are grasps that count from the next state on.
+    ``news`` are grasps that count from the next state on, ``observed`` is the memory of the computed torque.
     """
 
     phase_index: int
@@ -53,6 +54,7 @@ class MpcState:
     preview: PreviewState | None
     grip: Grip
     news: tuple[GraspEvent, ...]
+    observed: Array
 
 
 class MpcController:
@@ -135,6 +137,7 @@ class MpcController:
             self._preview.state,
             self._payload.grip,
             self._news,
+            memory_of(self._efforts),
         )
 
     def restore(self, state: MpcState) -> None:
@@ -146,6 +149,7 @@ class MpcController:
         self._preview.restore(state.preview)
         self._news = state.news
         self._hold(state.grip)
+        restore_memory(self._efforts, state.observed)
 
     def _heed_news(self) -> None:
         """Take up the payload of the latest events."""

@@ -51,8 +51,8 @@ class MpcGains:
         maximum=3.0,
     )
     least_distance: float = parameter(
-        "mpc: least distance between two bodies, other than a gripper and the deputy that it may touch; "
-        "0: none",
+        "mpc: least distance between two bodies; 1 mm for those of one arm, and for a gripper and the deputy "
+        "that it may touch; 0: none",
         unit="m",
         minimum=0.0,
         maximum=1.0,

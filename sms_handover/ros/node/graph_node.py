@@ -186,7 +186,7 @@ class GraphNode(LifecycleNode, Generic[P]):
             raise MessageError(Reason.SENDER, text)
         waiting = [] if matched else self.endpoints.unmatched
         message: DiagnosticArray = diagnostics_message(
-            self.get_name(),
+            self.get_fully_qualified_name(),
             self.report(),
             wakes=self.inputs.loop.wakes,
             waiting=waiting if self.active else ["somebody to activate it"],

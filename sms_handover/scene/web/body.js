@@ -2,13 +2,14 @@
 /* One run in the 3D view: its solids, frames and traces, placed at any time from the recorded poses. */
 
 const COLOURS = { // of arms in order, of the deputy, of edges; distinguishable by colour-blind viewers
-  light: { arms: [0x1c74b8, 0xd2601a, 0x8a5a9e, 0x4b8b3b], deputy: 0x0f9d6b, edge: 0x1d2530, start: 0x69788c, apart: 0x18202b, inside: 0xd00000 },
-  dark: { arms: [0x58b4ff, 0xff9a4d, 0xc79be0, 0x93d07f], deputy: 0x2fe0a0, edge: 0x05080f, start: 0x8ea2bd, apart: 0xe8edf4, inside: 0xff4a4a },
+  light: { arms: [0x1c74b8, 0xd2601a, 0x8a5a9e, 0x4b8b3b], deputy: 0x0f9d6b, edge: 0x1d2530, start: 0x69788c, apart: 0x18202b, momentum: 0xb0307a, inside: 0xd00000 },
+  dark: { arms: [0x58b4ff, 0xff9a4d, 0xc79be0, 0x93d07f], deputy: 0x2fe0a0, edge: 0x05080f, start: 0x8ea2bd, apart: 0xe8edf4, momentum: 0xff7ac0, inside: 0xff4a4a },
 };
 const GHOST_OPACITY = 0.3;
 const EDGE_ANGLE = 30; // degrees, smallest angle between two faces whose common edge is drawn
 const AXIS_LENGTH = 0.16; // m
 const TRACE_WIDTH = 2.5; // px
+const MOMENTUM_LENGTH = 0.6; // m, of the arrow of the largest angular momentum of a run
 
 /** Decode base64 of little-endian floats. */
 function numbers(text, Type) {
@@ -190,6 +191,62 @@ class Nearest {
   get text() { return this.known ? `${(1000 * this.distance).toFixed(1).replace("-", "\u2212")} mm` : "\u2013"; }
 }
 
+/** Centre of mass of robot and deputy as a ball, and their angular momentum about it as an arrow. */
+class Momentum {
+  constructor(data, motion, group) {
+    this.motion = motion; // its instants are those of the momentum
+    this.centres = numbers(data.centres, Float32Array); // m, x y z per instant
+    this.angular = numbers(data.angular, Float32Array); // kg m^2/s, x y z per instant
+    const sizes = Array.from({ length: this.angular.length / 3 }, (_, i) => Math.hypot(...this.angular.subarray(3 * i, 3 * i + 3)));
+    this.scale = MOMENTUM_LENGTH / Math.max(...sizes.filter((size) => !Number.isNaN(size)));
+    this.centre = new THREE.Vector3();
+    this.vector = new THREE.Vector3();
+    this.tip = new THREE.Vector3();
+    const above = { depthTest: false, transparent: true }; // seen through the spacecraft it lies in
+    this.line = new THREE.Line2(new THREE.LineGeometry(), new THREE.LineMaterial({ linewidth: 4, ...above }));
+    this.line.frustumCulled = false;
+    this.material = new THREE.MeshStandardMaterial({ color: 0x000000, ...above });
+    this.ball = new THREE.Mesh(new THREE.SphereGeometry(0.02, 20, 14), this.material);
+    this.head = new THREE.Mesh(new THREE.CylinderGeometry(0, 0.022, 0.06, 20), this.material);
+    this.up = new THREE.Vector3(0, 1, 0); // along the head
+    [this.line, this.ball, this.head].forEach((part) => { part.renderOrder = 1; group.add(part); });
+  }
+
+  /** Write a vector at time t, straight on between two instants. */
+  read(values, t, vector) {
+    const index = this.motion.index(t);
+    const { times } = this.motion;
+    vector.fromArray(values, 3 * index);
+    if (index + 1 < this.motion.count && t > times[index]) {
+      const part = (t - times[index]) / (times[index + 1] - times[index]);
+      vector.lerp(this.tip.fromArray(values, 3 * index + 3), part);
+    }
+  }
+
+  /** Move to time t. */
+  place(t) {
+    this.read(this.centres, t, this.centre);
+    this.read(this.angular, t, this.vector);
+    this.size = this.vector.length(); // kg m^2/s
+    this.known = !Number.isNaN(this.size + this.centre.x);
+    [this.line, this.ball, this.head].forEach((each) => { each.visible = this.known; });
+    if (!this.known) return;
+    this.tip.copy(this.centre).addScaledVector(this.vector, this.scale);
+    this.line.geometry.setPositions([...this.centre.toArray(), ...this.tip.toArray()]);
+    this.ball.position.copy(this.centre);
+    this.head.position.copy(this.tip);
+    this.head.quaternion.setFromUnitVectors(this.up, this.vector.clone().normalize());
+  }
+
+  paint(colour) {
+    this.line.material.color.set(colour);
+    this.material.emissive.set(colour); // no shading: a mark, not a body
+  }
+
+  /** Its size as text. */
+  get text() { return this.known ? `${this.size.toPrecision(3)} kg m\u00b2/s` : "\u2013"; }
+}
+
 /** Everything drawn of one run, as a group that moves with time. */
 class RunBody {
   constructor(data) {
@@ -201,7 +258,8 @@ class RunBody {
     this.targetGroup = new THREE.Group();
     this.startGroup = new THREE.Group();
     this.nearestGroup = new THREE.Group();
-    this.group.add(this.traceGroup, this.targetGroup, this.startGroup, this.nearestGroup);
+    this.momentumGroup = new THREE.Group();
+    this.group.add(this.traceGroup, this.targetGroup, this.startGroup, this.nearestGroup, this.momentumGroup);
     this.painted = []; // { material, role, arm } to recolour when the theme changes
     this.bodies = this.motion.bodies.map(() => new THREE.Group());
     this.bodies.forEach((body) => this.group.add(body));
@@ -210,6 +268,7 @@ class RunBody {
     this.traces = data.arms.map((arm, index) => this.addArm(arm, index));
     this.basePath = new Trace(this.motion, 0, this.traceGroup);
     this.nearest = data.clearance ? new Nearest(data.clearance, this.motion, this.nearestGroup) : null;
+    this.momentum = data.momentum ? new Momentum(data.momentum, this.motion, this.momentumGroup) : null;
     this.drawStart();
   }
 
@@ -310,6 +369,7 @@ class RunBody {
     this.startLines.color.set(colours.start);
     this.startGroup.visible = !ghost;
     this.nearest?.paint(colours);
+    this.momentum?.paint(colours.momentum);
     [...this.traces, this.basePath].forEach((trace) => {
       trace.past.material.linewidth = ghost ? TRACE_WIDTH * 0.6 : TRACE_WIDTH;
     });
@@ -331,6 +391,7 @@ class RunBody {
     const index = this.motion.index(t);
     [...this.traces, this.basePath].forEach((trace) => trace.show(index));
     this.nearest?.place(t);
+    this.momentum?.place(t);
   }
 
   /** The current position of a body, in m. */

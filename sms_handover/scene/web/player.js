@@ -56,7 +56,8 @@ class Player {
     element("arrange").hidden = this.runs.length === 1;
     element("runs").addEventListener("change", (event) => this.arrange(Number(event.target.value)));
     element("nearest").parentElement.hidden = !this.runs.some((run) => run.nearest);
-    ["traces", "targets", "nearest"].forEach((id) => element(id).addEventListener("change", () => this.showParts()));
+    element("momentum").parentElement.hidden = !this.runs.some((run) => run.momentum);
+    ["traces", "targets", "nearest", "momentum"].forEach((id) => element(id).addEventListener("change", () => this.showParts()));
     document.addEventListener("keydown", (event) => {
       if (event.key === " " && !["BUTTON", "SELECT"].includes(event.target.tagName)) { event.preventDefault(); this.toggle(); }
     });
@@ -101,6 +102,7 @@ class Player {
       run.traceGroup.visible = element("traces").checked;
       run.targetGroup.visible = element("targets").checked;
       run.nearestGroup.visible = element("nearest").checked;
+      run.momentumGroup.visible = element("momentum").checked;
     });
     this.picture.ask();
   }
@@ -198,6 +200,10 @@ class Player {
     if (runs.some((run) => run.nearest)) {
       const colour = runs[0].nearest?.known ? runs[0].nearest.colour : start;
       rows.push({ colour, text: "Least clearance", values: runs.map((run) => run.nearest?.text ?? "\u2013") });
+    }
+    if (runs.some((run) => run.momentum)) {
+      const colour = COLOURS[this.theme].momentum;
+      rows.push({ colour, text: "Angular momentum", values: runs.map((run) => run.momentum?.text ?? "\u2013") });
     }
     const table = document.createElement("table");
     if (runs.length > 1) {
