@@ -70,7 +70,8 @@ make the same with plots; [campaigns.md](campaigns.md) tells how to read it. A l
 name in `laws` of a copy of the file.
 
 The plant has the drawn mass properties, the laws have those of the scenario, with a deputy of
-{campaign.values["deputy.mass"]} kg. A case is a success if `{campaign.success.text}`: every grasp made, and no bodies in each other.
+{campaign.values["deputy.mass"]} kg. A case is a success if `{campaign.success.text}`: every grasp made, and
+no bodies in each other.
 
 {table(["Drawn for the plant", "Distribution"], draws)}
 
