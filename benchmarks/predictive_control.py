@@ -4,7 +4,7 @@ These are Pinocchio's derivatives of dynamics, tools and distances, and DAQP on 
 solve takes beyond them is condensing and the assembly of rows.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from time import process_time
@@ -13,14 +13,15 @@ import numpy as np
 
 from benchmarks.machine import versions
 from benchmarks.results import Result, Table, publish, row
-from benchmarks.timing import Timings, interleaved
+from benchmarks.timing import interleaved
 from sms_handover.control.mpc.distance_rows import DistanceModel
 from sms_handover.control.mpc.law import MpcController
 from sms_handover.control.mpc.momentum import base_start
 from sms_handover.control.mpc.parameters import MpcGains
 from sms_handover.control.mpc.placement import placements
-from sms_handover.control.mpc.planner import Planner, PlanStart
+from sms_handover.control.mpc.planner import Planner, PlanStart, Program
 from sms_handover.control.mpc.prediction import PredictionModel
+from sms_handover.control.mpc.quadratic_program import solve
 from sms_handover.control.mpc.tool_errors import ToolErrorModel
 from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.near_pairs import NearPairs
@@ -32,7 +33,7 @@ from sms_handover.units import seconds_to_ns
 
 INTERVALS = (10, 15, 20)  # [-] of the horizon
 STATES = 20  # [-] reference periods of the task, from each of which one solve is taken
-ROUNDS = 2
+ROUNDS = 2  # [-] of which the shortest counts
 LIMITS: Mapping[str, object] = {"base_attitude_limit": 0.07}  # rad, besides those of scenario `tight`
 WHOLE, PARTS = "whole", "parts"
 _MS_PER_S = 1000.0  # [ms/s]
@@ -86,40 +87,32 @@ class Contest:
         self._tools.at(placed[1:], problem.targets)
         self._distances.at(placed, problem.targets)
 
-    def program(self, problem: Problem) -> float:
-        """Return the wall time of the quadratic program alone, s, in one iteration."""
-        return self.planner.step(problem.start, problem.accelerations, problem.targets).program_time
+    def programs(self) -> list[Program]:
+        """Return the finished quadratic programs."""
+        return [self.planner.program(item.start, item.accelerations, item.targets) for item in self.problems]
+
+    def solve(self, program: Program) -> None:
+        """Solve a finished program."""
+        solve(program.hessian, program.gradient, program.constraints, self.planner.gains.program_iterations)
 
 
-def measured(intervals: int) -> tuple[Timings, list[float], float]:
-    """Return the times of whole and derivatives, the shortest time of each solve, and the median program."""
-    contest = Contest(intervals)
-
-    def all_of(one: str) -> None:
-        for problem in contest.problems:
-            getattr(contest, one)(problem)
-
-    times = interleaved(
-        {name: partial(all_of, name) for name in ("whole", "derivatives")}, ROUNDS, process_time
-    )
-    single = []
-    for problem in contest.problems:
-        taken = interleaved({WHOLE: partial(contest.whole, problem)}, 3, process_time)
-        single.append(taken.best(WHOLE))
-    program = float(np.median([contest.program(problem) for problem in contest.problems]))
-    return times, single, program
+def shortest(run: Callable[[], None]) -> float:
+    """Return the shortest processor time of some calls, s."""
+    return interleaved({WHOLE: run}, ROUNDS, process_time).best(WHOLE)
 
 
 def main() -> None:
     """Measure horizons of several lengths."""
     rows, values = [], {}
     for intervals in INTERVALS:
-        times, single, program = measured(intervals)
-        derivatives = times.best("derivatives") / STATES
-        parts = derivatives + program
-        median, tail = float(np.median(single)), float(np.percentile(single, 99.0))
-        numbers = (median, tail, derivatives, program)
-        rows.append(row(intervals, *(number * _MS_PER_S for number in numbers), median / parts))
+        contest = Contest(intervals)
+        whole = [shortest(partial(contest.whole, problem)) for problem in contest.problems]
+        derivatives = [shortest(partial(contest.derivatives, problem)) for problem in contest.problems]
+        programs = [shortest(partial(contest.solve, program)) for program in contest.programs()]
+        parts = float(np.median(np.add(derivatives, programs)))
+        median, tail = float(np.median(whole)), float(np.percentile(whole, 99.0))
+        numbers = (median, tail, float(np.median(derivatives)), float(np.median(programs)))
+        rows.append(row(str(intervals), *(number * _MS_PER_S for number in numbers), median / parts))
         values[str(intervals)] = {WHOLE: median, "tail": tail, PARTS: parts}
     heading = ("intervals", "solve, median [ms]", "99th percentile [ms]", "derivatives [ms]", "program [ms]")
     publish(
@@ -129,7 +122,7 @@ def main() -> None:
             tables=[Table([*heading, "solve over both"], rows)],
             notes=[
                 f"Processor time of one iteration at each of the first {STATES} reference periods of "
-                "scenario `tight`, with the base's rotation limited too; the shortest of 3 counts. "
+                "scenario `tight`, with the base's rotation limited too; the shortest of some counts. "
                 "Derivatives are Pinocchio's, of dynamics, tools and distances; the program is DAQP with its "
                 "checks. "
                 f"Compared: {versions(('pin', 'daqp', 'numpy'))}.",

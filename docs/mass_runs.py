@@ -13,6 +13,7 @@ from sms_handover.analysis.numbers import angle_between
 from sms_handover.control.nmpc import NMPC
 from sms_handover.control.pid import PID
 from sms_handover.errors import UnstableLoopError
+from sms_handover.graph.events import Severity
 from sms_handover.model.known_payload import KnownPayload
 from sms_handover.model.poses import se3_of
 from sms_handover.model.reduced import reduced_dynamics
@@ -60,7 +61,8 @@ class Case:
 class Outcome:
     """What came of a run: in words, the distance of each grasp in mm, and its largest figures.
 
-    ``turn`` deg is the farthest that the base was from its first attitude, ``peak`` N m the largest torque.
+    ``turn`` deg is the farthest that the base was from its first attitude, ``peak`` N m the largest torque
+    from the capture on.
     """
 
     words: str
@@ -113,7 +115,7 @@ def scenario_of(case: Case) -> Scenario:
 def outcome_of(case: Case) -> Outcome:
     """Return what comes of a case; its run ends with the first grasp that misses."""
     scenario = scenario_of(case)
-    if case.law == PID.name:  # under nmpc nothing is unstable, and a run that fails says more than its check
+    if case.law == PID.name and case.scenario != FIRST:  # there it runs, as the prototype did; nmpc is stable
         try:
             check_scenario(scenario)
         except UnstableLoopError:
@@ -121,7 +123,8 @@ def outcome_of(case: Case) -> Outcome:
     run = _run(scenario)
     attitude = run.base_pose[:, 3:]
     turn = float(np.max(angle_between(attitude[:1], attitude))) * DEG_PER_RAD
-    peak = float(np.max(np.abs(run.joint_effort)))
+    held = run.tick_ns > run.grasp_events[0].stamp_ns  # before, no mass is in the hand
+    peak = float(np.max(np.abs(run.joint_effort[held]), initial=0.0))
     distances = tuple(event.position_error * MM_PER_M for event in run.grasp_events)
     return Outcome(_words(case, scenario, run), distances, turn, peak)
 
@@ -195,8 +198,8 @@ def _words(case: Case, scenario: Scenario, run: RunData) -> str:
             return f"{event.command.action.value} missed by {event.position_error * MM_PER_M:.0f} mm"
     failed = next((phase for phase in run.phases if phase.failed), None)
     if failed:
-        why = run.run_events[-1].kind if run.run_events else "failed"
-        return f"{why} at {ns_to_seconds(failed.stamp_ns):.0f} s"
+        why = [event.kind for event in run.run_events if event.severity is Severity.ERROR]
+        return f"{why[-1]} at {ns_to_seconds(failed.stamp_ns):.0f} s"
     if case.scenario != FIRST:
         world = scenario.truth
         touched = collisions_in_words(run_clearance(run, TaskTexts(world.robot.urdf, world.schedule.text)))

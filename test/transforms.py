@@ -18,8 +18,13 @@ class TransformTree:
     def add(self, message: Any) -> None:
         """Take a TFMessage of any library."""
         for item in message.transforms:
-            matrix = _matrix(item.transform.translation, item.transform.rotation)
-            self._in_parent[item.child_frame_id] = item.header.frame_id, matrix
+            at, turn = item.transform.translation, item.transform.rotation
+            row = np.array([at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w])
+            self.place(item.header.frame_id, item.child_frame_id, row)
+
+    def place(self, parent: str, child: str, row: Array) -> None:
+        """Take the pose (7,) of a frame in its parent."""
+        self._in_parent[child] = parent, matrix_of(row)
 
     @property
     def frames(self) -> set[str]:
@@ -43,7 +48,3 @@ def matrix_of(row: Array) -> Array:
     vector, cross = np.array([qx, qy, qz]), np.array([[0.0, -qz, qy], [qz, 0.0, -qx], [-qy, qx, 0.0]])
     matrix[:3, :3] = (qw * qw - vector @ vector) * np.eye(3) + 2.0 * (np.outer(vector, vector) + qw * cross)
     return matrix
-
-
-def _matrix(at: Any, turn: Any) -> Array:
-    return matrix_of(np.array([at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w]))

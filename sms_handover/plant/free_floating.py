@@ -263,8 +263,9 @@ class FreeFloatingPlant:
 
     def _carry_out(self, command: GraspCommand) -> GraspEvent:
         """Execute one command; with a deputy that has mass its momentum changes hands too."""
-        self._deputy_follow()
         v = self.v if self._next_v is None else self._next_v
+        if self._deputy.holder:
+            self._kinematics.carry(self._deputy, self.q, v)
         motions = {arm: self._kinematics.tool_motion(self.q, v, arm) for arm in self._robot.arms}
         tools = {arm: pose for arm, (pose, _) in motions.items()}
         twists = {arm: twist for arm, (_, twist) in motions.items()}

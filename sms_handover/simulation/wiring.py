@@ -165,8 +165,8 @@ def _computed_torque(
         return make
     if Need.PAYLOAD not in law.needs:
         raise ConfigurationError(
-            f"disturbance_bandwidth is {bandwidth:g} 1/s, must be 0 under control law {law.name!r}, which "
-            "has no model of the dynamics"
+            f"disturbance_bandwidth is {bandwidth:g} 1/s, must be 0 under control law {law.name!r}, "
+            "which has no model of the dynamics"
         )
     if bandwidth * dt > 1.0:
         raise ConfigurationError(

@@ -97,7 +97,7 @@ def test_masses_are_read_back_from_what_the_plant_integrates() -> None:
 @pytest.mark.parametrize(
     ("path", "value"),
     [
-        ("conditions.friction.coulomb", 0.1),
+        ("conditions.friction.viscous", 0.1),
         ("conditions.command.delay", 0.004),
         ("conditions.model_error.base.mass", 0.02),
     ],

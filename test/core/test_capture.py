@@ -147,6 +147,19 @@ def test_the_event_tells_how_deputy_and_hand_moved(robot: RobotModel, draw: Draw
     assert event.relative_rate == pytest.approx(np.linalg.norm((twist - hand)[3:]), rel=1e-12)
 
 
+def test_two_commands_of_one_instant_are_carried_out_one_after_the_other(robot: RobotModel) -> None:
+    """The second hand finds the deputy as the impulse of the first one has left it, as if a moment later."""
+    at_once, later = (moving(Draw(robot, seed=8), 4.0, speed=1.0, tick_ns=1) for _ in range(2))
+    first, second = at_once.execute(_STEPS[:2])
+    (same,) = later.execute(_STEPS[:1])
+    later.apply(np.zeros(robot.n_joints))
+    (expected,) = later.execute(_STEPS[1:2])
+    assert first == same
+    for name in ("relative_twist", "impulse", "energy_lost", "relative_speed"):
+        found = getattr(second, name)
+        np.testing.assert_allclose(found, getattr(expected, name), rtol=0.0, atol=1e-5, err_msg=name)
+
+
 def test_a_captured_deputy_is_carried_with_its_momentum(robot: RobotModel, draw: Draw) -> None:
     """A tenth of a second in each hand: momenta stay, energy is work less heat, nothing slips."""
     plant = moving(draw, 12.0, speed=0.1, tick_ns=_MS)

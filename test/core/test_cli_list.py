@@ -45,7 +45,7 @@ def test_a_law_of_another_package_is_listed_with_where_it_comes_from(
     laws = {"task_space_pd": "my_controller.law:LAW", "broken": "my_controller.no_such:LAW"}
     monkeypatch.syspath_prepend(offer(tmp_path / "site", "my_controller", **laws))
     rows = {row["law"]: row for row in listed(capsys, "laws")}
-    assert list(rows) == ["nmpc", "pid", "broken", "task_space_pd"]
+    assert list(rows) == ["nmpc", "pid", "mpc", "broken", "task_space_pd"]
     assert rows["nmpc"]["package"] == "sms_handover"
     assert rows["task_space_pd"] == {
         "law": "task_space_pd",

@@ -10,13 +10,13 @@ import pytest
 from sms_handover.analysis.equality import Difference, compare_runs
 from sms_handover.graph.events import RunEvent, Severity
 from sms_handover.run_data import RunData
-from sms_handover.types import GraspStatus
+from sms_handover.types import GraspStatus, PlanReport, PlanStatus
 
 from .bag_messages import made_up_run
 
 ARRAYS = [item.name for item in fields(RunData) if isinstance(getattr(made_up_run(3), item.name), np.ndarray)]
 PER_ARM = ("target_pose", "tool_pose")
-TEXTS = ("joint_names", "arms", "phases", "grasp_events", "run_events")
+TEXTS = ("joint_names", "arms", "phases", "grasp_events", "run_events", "plans")
 
 
 @pytest.fixture
@@ -54,6 +54,16 @@ def test_one_bit_in_any_array_is_a_difference(run: RunData, name: str) -> None:
         assert difference.field == name
         assert f"1 of {array.shape[0]} rows, first row {row}, by " in difference.detail
         assert str(difference) == f"{name}: {difference.detail}"
+
+
+def test_a_plan_is_the_same_however_long_it_took(run: RunData) -> None:
+    plan = PlanReport(0, 1, PlanStatus.SOLVED, 3, ("rate of a",), 0.1, "rate of a", 1e-9, 0.1, 0.2, 0.3, 0.0)
+    slow = replace(plan, linearization_time=1.0, program_time=2.0, total_time=3.0)
+    other = replace(plan, largest_slack=np.nextafter(0.1, 1.0))
+    mine = replace(run, plans=(plan,))
+    assert compare_runs(mine, replace(run, plans=(slow,))) == ()
+    (difference,) = compare_runs(mine, replace(run, plans=(other,)))
+    assert difference.field == "plans"
 
 
 @pytest.mark.parametrize("name", PER_ARM)

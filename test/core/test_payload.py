@@ -218,7 +218,7 @@ def test_a_run_with_a_payload_conserves_and_says_what_it_lost(tmp_path: Path) ->
     run = simulate(load_scenario("colliding", passing(tmp_path)))
     caught, handed_over = run.grasp_events
     assert {caught.status, handed_over.status} == {GraspStatus.SUCCEEDED}
-    assert caught.energy_lost > 1e-3 and caught.relative_speed > 0.04  # [J], [m/s]
+    assert caught.energy_lost > 1e-3 and caught.relative_speed > 0.02  # [J], [m/s]
     for momentum in (run.linear_momentum, run.angular_momentum):
         assert np.linalg.norm(momentum[0]) > 0.01
         np.testing.assert_allclose(

@@ -17,6 +17,7 @@ from sms_handover.frames import BASE, WORLD
 from sms_handover.graph.topics import (
     BASE_ODOMETRY,
     CONTROLLER,
+    GRASP_EVENT,
     JOINT_COMMAND,
     JOINT_REFERENCE,
     JOINT_STATES,
@@ -63,7 +64,7 @@ class Rest:
         self.node = bench.add(ControllerNode)
         endpoints = Endpoints(bench.plain(PLANT), TOPICS, (PLANT, CONTROLLER))
         self._publish: dict[str, CountedPublisher] = {
-            name: endpoints.publisher(name) for name in (*INPUTS, *self._targets(), RUN_STATE)
+            name: endpoints.publisher(name) for name in (*INPUTS, *self._targets(), GRASP_EVENT, RUN_STATE)
         }
         self.commands: list[bytes] = []
         endpoints.subscribe(JOINT_COMMAND, self.commands.append, raw=True)

@@ -14,6 +14,7 @@ from sensor_msgs.msg import JointState
 from sms_handover_interfaces.msg import GraspCommand as GraspCommandMessage
 from sms_handover_interfaces.msg import GraspEvent as GraspEventMessage
 from sms_handover_interfaces.msg import IkStatus as IkStatusMessage
+from sms_handover_interfaces.msg import MpcStatus
 from sms_handover_interfaces.msg import RunEvent as RunEventMessage
 from sms_handover_interfaces.msg import TaskPhase as TaskPhaseMessage
 
@@ -24,6 +25,7 @@ from sms_handover.graph.message_constants import CONSTANTS, member_of
 from sms_handover.messages.values import (
     grasp_event,
     header_ns,
+    plan_report,
     run_event,
     status_values,
     task_phase,
@@ -34,6 +36,7 @@ from sms_handover.ros.codecs.convert import (
     header,
     joints_in_order,
     phase_message,
+    plan_message,
     pose_of_message,
     run_event_message,
     set_ik_status,
@@ -49,6 +52,8 @@ from sms_handover.types import (
     IkResult,
     IkStatus,
     PhaseState,
+    PlanReport,
+    PlanStatus,
     Pose,
     TaskPhase,
 )
@@ -135,6 +140,7 @@ DEFINITIONS: Mapping[type[Enum], Any] = {
     GraspStatus: GraspEventMessage,
     IkStatus: IkStatusMessage,
     PhaseState: TaskPhaseMessage,
+    PlanStatus: MpcStatus,
     Severity: RunEventMessage,
 }
 
@@ -146,6 +152,27 @@ def test_the_numbers_in_messages_are_the_constants_of_their_definitions() -> Non
     assert [member_of(type(member), CONSTANTS[member]) for member in members] == members
     with pytest.raises(KeyError):
         member_of(GraspAction, len(GraspAction))
+
+
+@pytest.mark.parametrize("status", list(PlanStatus))
+def test_the_report_of_a_plan_comes_back(status: PlanStatus) -> None:
+    report = PlanReport(
+        40_000_000,
+        3,
+        status,
+        17,
+        ("rate of a", "distance b - c"),
+        1e-3,
+        "rate of a",
+        1e-9,
+        0.1,
+        0.2,
+        0.3,
+        0.04,
+        5,
+        6,
+    )
+    assert plan_report(through_cdr(plan_message(report))) == report
 
 
 def test_reordering_an_enum_changes_no_number() -> None:

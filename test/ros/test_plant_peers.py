@@ -75,7 +75,8 @@ class FakeController:
         for unused in (DIAGNOSTICS, RUN_EVENTS, RUN_PUBLISHED):
             self._endpoints.publisher(unused)
         self._endpoints.subscribe(JOINT_STATES, self._on_state)
-        self._endpoints.subscribe(BASE_ODOMETRY, lambda message: None)
+        for unread in (BASE_ODOMETRY, GRASP_EVENT):
+            self._endpoints.subscribe(unread, lambda message: None)
         self._endpoints.subscribe(RUN_STATE, self._on_run)
 
     def get_ready(self, bench: Bench) -> None:

@@ -1,5 +1,6 @@
 """A recorded run over DDS is the run in one process, bit for bit, whatever else the machine does."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -39,6 +40,24 @@ def test_first_run(law: str, recorded: dict[str, tuple[Path, Ended]], simulated:
     assert_same_bits(run, simulated[law])
     assert "run complete at 1.02 s" in ended.out
     assert "grasp by arm_a: succeeded" in ended.err and "transfer by arm_b: succeeded" in ended.err
+
+
+def test_a_capture_with_a_jump(schedule: Path, tmp_path: Path) -> None:
+    """A deputy of 12 kg passes by at 50 mm/s, tumbling, and is caught; the model has half of its mass."""
+    values = {
+        "deputy.mass": 12.0,  # [kg]
+        "deputy.twist_in_world": {"linear": [0.05, 0.0, 0.0], "angular": [0.0, 0.1, 0.05]},  # [m/s], [rad/s]
+        "model.deputy.mass": 6.0,  # [kg]
+        "plant.grasp_position_tolerance": 0.05,  # [m]
+        "plant.grasp_speed_tolerance": 0.2,  # [m/s]
+        "plant.grasp_rate_tolerance": 0.5,  # [rad/s]
+    }
+    given = [word for path, value in values.items() for word in ("-p", f"{path}:={json.dumps(value)}")]
+    ended = sms_handover("run", "--schedule", schedule, "-o", "out", *given, cwd=tmp_path)
+    assert "grasp by arm_a: succeeded" in ended.err, ended
+    run = read_run(tmp_path / "out" / "bag")
+    assert run.grasp_events[0].energy_lost > 0.0
+    assert_same_bits(run, simulate(scenario_in(read_info(tmp_path / "out" / "bag"), tmp_path)))
 
 
 def test_runs_side_by_side_do_not_hear_each_other(

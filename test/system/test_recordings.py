@@ -13,6 +13,7 @@ import pytest
 import yaml
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from rerun.chunk import RrdReader
 from rosbags.highlevel import AnyReader
 
 from sms_handover.bag.info import BagInfo, read_info
@@ -253,3 +254,15 @@ def test_rerun_opens_a_bag_with_robot_and_transforms(bag: Path, tmp_path: Path) 
     for shape in read_scene(bag).shapes:
         assert f"/visual_geometries/{shape.link}/visual_0" in listed
     subprocess.run([rerun, "rrd", "verify", str(tmp_path / "run.rrd")], check=True)
+    scene, trees = read_scene(bag), dict[int, TransformTree]()
+    for chunk in RrdReader(str(tmp_path / "run.rrd")).stream():
+        if chunk.entity_path in ("/tf", "/tf_static"):
+            for row in chunk.to_record_batch().to_pylist():
+                if parent := row.get("Transform3D:parent_frame"):
+                    (at,), (turn,) = row["Transform3D:translation"], row["Transform3D:quaternion"]
+                    stamp_ns = 0 if chunk.entity_path == "/tf_static" else row["message_log_time"].value
+                    tree = trees.setdefault(stamp_ns, TransformTree())
+                    tree.place(parent[0], row["Transform3D:child_frame"][0], np.array([*at, *turn]))
+    for place, link in enumerate(scene.links):  # rerun keeps single precision
+        error = trees[0].in_world(link) - matrix_of(scene.link_in_world[0, place])
+        assert np.abs(error).max() < 2e-6, link

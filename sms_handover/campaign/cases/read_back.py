@@ -52,7 +52,7 @@ def read_back(loop: Loop, path: str) -> Value:
 
 
 def is_exact(loop: Loop, path: str) -> bool:
-    """Whether a value is to come back as it was set: a robot with a model error differs from it."""
+    """Whether the value at a path comes back as it was set; that of a robot with a model error does not."""
     if loop.scenario.truth.model_error is None:
         return True
     return not path.removeprefix(f"{TRUTH}.").startswith(f"{ROBOT}.")

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
-from sms_handover.control.mpc.constraints import Limits
+from sms_handover.control.mpc.constraints import Constraint, Limits
 from sms_handover.control.mpc.cost import PlanCost
 from sms_handover.control.mpc.distance_rows import DistanceModel
 from sms_handover.control.mpc.horizon import Horizon
@@ -27,6 +27,15 @@ class PlanStart:
     q: Array
     w: Array
     base: BaseStart
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A quadratic program in the changes of the accelerations (N n,): Hessian, gradient and constraints."""
+
+    hessian: Array
+    gradient: Array
+    constraints: Sequence[Constraint]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +67,15 @@ class Planner:
     def step(self, start: PlanStart, accelerations: Array, targets: Sequence[PreviewedTargets]) -> Step:
         """Return one iteration about accelerations (N, n), towards targets at all instants but the first."""
         begun = perf_counter()
+        program = self.program(start, accelerations, targets)
+        linearized = perf_counter()
+        solution = solve(
+            program.hessian, program.gradient, program.constraints, self.gains.program_iterations
+        )
+        return Step(solution, linearized - begun, perf_counter() - linearized)
+
+    def program(self, start: PlanStart, accelerations: Array, targets: Sequence[PreviewedTargets]) -> Program:
+        """Return the quadratic program about accelerations (N, n)."""
         horizon = self.horizon
         prediction = self.prediction.predict(horizon, start.base, start.q, start.w, accelerations)
         placed = placements(prediction)
@@ -66,6 +84,4 @@ class Planner:
         sensitivity = Sensitivity(horizon, prediction)
         hessian, gradient = self._cost.quadratic(prediction, accelerations, sensitivity, errors, targets)
         constraints = self._limits.constraints(horizon, prediction, sensitivity, distances)
-        linearized = perf_counter()
-        solution = solve(hessian, gradient, constraints, self.gains.program_iterations)
-        return Step(solution, linearized - begun, perf_counter() - linearized)
+        return Program(hessian, gradient, constraints)
