@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from benchmarks.campaign_stub import row_text
-from benchmarks.machine import machine
+from benchmarks.machine import load_average, machine
 from benchmarks.results import ROOT
 from docs.tables import table
 from sms_handover.campaign.cases.case_process import Done
@@ -113,7 +113,8 @@ def page(drivers: Iterable[Driver], overheads: Iterable[tuple[int, float]]) -> s
     ]
     last = measured[-1]
     million = 1e6 * last.journal / _MB
-    lines = "\n".join(f"- {line}" for line in machine())
+    load = f"Load: {load_average():.0f} processes wanted to run; more than there are cores make all slower"
+    lines = "\n".join(f"- {line}" for line in (*machine(), load))
     minutes, hours, pace = 1e6 / last.rate / 60.0, 3e6 / 64.0 / 3600.0, 64.0 / 3.0
     return f"""\
 # Scale of campaigns

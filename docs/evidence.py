@@ -69,8 +69,9 @@ with the same draws, {len(entries)} runs. `sms-handover campaign run laws` and `
 make the same with plots; [campaigns.md](campaigns.md) tells how to read it. A law of your own enters by its
 name in `laws` of a copy of the file.
 
-The plant has drawn mass properties and a deputy of {campaign.values.get("truth.deputy.mass", 0)} kg; the laws
-know neither. A case is a success if `{campaign.success.text}`: every grasp made, and no bodies in each other.
+The plant has the drawn mass properties, the laws have those of the scenario, with a deputy of
+{campaign.values["deputy.mass"]} kg. A case is a success if `{campaign.success.text}`: every grasp made, and
+no bodies in each other.
 
 {table(["Drawn for the plant", "Distribution"], draws)}
 

@@ -13,6 +13,7 @@ from sms_handover.analysis.numbers import angle_between
 from sms_handover.control.nmpc import NMPC
 from sms_handover.control.pid import PID
 from sms_handover.errors import UnstableLoopError
+from sms_handover.graph.events import Severity
 from sms_handover.model.known_payload import KnownPayload
 from sms_handover.model.poses import se3_of
 from sms_handover.model.reduced import reduced_dynamics
@@ -197,8 +198,8 @@ def _words(case: Case, scenario: Scenario, run: RunData) -> str:
             return f"{event.command.action.value} missed by {event.position_error * MM_PER_M:.0f} mm"
     failed = next((phase for phase in run.phases if phase.failed), None)
     if failed:
-        why = run.run_events[-1].kind if run.run_events else "failed"
-        return f"{why} at {ns_to_seconds(failed.stamp_ns):.0f} s"
+        why = [event.kind for event in run.run_events if event.severity is Severity.ERROR]
+        return f"{why[-1]} at {ns_to_seconds(failed.stamp_ns):.0f} s"
     if case.scenario != FIRST:
         world = scenario.truth
         touched = collisions_in_words(run_clearance(run, TaskTexts(world.robot.urdf, world.schedule.text)))

@@ -374,10 +374,12 @@ class PreviewState:
     """Everything that a preview depends on: the phase as it began, the deputy, and the time law of targets.
 
     ``start_ns`` is when the phase began, with joints (n,) rad and tools as they were. ``grasp_frame`` is
-    where ``holder`` has the deputy; ``deputy_in_world`` is where it was last.
+    where ``holder`` has the deputy; ``deputy_in_world`` is where it was last. ``corrections`` tell by arm how
+    far off the targets at ``stamp_ns`` were what was expected: a shift in ``world``, and a turn of its axes.
     """
 
     phase: TaskPhase
+    stamp_ns: int
     start_ns: int
     joints_at_start: Array
     tools_at_start: Mapping[str, Pose]
@@ -385,10 +387,12 @@ class PreviewState:
     grasp_frame: str
     deputy_in_world: Pose
     time_law: str
+    corrections: Mapping[str, Pose]
 
     def __post_init__(self) -> None:
         freeze(self, "joints_at_start")
-        object.__setattr__(self, "tools_at_start", MappingProxyType(dict(self.tools_at_start)))
+        for name in ("tools_at_start", "corrections"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
 
 class PlanStatus(Enum):

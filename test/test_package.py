@@ -43,6 +43,7 @@ BY_PIP_ONLY = {
     "Basilisk",
     "SALib",
     "casadi",
+    "dask",
     "distributed",
     "mujoco",
     "pandas",

@@ -16,6 +16,7 @@ from sms_handover.frames import BASE, WORLD
 from sms_handover.graph.topics import (
     BASE_ODOMETRY,
     CONTROLLER,
+    GRASP_EVENT,
     JOINT_COMMAND,
     JOINT_STATES,
     PLANT,
@@ -73,6 +74,8 @@ class CommandReplay:
         reads = dict(zip(_STATE, (self._codec.joints.checked, self._codec.odometry.checked), strict=True))
         for name, read in reads.items():
             self._subscribe(name, self.refusals.wrap(name, partial(self._on_state, name), _raw(read)))
+        # a controller hears of grasps; the recorded commands know of them
+        self._endpoints.subscribe(GRASP_EVENT, lambda data: None, raw=True)
         self._subscribe(RUN_STATE, self.refusals.wrap(RUN_STATE, self._on_run_state, _run_state))
         self._matching = node.create_timer(_MATCHING_PERIOD_S, self._check_matched)
 

@@ -51,7 +51,8 @@ class TargetPreview:
 
     A controller does not hear by which time law targets move, nor where the deputy is: of the time laws that
     one is taken which fits the targets of now best; the deputy is where the schedule has it, then in the
-    grasp of the arm that has grasped it. What the targets of now are off by, those to come are too. A
+    grasp of the arm that has grasped it. What the targets of now are off by,
+    those to come are too, and ever more if that grows. A
     preview ends where commands are due, as what follows depends on their outcome.
     """
 
@@ -87,8 +88,10 @@ class TargetPreview:
             now = replace(now, deputy_in_world=held)
         self._leg, self._joints = self._leg_of(now), q[-self._robot.n_joints :]
         now = replace(now, time_law=self._fitting(now, reference, tool_in_world))
-        self._corrections = self._corrections_of(now, phase.stamp_ns, tool_in_world)
-        self._now = now
+        found = self._corrections_of(now, phase.stamp_ns, tool_in_world)
+        since = ns_to_seconds(phase.stamp_ns - now.stamp_ns)
+        self._drifts = {arm: _drift(now.corrections.get(arm), one, since) for arm, one in found.items()}
+        self._now = replace(now, stamp_ns=phase.stamp_ns, corrections=found)
 
     def grasped(self, event: GraspEvent) -> None:
         """Learn what came of a grasp command, between two updates."""
@@ -114,7 +117,8 @@ class TargetPreview:
         deputy = now.deputy_in_world if now else self._schedule.deputy.deputy_in_world
         law = now.time_law if now else next(iter(TIME_LAWS))
         grip = (now.holder, now.grasp_frame) if now else ("", "")
-        return PreviewState(phase, phase.stamp_ns, joints, tools, *grip, deputy, law)
+        stamp_ns = phase.stamp_ns
+        return PreviewState(phase, stamp_ns, stamp_ns, joints, tools, *grip, deputy, law, {})
 
     def _leg_of(self, now: PreviewState) -> _Leg:
         """Return the leg of the phase of now."""
@@ -194,13 +198,13 @@ class TargetPreview:
 
     def _corrections_of(
         self, now: PreviewState, stamp_ns: int, tool_in_world: Mapping[str, Pose]
-    ) -> Mapping[str, tuple[Array, Array]]:
-        """Return by how much the targets of now are off: rotation (3, 3) and shift (3,) m in ``world``."""
-        done, found = _progress(now.time_law, self._leg, stamp_ns), {}
+    ) -> Mapping[str, Pose]:
+        """Return by how much the targets of now are off."""
+        done, found = _progress(now.time_law, self._leg, stamp_ns), dict[str, Pose]()
         for arm, goal in self._leg.goals.items():
             expected, given = PosePath(self._leg.tools[arm], goal).at(done)[0], tool_in_world[arm]
             turn = se3_of(given).rotation @ se3_of(expected).rotation.T
-            found[arm] = turn, given.position - expected.position
+            found[arm] = pose_of(pin.SE3(turn, given.position - expected.position))
         return found
 
     def _targets(self, now: PreviewState, leg: _Leg, stamp_ns: int) -> PreviewedTargets:
@@ -208,10 +212,12 @@ class TargetPreview:
         done, tools, twists = _progress(now.time_law, leg, stamp_ns), dict[str, Pose](), dict[str, Twist]()
         for arm, goal in leg.goals.items():
             pose, twist = PosePath(leg.tools[arm], goal).at(done)
-            if arm in self._corrections:
-                turn, shift = self._corrections[arm]
+            if arm in now.corrections:
+                ahead, drift = ns_to_seconds(stamp_ns - now.stamp_ns), self._drifts[arm]
+                turn = pin.exp3(ahead * drift.angular) @ se3_of(now.corrections[arm]).rotation
+                shift = now.corrections[arm].position + ahead * drift.linear
                 pose = pose_of(pin.SE3(turn @ se3_of(pose).rotation, pose.position + shift))
-                twist = Twist(twist.linear, turn @ twist.angular)
+                twist = Twist(twist.linear + drift.linear, turn @ twist.angular + drift.angular)
             tools[arm], twists[arm] = pose, twist
         rates = done.rate * (leg.ends - leg.joints)
         joints = leg.joints + done.fraction * (leg.ends - leg.joints)
@@ -225,6 +231,14 @@ class TargetPreview:
             held = pose_of(se3_of(frame).inverse())
             return PreviewedTargets(tools, twists, joints, rates, now.holder, held, touching)
         return PreviewedTargets(tools, twists, joints, rates, "", now.deputy_in_world, touching)
+
+
+def _drift(before: Pose | None, now: Pose, since: float) -> Twist:
+    """Return how a correction changes, in ``world`` axes, zero where it is the first."""
+    if before is None or since <= 0.0:
+        return Twist(np.zeros(3), np.zeros(3))
+    turned = se3_of(now).rotation @ se3_of(before).rotation.T
+    return Twist((now.position - before.position) / since, pin.log3(turned) / since)
 
 
 def _progress(law: str, leg: _Leg, stamp_ns: int) -> Progress:

@@ -23,7 +23,7 @@ def main() -> None:
             time.sleep(60.0)
         if bad and case == DIES:
             os.kill(os.getpid(), signal.SIGKILL)
-        eaten = list[bytes]()
+        eaten: list[bytes] = []
         while bad and case == EATS and len(eaten) < MOST:
             eaten.append(b"x" * 10_000_000)
             time.sleep(0.001)

@@ -97,7 +97,7 @@ def test_laws_are_compared_and_reported(
     [
         (["compare", "OUT", "--csv", "-"], "--csv is for runs: the cases of OUT are in its cases.parquet"),
         (["compare", "OUT", "OUT"], "OUT is a campaign: give it alone"),
-        (["report", "OUT", "--figures", "x"], "the paper's figures are those of runs"),
+        (["report", "OUT", "--figures", "x"], "figures and second engines are for runs"),
         (["campaign", "rerun", "OUT", "2"], "case is 2, must be from 0 to 1"),
         (["campaign", "rerun", "OUT", "0", "--law", "pdi"], "unknown law 'pdi' (did you mean 'pid'?)"),
         (["campaign", "rerun", "OUT", "0", "--view"], "--view shows a recording: give --bag too"),

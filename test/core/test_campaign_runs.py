@@ -210,6 +210,7 @@ def test_a_full_disk_is_a_clear_error_and_the_same_command_goes_on(
         with pytest.raises(SmsHandoverError, match="No space left on device; make room, then the same"):
             run_here(file, out, program=STUB)
     assert len(rows_of(out)) == journal_lines(out) == 3
+    assert (out / JOURNAL).read_bytes().endswith(b"}\n"), "no part of a line is left behind"
     run_here(file, out, program=STUB)
     run_here(file, tmp_path / "good", program=STUB)
     assert digests_of(out) == digests_of(tmp_path / "good")

@@ -244,6 +244,17 @@ def test_a_limit_is_kept_that_binds(name: str, free: RunData) -> None:
     assert all(plan.largest_slack == 0.0 for plan in free.plans)
 
 
+def test_the_limits_of_the_tight_scenario_are_kept_and_needed() -> None:
+    """Up to beyond the middle of the first motion; the closed form exceeds that of the joints there."""
+    values = {"common.duration": 8.6, "common.tick": 0.02}
+    planned = simulate(load_scenario("tight", values))
+    free = simulate(load_scenario("tight", {**values, "law": "nmpc"}))
+    limits = load_scenario("tight").parameters.controller
+    kept, exceeded = peaks(planned), peaks(free)
+    assert kept["base_rate_limit"] <= 1.01 * limits.base_rate_limit
+    assert kept["joint_rate_limit"] <= 1.01 * limits.joint_rate_limit < 0.9 * exceeded["joint_rate_limit"]
+
+
 def test_a_plan_begins_where_the_robot_will_be() -> None:
     """One period of delay, predicted: joints, rates and attitude are met when the plan comes into use."""
     loop = Loop(scenario_of("paper", 1.0))

@@ -18,7 +18,7 @@ pytestmark = [pytest.mark.system, pytest.mark.slow]
 
 PERIODS = (TICKS - 1) // 20 + 1
 PER_TICK = 3  # messages over DDS: two of the state, one of the command
-PER_PERIOD = 15  # messages over DDS beside them each reference period, without the service
+PER_PERIOD = 16  # messages over DDS beside them each reference period, without the service
 WAKES = {PLANT: TICKS, CONTROLLER: TICKS, TRAJECTORY: 2 * PERIODS, IK: PERIODS}
 MARGIN = 1.05  # [-] a message may overtake one that another writer has sent before it
 
