@@ -89,8 +89,8 @@ to there, which the times in the list show.
 ## Bounds and what was measured
 
 The bounds are stated per scenario (`sms_handover/engines/bounds.py`). A run in which the deputy has mass has
-those of `massive` unless its scenario has its own, another scenario that is not shipped those of `paper`. They
-notice what they are for: 0.1 % more mass of any one link is beyond those of `smooth` within two seconds
+those of `massive` unless its scenario has its own, another scenario that is not shipped those of `paper`.
+They notice what they are for: 0.1 % more mass of any one link is beyond those of `smooth` within two seconds
 (`test/verification/test_second_engine.py`). Largest differences over a whole run, under the law of the
 scenario, written by `make engines`:
 
