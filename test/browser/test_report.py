@@ -103,7 +103,7 @@ def test_it_opens_whole_and_without_a_network(
         "plots.plots.map((plot) => plot.frame.querySelectorAll('.scatterlayer .trace').length)"
     )
     # position and orientation error of two arms, torques, errors of joints, base, conservation, clearance
-    per_run = [1, 1, 1, 1, 7, 7, 7, 7, 3, 3, 1, 1, 1, 1, 2, 1, 5]
+    per_run = [1, 1, 1, 1, 7, 7, 7, 7, 3, 3, 1, 1, 1, 1, 3, 1, 5]
     assert traces == [len(runs) * count for count in per_run]
 
 

@@ -13,9 +13,9 @@ from sms_handover.graph.topics import LOOP_NODES
 from .bag_damage import chunks_of, write_file
 from .test_bag_check import write_finished
 
-# three topics each tick, eleven each reference period, and what comes once in a run
+# three topics each tick, twelve each reference period, and what comes once in a run
 ONCE = ("description", "state", "grasp", "transfer", "decision", "another decision", *LOOP_NODES)
-MESSAGES = 3 * 201 + 11 * 11 + len(ONCE)
+MESSAGES = 3 * 201 + 12 * 11 + len(ONCE)
 
 
 @pytest.fixture

@@ -397,7 +397,7 @@ REFUSED: dict[str, tuple[str, str, str, str]] = {
     "deputy with too much mass": (
         "mass: 0.0",
         "mass: 1.0e+6",
-        "deputy.mass is 1e+06 kg, must be >= 0 and <= 100000 kg",
+        "deputy.mass is 1000000.0 kg, must be >= 0 and <= 100000 kg",
         "mass",
     ),
     "deputy with the inertia of no body": (
@@ -409,7 +409,7 @@ REFUSED: dict[str, tuple[str, str, str, str]] = {
     "deputy with negative mass": (
         "mass: 0.0",
         "mass: -1.0",
-        "deputy.mass is -1.0 kg, must be >= 0 kg",
+        "deputy.mass is -1.0 kg, must be >= 0 and <= 100000 kg",
         "-1.0\n",
     ),
     "deputy without extent": (

@@ -12,6 +12,7 @@ from sms_handover.frames import BASE, WORLD
 from sms_handover.graph.topics import (
     BASE_ODOMETRY,
     CONTROLLER,
+    GRASP_EVENT,
     JOINT_COMMAND,
     JOINT_STATES,
     PLANT,
@@ -60,6 +61,9 @@ def recorded(ticks: Sequence[int], *, without_command: Sequence[int] = ()) -> li
     return found
 
 
+_PUBLISHED = (JOINT_STATES, BASE_ODOMETRY, RUN_STATE, GRASP_EVENT)
+
+
 class FakePlant:
     """Publishes the states that the test says, and keeps the answers."""
 
@@ -68,7 +72,7 @@ class FakePlant:
         bench.start()
         self._bench = bench
         self._endpoints = Endpoints(bench.plain(PLANT), graph_topics(ROBOT.arms), PEERS)
-        self._publish = {n: self._endpoints.publisher(n) for n in (JOINT_STATES, BASE_ODOMETRY, RUN_STATE)}
+        self._publish = {n: self._endpoints.publisher(n) for n in _PUBLISHED}
         self.commands: list[bytes] = []
         self.phases: list[TaskPhase] = []
         self.ready: list[str] = []

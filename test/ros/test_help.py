@@ -75,7 +75,8 @@ def test_the_reference_is_what_the_node_has(
 ) -> None:
     """Every publisher, subscription, service and parameter of the running node is told, and no other."""
     monkeypatch.chdir(tmp_path)
-    bench.start({name: {"clearance": "online"}} if name in NODES else {})  # with every topic
+    every_topic = {"clearance": "online", "conditions": "harsh"}
+    bench.start({name: every_topic} if name in NODES else {})
     node = bench.add(GRAPH[name])
     published, subscribed = topics_of(name)
     told = {topic.name: topic.type for topic in published}

@@ -30,6 +30,7 @@ SAMPLES = {
     "time_law": "quintic",
     "dynamics": "compiled",
     "scenario": "my run.yaml",
+    "conditions": "nominal",
     "schedule": "my task.yaml",
     "robot": "robot.yaml",
     "duration": "5",

@@ -71,7 +71,9 @@ def test_no_message_is_missing(bag: Path) -> None:
         account = accounts[f"/{topic.name.lstrip('/')}"]
         if topic.rate in COUNTS:
             assert account.received == account.published == COUNTS[topic.rate] * len(topic.publishers), topic
-            assert account.missing == account.duplicates == account.out_of_order == 0, topic.name
+            assert account.missing == account.duplicates == 0, topic.name
+            if len(topic.publishers) == 1:  # those of several come in any order
+                assert account.out_of_order == 0, topic.name
     assert info.topics["/run/published"].message_count == len(LOOP_NODES)
 
 

@@ -164,6 +164,8 @@ class DaskWorkers:
 
     def close(self) -> None:
         """End the cluster, or leave the one of others as it was."""
+        log = logging.getLogger("distributed")  # that the workers we end are gone is no news
+        log.handlers[:], log.propagate = [logging.NullHandler()], False
         client = getattr(self, "_client", None)
         if client is not None:
             with suppress(Exception):
