@@ -297,7 +297,8 @@ class Loop:
         """Go back to a snapshot: the rest of the run is the same bit for bit.
 
         Under another law than that of the snapshot the controller begins here, with the guidance in force.
-        Raises ConfigurationError if the snapshot is of another robot or schedule.
+        Raises ConfigurationError if the snapshot is of another robot or schedule, or if only one of the two
+        deputies has mass.
         """
         self._plant.seed(snapshot.seed)
         self._plant.restore(snapshot.plant)
