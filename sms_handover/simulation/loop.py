@@ -197,7 +197,8 @@ class Loop:
     def reset(self, seed: int | None = None) -> None:
         """Go back to the start.
 
-        ``seed`` is that of every random stream, by default that of the scenario, and is kept by snapshots.
+        ``seed`` is that of the noise of the run, by default that of the scenario, and is kept by snapshots.
+        The robot stays as the scenario has drawn it.
         """
         self.seed = self._common.seed if seed is None else seed
         self._plant.seed(self.seed)
