@@ -82,8 +82,8 @@ The event of the grasp tells impulse and heat.
 base and torques all change with it. In a transfer one hand lets go and the other closes in
 the same instant.
 
-**Momentum** of robot and deputy together never changes: nothing from outside acts. A robot that captures a
-deputy with linear momentum $P$ and angular momentum $L$ about the common centre of mass drifts on with
+**Momentum** of robot and deputy together never changes where nothing acts from outside. A robot that captures
+a deputy with linear momentum $P$ and angular momentum $L$ about the common centre of mass drifts on with
 $P / M$, and once its joints rest, it turns as a whole by
 
 $$\\omega = I^{{-1}} L,$$
@@ -163,8 +163,8 @@ there is left aside.
 
 Ours, since nobody gives them: masses and sizes, uniform boxes, the grasp frames on the largest face, drift
 and tumble of `tumbling` (5 mm/s, 1.4 degrees per second), and a grip that closes in an instant and is
-rigid. Limits of a grasp are those of the [plant](parameters.md#plant): with mass also 5 degrees per second
-of relative rate, ours too.
+rigid. Limits of a grasp are those of the [plant](parameters.md#plant), 5 degrees per second of relative rate
+among them, ours too.
 
 - What laws believe of the deputy is where it *should* be in the hand: how far a grasp was off they do not
   know.

@@ -21,7 +21,8 @@ class PhysicsResiduals:
 
     ``linear_momentum`` kg m/s and ``angular_momentum`` kg m^2/s, the latter about the centre of mass, are the
     largest changes since the start less what wrenches from outside have given; ``energy`` is the largest
-    |change of kinetic energy - work + heat|, relative to ``peak_kinetic_energy`` J, and NaN if nothing moved.
+    |change of kinetic energy - work - external work + heat|, relative to ``peak_kinetic_energy`` J, and NaN
+    if nothing moved.
     ``external_work`` J was done by wrenches from outside, ``lost`` J has become heat.
     """
 

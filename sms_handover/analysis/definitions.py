@@ -27,7 +27,7 @@ _TORQUE = {
     "control_effort": "integral of the squared joint torques",
     "saturated_ticks": "commands that the plant had to clip, of the worst joint",
     "ticks_at_peak": "ticks at which the torque is exactly its largest, of the worst joint",
-    "net_work": "work of the joint torques; over all joints and a whole run the increase of kinetic energy",
+    "net_work": "work of the joint torques; in all the kinetic energy gained + heat - external work",
     "absolute_work": "sum of the magnitudes of the work of each tick: what motors without recuperation need",
     "peak_power": "largest magnitude of the power of any joint over a tick",
 }
@@ -44,9 +44,9 @@ _BASE = {
     "drift_attitude_rate": "drift of the attitude: change over duration",
 }
 _PHYSICS = {
-    "largest_linear_momentum": "largest change of the linear momentum of robot and deputy: rounding",
+    "largest_linear_momentum": "largest change of linear momentum of robot and deputy, less external impulse",
     "largest_angular_momentum": "largest change of their angular momentum about the centre of mass, likewise",
-    "energy_residual": "largest |energy gained - work + heat| over the largest kinetic energy",
+    "energy_residual": "largest |energy gained - work - external work + heat| over peak_kinetic_energy",
     "peak_kinetic_energy": "largest kinetic energy",
     "external_work": "work of wrenches from outside",
     "energy_lost": "kinetic energy that has become heat, in grips that close and in joints",

@@ -95,12 +95,12 @@ def base_turn_rate(run: RunData) -> Signal:
 
 
 def linear_momentum(run: RunData) -> Signal:
-    """Return P of robot and deputy in kg m/s in ``world`` axes, each period; constant up to rounding."""
+    """Return P of robot and deputy in kg m/s in ``world`` axes; constant but for wrenches from outside."""
     return _signal("linear momentum", "kg m/s", run.reference_ns, run.linear_momentum, AXES)
 
 
 def angular_momentum(run: RunData) -> Signal:
-    """Return L in kg m^2/s about the common centre of mass in ``world`` axes; constant up to rounding."""
+    """Return L in kg m^2/s about the common centre of mass in ``world`` axes; constant likewise."""
     return _signal("angular momentum", "kg m^2/s", run.reference_ns, run.angular_momentum, AXES)
 
 

@@ -96,8 +96,9 @@ def _friction(root: Section, joints: int) -> FrictionValues | None:
     coulomb = per_joint(section, "coulomb", joints)
     stiction = per_joint(section, "stiction", joints) if "stiction" in section else coulomb
     speed = per_joint(section, "stribeck_speed", joints, _STRIBECK_SPEED)
+    viscous = per_joint(section, "viscous", joints)
     with section.located():
-        values = FrictionValues(per_joint(section, "viscous", joints), coulomb, stiction, speed)
+        values = FrictionValues(viscous, coulomb, stiction, speed)
     return values if values.any else None
 
 

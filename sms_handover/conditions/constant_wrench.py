@@ -7,8 +7,7 @@ import numpy as np
 from sms_handover.conditions.wrench import BodyAtInstant, Wrench, at_point
 from sms_handover.types import Array, freeze
 
-BODY, WORLD = "body", "world"
-AXES = (BODY, WORLD)
+BODY, WORLD = "body", "world"  # as configuration/conditions_fields.py allows
 _UPRIGHT = np.eye(3)
 
 

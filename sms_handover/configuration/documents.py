@@ -111,7 +111,7 @@ def with_rotors(robot: Mapping, conditions: Mapping) -> Mapping:
     """Return the content of a robot with the inertia of rotors that conditions give to its joints.
 
     One number is for all joints, a list is in their order. Anything that is not as a robot has it is left to
-    the reader of robots.
+    the reader of robots, and so is a list that is too long: the last arm gets the rest.
     """
     given, arms = conditions.get(_ROTOR), robot.get(_ARMS)
     if given is None or not isinstance(arms, list):
@@ -126,6 +126,8 @@ def with_rotors(robot: Mapping, conditions: Mapping) -> Mapping:
         if count:
             changed[-1][_ROTOR] = rotors
             changed[-1].origins = {**arm.origins, _ROTOR: f"{CONDITIONS}.{_ROTOR}"}
+    if isinstance(given, list) and 0 < first < len(given) and isinstance(changed[-1].get(_ROTOR), list):
+        changed[-1][_ROTOR] = [*changed[-1][_ROTOR], *given[first:]]
     result[_ARMS] = changed
     return result
 

@@ -58,10 +58,16 @@ class Section:
         return tuple(self._values)
 
     def where(self, key: object = None) -> str:
-        """Return file and line of a key, or where else it was set; by default of the section itself."""
-        return (
-            self._values.origins.get(key) or f"{self._file}:{self._values.lines.get(key, self._values.line)}"
-        )
+        """Return file and line of a key, or where else it was set; by default of the section itself.
+
+        A section without a file is where its values were set.
+        """
+        origins = self._values.origins
+        if key in origins:
+            return origins[key]
+        if origins and self._file == Path():
+            return ", ".join(dict.fromkeys(origins.values()))
+        return f"{self._file}:{self._values.lines.get(key, self._values.line)}"
 
     def path(self, key: str) -> str:
         """Return the dotted path of a key."""

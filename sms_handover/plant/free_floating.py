@@ -154,11 +154,18 @@ class FreeFloatingPlant:
         )
 
     def restore(self, state: PlantState) -> None:
-        """Go back to a former state; raises ConfigurationError if it is that of another robot."""
+        """Go back to a former state; raises ConfigurationError if it is that of another robot or deputy."""
         shapes = [array.shape for array in (state.q, state.v, state.joint_effort)]
         if shapes != [self.q.shape, self.v.shape, self.joint_effort.shape]:
             raise ConfigurationError(
                 f"the snapshot has {state.joint_effort.size} joints, must have {self.joint_effort.size}"
+            )
+        has_mass = state.deputy.q.size > 0
+        if has_mass != (self._payload is not None):
+            kinds = ("with", "without") if has_mass else ("without", "with")
+            raise ConfigurationError(
+                f"the snapshot is of a deputy {kinds[0]} mass, must be of one {kinds[1]}: "
+                "set deputy.mass, in kg, as in its run"
             )
         self.tick, self._work, self._losses = state.tick, state.work, state.losses
         self.q, self.v, self.joint_effort = (read_only(a) for a in (state.q, state.v, state.joint_effort))

@@ -18,7 +18,7 @@ class RigidDeputy(MasslessDeputy):
     """A deputy of inertia Y: free, Y V' = V x* Y V on SE(3), without wrenches.
 
     Its state while it floats is ``q`` (7,), position and quaternion x y z w in ``world``, and the twist
-    ``v`` (6,) in its own axes, integrated by the Lie-group scheme of the plant with the tick as step.
+    ``v`` (6,) in its own axes, integrated by a Lie-group scheme of order 4 with the tick as step.
     """
 
     def __init__(

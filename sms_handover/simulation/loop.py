@@ -197,7 +197,8 @@ class Loop:
     def reset(self, seed: int | None = None) -> None:
         """Go back to the start.
 
-        ``seed`` is that of every random stream, by default that of the scenario, and is kept by snapshots.
+        ``seed`` is that of the noise of the run, by default that of the scenario, and is kept by snapshots.
+        The robot stays as the scenario has drawn it.
         """
         self.seed = self._common.seed if seed is None else seed
         self._plant.seed(self.seed)
@@ -297,7 +298,8 @@ class Loop:
         """Go back to a snapshot: the rest of the run is the same bit for bit.
 
         Under another law than that of the snapshot the controller begins here, with the guidance in force.
-        Raises ConfigurationError if the snapshot is of another robot or schedule.
+        Raises ConfigurationError if the snapshot is of another robot or schedule, or if only one of the two
+        deputies has mass.
         """
         self._plant.seed(snapshot.seed)
         self._plant.restore(snapshot.plant)

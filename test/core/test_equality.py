@@ -104,6 +104,7 @@ def test_what_is_missing_in_both_is_the_same(run: RunData) -> None:
     for differences in (compare_runs(run, with_nan), compare_runs(with_nan, run)):
         assert [difference.field for difference in differences] == ["joint_effort"]
         assert "1 of" in differences[0].detail and "first row 4" in differences[0].detail
+        assert differences[0].detail.endswith("where only one run has numbers")
 
 
 def test_names_phases_and_events_count(run: RunData) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from sms_handover.control.controller import JointController
 from sms_handover.control.protocol import Carrying, Controller, Guidance
+from sms_handover.errors import ConfigurationError
 from sms_handover.model.carrying import carrying
 from sms_handover.model.floating_model import floating_model
 from sms_handover.model.known_payload import EMPTY_HANDS, Grip, KnownPayload
@@ -211,6 +212,13 @@ def test_a_run_with_a_payload_goes_on_from_any_snapshot(tmp_path: Path) -> None:
     whole = digest_of_rest(again)
     loop.reset()
     assert digest_of_rest(loop) == whole
+
+
+@pytest.mark.parametrize(("mass", "other"), [(0.0, 12.0), (12.0, 0.0)])
+def test_a_snapshot_is_of_a_deputy_with_mass_or_without(mass: float, other: float) -> None:
+    snapshot = Loop(load_scenario("smooth", {"deputy.mass": mass})).snapshot()
+    with pytest.raises(ConfigurationError, match=r"deputy with(out)? mass.*set deputy\.mass, in kg"):
+        Loop(load_scenario("smooth", {"deputy.mass": other})).restore(snapshot)
 
 
 def test_a_run_with_a_payload_conserves_and_says_what_it_lost(tmp_path: Path) -> None:
