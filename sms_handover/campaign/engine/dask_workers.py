@@ -74,7 +74,8 @@ class CasePlugin(distributed.WorkerPlugin):
             process = self._idle.get_nowait()
         except Empty:
             frozen = Frozen(self._files)
-            process = CaseProcess(frozen, self._cases, self._seed, self._limits, self._program)
+            program = self._program or CASE_PROGRAM
+            process = CaseProcess(frozen, self._cases, self._seed, self._limits, program)
         try:
             yield process
         finally:
@@ -100,10 +101,11 @@ class DaskWorkers:
         *,
         workers: int = 0,
         scheduler: str = "",
-        program: Sequence[str] = CASE_PROGRAM,
+        program: Sequence[str] = (),
     ) -> None:
         """Make a cluster of so many workers here, or connect to a scheduler.
 
+        Without a ``program`` each worker takes its own Python, which need not be where that of the driver is.
         Raises SmsHandoverError if there is no scheduler.
         """
         self._cluster: Any = None
