@@ -152,6 +152,15 @@ def test_check_finds_what_no_case_could_have(
     assert told in capsys.readouterr().err
 
 
+def test_a_campaign_with_an_unknown_metric_does_not_begin(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = written(tmp_path, worst_by="grasp_eror")
+    assert main(["campaign", "run", str(file), "-o", str(tmp_path / "out")]) == 2
+    assert "unknown metric 'grasp_eror'" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_the_shipped_campaign_is_one() -> None:
     campaign = read_campaign(campaign_path("laws"))
     assert campaign.name == "laws" and len(campaign.laws) >= 2 and campaign.cases

@@ -8,6 +8,7 @@ from typing import Any
 
 from sms_handover.campaign.definition.frozen import campaign_path, freeze
 from sms_handover.campaign.engine.choice import workers_for
+from sms_handover.campaign.engine.plan import require_metrics
 from sms_handover.campaign.engine.run import Tally, run_campaign
 from sms_handover.campaign.engine.scheduler_url import require_safe
 from sms_handover.campaign.record.campaign_folder import open_campaign
@@ -78,6 +79,7 @@ def command(options: Namespace) -> int:
     campaign, shard = frozen.campaign(cases), shard_of(options.shard) if options.shard else Shard()
     if options.shard and campaign.stop:
         raise ConfigurationError("a shard knows nothing of the others: leave stop out, or --shard")
+    require_metrics(frozen, path)
     part = f".shard_{shard.number}_of_{shard.of}" if options.shard else ""
     folder = options.output or Path("runs") / f"{campaign.name}{part}"
     with open_campaign(folder, frozen, cases, shard) as opened, Progress() as progress:
