@@ -105,6 +105,8 @@ def test_laws_are_compared_and_reported(
         (["campaign", "status", "."], ". is no campaign folder: it has no manifest.json"),
         (["campaign", "run", "lows"], "unknown campaign 'lows' (did you mean 'laws'?)"),
         (["campaign", "run", "FILE", "-j", "0"], "--jobs is 0, must be from 1 to 1024"),
+        (["campaign", "run", "FILE", "--cases", "0"], "--cases is 0, must be from 1 to"),
+        (["campaign", "status", "OUT", "--worst", "-1"], "--worst is -1, must be >= 0"),
         (["campaign", "run", "FILE", "--shard", "4/3"], "shard '4/3' must be NUMBER/OF"),
         (["campaign", "run", "FILE", "--trust-network"], "--trust-network is for --scheduler"),
         (["campaign", "run", "FILE", "--scheduler", "tcp://10.1.1.1:1"], "is plain TCP to another machine"),

@@ -6,6 +6,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from sms_handover.campaign.definition.fields import MOST_CASES
 from sms_handover.campaign.definition.frozen import campaign_path, freeze
 from sms_handover.campaign.engine.choice import workers_for
 from sms_handover.campaign.engine.plan import require_metrics
@@ -69,6 +70,8 @@ def command(options: Namespace) -> int:
     """Run the command; return the exit code."""
     if not 1 <= options.jobs <= _MOST_JOBS:
         raise ConfigurationError(f"--jobs is {options.jobs}, must be from 1 to {_MOST_JOBS}")
+    if options.cases is not None and not 1 <= options.cases <= MOST_CASES:
+        raise ConfigurationError(f"--cases is {options.cases}, must be from 1 to {MOST_CASES}")
     if options.trust_network and not options.scheduler:
         raise ConfigurationError("--trust-network is for --scheduler")
     if options.scheduler:
