@@ -13,7 +13,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from itertools import islice
 from queue import Empty, SimpleQueue
-from time import monotonic
 from typing import Any
 
 import dask
@@ -136,7 +135,7 @@ class DaskWorkers:
         """Yield finished cases as they come; raises SmsHandoverError where workers die again and again."""
         left, self._chunk_size, number = iter(tasks), 1, 0
         running = distributed.as_completed()
-        waiting, began = 0, dict[str, float]()
+        waiting = 0
 
         def hand_out() -> bool:
             nonlocal number, waiting
@@ -145,7 +144,6 @@ class DaskWorkers:
                 return False
             number += 1
             key = f"{_PLUGIN}-{number}"
-            began[key] = monotonic()
             running.add(self._client.submit(run_chunk, chunk, key=key, pure=False))
             waiting += 1
             return True
