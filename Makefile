@@ -165,7 +165,7 @@ $(VENV)/.verify: $(VENV)/.test
 
 $(VENV)-basilisk/.engines: $(METADATA)
 	$(PYTHON) -m venv $(VENV)-basilisk
-	$(VENV)-basilisk/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[basilisk,mujoco]' 'pytest>=8.4'
+	$(VENV)-basilisk/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[basilisk,mpc,mujoco]' 'pytest>=8.4'
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.test

@@ -45,6 +45,7 @@ def add_parser(parser: ArgumentParser) -> None:
         "mended it; 130 interrupted. "
         "To look at the running graph with other tools, give --domain-id and set ROS_DOMAIN_ID to it."
     )
+    parser.set_defaults(node_server=None)  # the program has one; who calls this from elsewhere need not
     add_scenario_options(parser)
     add_dry_run_options(parser)
     group = parser.add_argument_group("graph")

@@ -147,9 +147,10 @@ def serve(channel: socket.socket) -> int:
             channel.close()
             _become(request, descriptors)
             return int(mains[request["node"]]())
+        os.close(to_server)  # so that a child that could not fork is read as nothing
         os.waitpid(child, 0)  # from here on the node is a child of the launcher
         channel.send(os.read(between, _LARGEST))
-        for descriptor in (between, to_server, *descriptors):
+        for descriptor in (between, *descriptors):
             os.close(descriptor)
 
 

@@ -16,6 +16,7 @@ from sms_handover.campaign.cases.read_back import is_same, read_back
 from sms_handover.campaign.cases.retained import trajectory
 from sms_handover.campaign.definition.campaign_file import Limits
 from sms_handover.campaign.definition.frozen import freeze
+from sms_handover.campaign.record.campaign_folder import CampaignFolder
 from sms_handover.errors import ConfigurationError, SmsHandoverError
 from sms_handover.simulation import loop as loops
 from sms_handover.simulation.loop import Loop
@@ -160,6 +161,8 @@ def test_bad_cases_end_as_rows_with_their_causes(tmp_path: Path) -> None:
     file = written(tmp_path, name="bad", cases=5, limits=limits)
     run_here(file, tmp_path / "out", program=STUB)
     rows = {task.case: row for task, row in rows_of(tmp_path / "out").items()}
+    tries = {entry.row.task.case: entry.beside.tries for entry in CampaignFolder(tmp_path / "out").entries()}
+    assert tries == {0: 1, 1: 1, 2: 2, 3: 1, 4: 1}, "only what died is tried again"
     assert (rows[1].status, rows[1].cause) == (Status.LIMIT, "more than 3 s of wall time")
     assert (rows[2].status, rows[2].cause) == (Status.DIED, "its process ended by signal SIGKILL")
     assert (rows[3].status, rows[3].cause) == (Status.LIMIT, "more than 100 MB of memory")

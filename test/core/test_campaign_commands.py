@@ -105,6 +105,8 @@ def test_laws_are_compared_and_reported(
         (["campaign", "status", "."], ". is no campaign folder: it has no manifest.json"),
         (["campaign", "run", "lows"], "unknown campaign 'lows' (did you mean 'laws'?)"),
         (["campaign", "run", "FILE", "-j", "0"], "--jobs is 0, must be from 1 to 1024"),
+        (["campaign", "run", "FILE", "--cases", "0"], "--cases is 0, must be from 1 to"),
+        (["campaign", "status", "OUT", "--worst", "-1"], "--worst is -1, must be >= 0"),
         (["campaign", "run", "FILE", "--shard", "4/3"], "shard '4/3' must be NUMBER/OF"),
         (["campaign", "run", "FILE", "--trust-network"], "--trust-network is for --scheduler"),
         (["campaign", "run", "FILE", "--scheduler", "tcp://10.1.1.1:1"], "is plain TCP to another machine"),
@@ -150,6 +152,15 @@ def test_check_finds_what_no_case_could_have(
 ) -> None:
     assert main(["check", str(written(tmp_path, **changes))]) == 2
     assert told in capsys.readouterr().err
+
+
+def test_a_campaign_with_an_unknown_metric_does_not_begin(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = written(tmp_path, worst_by="grasp_eror")
+    assert main(["campaign", "run", str(file), "-o", str(tmp_path / "out")]) == 2
+    assert "unknown metric 'grasp_eror'" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_shipped_campaign_is_one() -> None:

@@ -52,6 +52,7 @@ TWO = {MASS: {"normal": {"mean": 240, "std": 12}}, X: UNIFORM}
         ({"success": "complete and"}, "success 'complete and' is not an expression over metrics"),
         ({"success": "__import__('os')"}, "is not allowed: see docs/campaigns.md for what is"),
         ({"stop": {"half_width": 0.1, "looks": [5, 2]}}, "stop.looks must be whole numbers that rise"),
+        ({"stop": {"half_width": 0.1, "looks": [2.5, 5]}}, "stop.looks must be whole numbers that rise"),
         ({"correlated": [{"draws": {MASS: {"mean": 1, "std": 1}}, "correlation": [[1]]}]}, "is drawn twice"),
     ],
 )

@@ -70,10 +70,13 @@ def ended_at_last(child: "subprocess.Popen[str]") -> Iterator[list[psutil.Proces
 
 
 @pytest.mark.slow
-def test_rows_depend_on_no_worker_order_or_kill(tmp_path: Path) -> None:
+def test_rows_depend_on_no_worker_order_or_kill(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One process; the same backwards; 2 workers with kill -9 of one, then of the driver; 1 worker."""
     file = written(tmp_path, cases=CASES)
+    (tmp_path / "scratch").mkdir()
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "scratch"))
     run_here(file, tmp_path / "serial")
+    assert not list((tmp_path / "scratch").iterdir())
     expected = digests_of(tmp_path / "serial")
     assert len(expected) == CASES == len(set(expected.values()))
 
@@ -159,19 +162,21 @@ def test_a_corrupted_line_is_named_and_done_again(tmp_path: Path) -> None:
     expected, path = digests_of(out), out / JOURNAL
     lines = path.read_bytes().splitlines(keepends=True)
     lines[1] = lines[1].replace(b'"grasp_error":0.001', b'"grasp_error":0.002')  # valid JSON, wrong value
+    lines[2] = lines[2][:20] + b"\r" + lines[2][21:]  # still one line
     lines[4] = b"\x00" * 30 + b"\n"
     path.write_bytes(b"".join(lines))
     frozen, number = freeze(file)
     with open_campaign(out, frozen, number, Shard()) as opened:
         assert [fault.partition(" is corrupted")[0] for fault in opened.faults] == [
             f"{path}, line 2",
+            f"{path}, line 3",
             f"{path}, line 5",
         ]
         with pytest.raises(ConfigurationError, match="is written to by another run of the campaign"):
             open_campaign(out, frozen, number, Shard())
-    assert len(rows_of(out)) == 4
-    assert run_here(file, out, program=STUB).before == 4
-    assert digests_of(out) == expected and len((out / "broken.jsonl").read_bytes().splitlines()) == 2
+    assert len(rows_of(out)) == 3
+    assert run_here(file, out, program=STUB).before == 3
+    assert digests_of(out) == expected and (out / "broken.jsonl").read_bytes().count(b"\n") == 3
 
 
 def test_a_forged_row_is_no_row(tmp_path: Path) -> None:

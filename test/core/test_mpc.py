@@ -68,6 +68,15 @@ def test_intervals_grow_and_fill_the_horizon() -> None:
         Horizon.growing(0.4, 10, 0.05)
 
 
+def test_a_plan_lasts_until_the_next_one() -> None:
+    short = {"plan_horizon": 0.05, "plan_intervals": 2, "law": "mpc"}
+    scenario = load_scenario("paper", {"common": {"reference_period": 0.1}, "controller": short})
+    with pytest.raises(
+        ConfigurationError, match=r"plan_horizon is 0.05 s, must be >= the reference period, 0.1 s"
+    ):
+        Loop(scenario)
+
+
 def test_momentum_stays_what_it_was(
     robot: RobotModel, moving: tuple[BaseStart, Array, Array, Array, Array]
 ) -> None:

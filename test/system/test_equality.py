@@ -200,3 +200,19 @@ def test_every_node_has_the_robot_that_is_its(
 def test_the_laws_differ(simulated: dict[str, RunData]) -> None:
     """The comparison would notice: two runs of another law are not the same."""
     assert compare_runs(simulated["nmpc"], simulated["pid"])
+
+
+def test_a_case_of_a_campaign_is_recorded_as_it_was_run(tmp_path: Path) -> None:
+    campaign = {
+        "name": "one",
+        "seed": 3,
+        "cases": 1,
+        "scenarios": {"smooth": "smooth"},
+        "laws": ["nmpc"],
+        "values": {"common.duration": 0.1},  # [s]
+        "draws": {"truth.robot.base.mass": {"normal": {"mean": 240.0, "std": 12.0}}},  # [kg]
+    }
+    (tmp_path / "one.yaml").write_text(json.dumps(campaign), encoding="utf-8")
+    assert sms_handover("campaign", "run", "one.yaml", "-o", "out", cwd=tmp_path).code == 0
+    again = sms_handover("campaign", "rerun", "out", "0", "--bag", "-o", "again", cwd=tmp_path)
+    assert again.code == 0 and "equal to its row, bit for bit" in again.out, again

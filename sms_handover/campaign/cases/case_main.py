@@ -6,6 +6,7 @@ would take its rows.
 
 import json
 import os
+import shutil
 import sys
 import tempfile
 from base64 import b64encode
@@ -29,8 +30,8 @@ def main() -> int:
     """Answer tasks until standard input ends; return the exit code."""
     answers = os.fdopen(os.dup(_STANDARD_OUTPUT), "w", encoding="ascii")
     os.dup2(os.open(os.devnull, os.O_WRONLY), _STANDARD_OUTPUT)  # what a law prints is no row
-    lines = _lines()
     with tempfile.TemporaryDirectory(prefix="sms_handover_cases_") as folder:
+        lines = _lines(folder)
         first = json.loads(next(lines))
         try:
             cases = Cases(Frozen(first["files"]), first["cases"], Path(folder))
@@ -52,13 +53,14 @@ def _done(cases: Cases, task: Task) -> dict[str, object]:
     return answer
 
 
-def _lines() -> Iterator[str]:
-    """Yield the lines of standard input; a thread ends the process at once where it ends."""
+def _lines(folder: str) -> Iterator[str]:
+    """Yield the lines of standard input; at its end a thread removes a folder and ends the process."""
     queue: SimpleQueue[str] = SimpleQueue()
 
     def read() -> None:
         for line in sys.stdin:
             queue.put(line)
+        shutil.rmtree(folder, ignore_errors=True)
         os._exit(0)  # the parent has ended, or wants no more
 
     Thread(target=read, name="standard_input", daemon=True).start()

@@ -62,6 +62,8 @@ class CaseProcess:
             answer, status, cause = self._ask(json.dumps(task), self._limits.wall_time)
             if answer is not None:
                 return self._done(answer, tries)
+            if status is not Status.DIED:  # what takes too long or too much once does so again
+                break
         row = Row(task, run_seed(self._seed, task.case), {}, status, cause, {}, "")
         return Done(row, Beside(0.0, time.monotonic() - begin, platform.node(), tries))
 

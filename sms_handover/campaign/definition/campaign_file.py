@@ -308,8 +308,9 @@ def _stop(root: Section) -> StopRule | None:
     if "stop" not in root:
         return None
     section = root.section("stop")
-    looks = tuple(int(look) for look in section.vector("looks"))
-    if list(looks) != sorted(set(looks)) or not looks:
+    numbers = section.vector("looks")
+    looks = tuple(int(look) for look in numbers)
+    if list(numbers) != sorted(set(looks)) or not looks:
         raise section.error(f"{section.path('looks')} must be whole numbers that rise", "looks")
     return StopRule(section.number("half_width"), looks)
 

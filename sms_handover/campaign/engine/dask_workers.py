@@ -13,7 +13,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from itertools import islice
 from queue import Empty, SimpleQueue
-from time import monotonic
 from typing import Any
 
 import dask
@@ -74,7 +73,8 @@ class CasePlugin(distributed.WorkerPlugin):
             process = self._idle.get_nowait()
         except Empty:
             frozen = Frozen(self._files)
-            process = CaseProcess(frozen, self._cases, self._seed, self._limits, self._program)
+            program = self._program or CASE_PROGRAM
+            process = CaseProcess(frozen, self._cases, self._seed, self._limits, program)
         try:
             yield process
         finally:
@@ -100,10 +100,11 @@ class DaskWorkers:
         *,
         workers: int = 0,
         scheduler: str = "",
-        program: Sequence[str] = CASE_PROGRAM,
+        program: Sequence[str] = (),
     ) -> None:
         """Make a cluster of so many workers here, or connect to a scheduler.
 
+        Without a ``program`` each worker takes its own Python, which need not be where that of the driver is.
         Raises SmsHandoverError if there is no scheduler.
         """
         self._cluster: Any = None
@@ -134,7 +135,7 @@ class DaskWorkers:
         """Yield finished cases as they come; raises SmsHandoverError where workers die again and again."""
         left, self._chunk_size, number = iter(tasks), 1, 0
         running = distributed.as_completed()
-        waiting, began = 0, dict[str, float]()
+        waiting = 0
 
         def hand_out() -> bool:
             nonlocal number, waiting
@@ -143,7 +144,6 @@ class DaskWorkers:
                 return False
             number += 1
             key = f"{_PLUGIN}-{number}"
-            began[key] = monotonic()
             running.add(self._client.submit(run_chunk, chunk, key=key, pure=False))
             waiting += 1
             return True

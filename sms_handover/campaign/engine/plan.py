@@ -13,8 +13,9 @@ from sms_handover.campaign.cases.retained import trajectory
 from sms_handover.campaign.definition.campaign_file import Campaign
 from sms_handover.campaign.definition.distributions import range_in_words
 from sms_handover.campaign.definition.fields import ALL, NONE
-from sms_handover.campaign.definition.frozen import freeze
+from sms_handover.campaign.definition.frozen import Frozen, freeze
 from sms_handover.errors import ConfigurationError, UnknownNameError
+from sms_handover.simulation.scenario import load_scenario
 
 _S_PER_H = 3600.0  # [s/h]
 _MB = 1e6  # [byte]
@@ -27,12 +28,12 @@ def plan_in_words(path: Path) -> str:
     be run: a value that no scenario has, or that cannot be read back, an unknown metric.
     """
     frozen, number = freeze(path)
+    require_metrics(frozen, path)
     with tempfile.TemporaryDirectory(prefix="sms_handover_check_") as folder:
         cases = Cases(frozen, number, Path(folder))
         campaign, count = cases.campaign, cases.samples.count
         cpu, size, kept = 0.0, 0.0, 0.0
         for scenario in campaign.scenarios:
-            _require_metrics(cases, scenario, path)
             for law in campaign.laws:
                 result = cases.run(Task(0, scenario, law))
                 _require_run(result.row, path)
@@ -70,14 +71,17 @@ def _draws(campaign: Campaign) -> Iterator[Row]:
             yield Row(path, ("of a table", f"{min(span):.6g} to {max(span):.6g}" if span else "texts"))
 
 
-def _require_metrics(cases: Cases, scenario: str, path: Path) -> None:
-    """Raise UnknownNameError unless a scenario has all metrics that the campaign names."""
-    campaign = cases.campaign
-    known = dict.fromkeys(known_metrics(cases.scenario(Task(0, scenario, campaign.laws[0]))))
-    campaign.success.require_known(known)
-    for metric in (*campaign.metrics, campaign.worst_by):
-        if metric not in known:
-            raise UnknownNameError("metric", metric, known, str(path), "sms-handover list metrics")
+def require_metrics(frozen: Frozen, path: Path) -> None:
+    """Raise UnknownNameError unless every scenario has all metrics that the campaign of a file names."""
+    with tempfile.TemporaryDirectory(prefix="sms_handover_check_") as folder:
+        campaign = frozen.unpacked(Path(folder))
+        for chosen in campaign.scenarios.values():
+            values = {**campaign.values, **chosen.values}
+            known = dict.fromkeys(known_metrics(load_scenario(Path(folder) / chosen.source, values)))
+            campaign.success.require_known(known)
+            for metric in (*campaign.metrics, campaign.worst_by):
+                if metric not in known:
+                    raise UnknownNameError("metric", metric, known, str(path), "sms-handover list metrics")
 
 
 def _require_run(row: CaseRow, path: Path) -> None:

@@ -69,11 +69,11 @@ class JournalWriter:
     def __init__(self, path: Path) -> None:
         """Lock the journal and mend it; raises ConfigurationError while somebody else writes to it."""
         self.path = path
-        self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+        self._descriptors: list[int] = []
         try:
-            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._descriptor = self._locked(path)
         except BlockingIOError:
-            os.close(self._descriptor)
+            self.close()
             raise ConfigurationError(
                 f"{path} is written to by another run of the campaign; wait for it, or end it first"
             ) from None
@@ -88,12 +88,22 @@ class JournalWriter:
             os.ftruncate(self._descriptor, os.fstat(self._descriptor).st_size - self.faults.torn)
         if not self.faults.broken:
             return
-        lines = self.path.read_bytes().splitlines(keepends=True)
         with self.path.with_name(_BROKEN).open("ab") as aside:
             aside.writelines(self.faults.broken.values())
-        sound = [line for number, line in enumerate(lines, start=1) if number not in self.faults.broken]
-        os.ftruncate(self._descriptor, 0)  # in place, because the lock is on this very file
+        with self.path.open("rb") as stream:  # by its lines, as they were numbered: \r ends none
+            sound = [line for number, line in enumerate(stream, start=1) if number not in self.faults.broken]
+        unfinished = self.path.with_name(f".{self.path.name}")
+        unfinished.unlink(missing_ok=True)
+        self._descriptor = self._locked(unfinished)
         self._write(b"".join(sound))
+        unfinished.replace(self.path)  # so that whoever is killed here leaves a whole journal
+
+    def _locked(self, path: Path) -> int:
+        """Open and lock a file until the journal is closed; raises BlockingIOError if somebody else has."""
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+        self._descriptors.append(descriptor)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return descriptor
 
     def add(self, row: Row, beside: Beside) -> None:
         """Append a line and wait until it is on disk; raises SmsHandoverError where it cannot be written."""
@@ -115,7 +125,8 @@ class JournalWriter:
 
     def close(self) -> None:
         """Let go of the journal."""
-        os.close(self._descriptor)
+        for descriptor in self._descriptors:
+            os.close(descriptor)
 
 
 def _line(row: Row, beside: Beside) -> bytes:

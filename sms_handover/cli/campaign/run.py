@@ -6,8 +6,10 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from sms_handover.campaign.definition.fields import MOST_CASES
 from sms_handover.campaign.definition.frozen import campaign_path, freeze
 from sms_handover.campaign.engine.choice import workers_for
+from sms_handover.campaign.engine.plan import require_metrics
 from sms_handover.campaign.engine.run import Tally, run_campaign
 from sms_handover.campaign.engine.scheduler_url import require_safe
 from sms_handover.campaign.record.campaign_folder import open_campaign
@@ -68,6 +70,8 @@ def command(options: Namespace) -> int:
     """Run the command; return the exit code."""
     if not 1 <= options.jobs <= _MOST_JOBS:
         raise ConfigurationError(f"--jobs is {options.jobs}, must be from 1 to {_MOST_JOBS}")
+    if options.cases is not None and not 1 <= options.cases <= MOST_CASES:
+        raise ConfigurationError(f"--cases is {options.cases}, must be from 1 to {MOST_CASES}")
     if options.trust_network and not options.scheduler:
         raise ConfigurationError("--trust-network is for --scheduler")
     if options.scheduler:
@@ -78,6 +82,7 @@ def command(options: Namespace) -> int:
     campaign, shard = frozen.campaign(cases), shard_of(options.shard) if options.shard else Shard()
     if options.shard and campaign.stop:
         raise ConfigurationError("a shard knows nothing of the others: leave stop out, or --shard")
+    require_metrics(frozen, path)
     part = f".shard_{shard.number}_of_{shard.of}" if options.shard else ""
     folder = options.output or Path("runs") / f"{campaign.name}{part}"
     with open_campaign(folder, frozen, cases, shard) as opened, Progress() as progress:

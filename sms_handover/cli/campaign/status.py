@@ -11,6 +11,7 @@ from sms_handover.campaign.statistics.proportion import proportion
 from sms_handover.campaign.statistics.worst_cases import failed, failures_by_cause, rerun_command, worst_of
 from sms_handover.cli.columns import columns
 from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
+from sms_handover.errors import ConfigurationError
 
 _MOST = 50  # [-] failures that are listed
 
@@ -31,6 +32,8 @@ def add_parser(parser: ArgumentParser) -> None:
 
 def command(options: Namespace) -> int:
     """Run the command; return the exit code."""
+    if options.worst < 0:
+        raise ConfigurationError(f"--worst is {options.worst}, must be >= 0")
     folder, faults = CampaignFolder(options.folder), JournalFaults()
     campaign = folder.campaign
     entries = list(folder.entries(faults))

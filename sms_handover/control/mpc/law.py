@@ -71,7 +71,13 @@ class MpcController:
         self._distances, self._period_ns = setup.distances, setup.reference_ns
         self._payload = KnownPayload(setup.robot, setup.deputy)
         self._rest = read_only(np.zeros(setup.robot.n_joints))  # N m
+        period = ns_to_seconds(setup.reference_ns)
         for gains in setup.gains:
+            if gains.plan_horizon < period:
+                raise ConfigurationError(
+                    f"plan_horizon is {gains.plan_horizon:g} s, must be >= the reference period, "
+                    f"{period:g} s: each plan is followed for that long"
+                )
             Planner(setup.robot, gains, None, np.eye(3))  # rejects what cannot be planned with
         self.reset()
 

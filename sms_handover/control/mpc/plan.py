@@ -66,9 +66,3 @@ class Plan:
         since = ns_to_seconds(begin_ns - self.begin_ns)
         rates = np.array([self.after(since + time)[1] for time in horizon.times.tolist()])
         return np.diff(rates, axis=0) / horizon.intervals[:, None]
-
-
-def standing(q: Array, begin_ns: int, horizon: Horizon) -> Plan:
-    """Return the plan of joints that stand still."""
-    still = np.zeros((horizon.count, len(q)))
-    return Plan(0, begin_ns, q, np.zeros(len(q)), still, horizon.intervals)

@@ -13,7 +13,7 @@ from sms_handover.errors import MissingDependencyError
 from sms_handover.types import Array, PlanStatus
 
 _HARD, _SOFT = 0, 8  # of DAQP
-_ITERATION_LIMIT, _INFEASIBLE, _CYCLE = -4, -1, -2  # of DAQP; it cycles where rows repeat each other
+_INFEASIBLE = -1  # of DAQP; others below 0 are ends without an answer, such as -4 after all iterations
 _SOFTNESS = 1e-8  # [-] slack of a scaled row per multiplier: rows are exceeded by about a thousandth
 _BINDS = 1e-9  # [-] multiplier from which a row binds
 _EXCEEDED = 1e-9  # [-] of the scale of a row, from which it is exceeded
