@@ -20,7 +20,8 @@ from sms_handover.campaign.definition.frozen import Frozen
 from sms_handover.campaign.sampling.streams import run_seed
 from sms_handover.errors import ConfigurationError, SmsHandoverError
 
-CASE_PROGRAM = (sys.executable, "-m", "sms_handover.campaign.cases.case_main")
+_SAFE_PATH = ("-P",) if sys.version_info >= (3, 11) else ()  # no module from the folder the user stands in
+CASE_PROGRAM = (sys.executable, *_SAFE_PATH, "-m", "sms_handover.campaign.cases.case_main")
 _START_S = 300.0  # [s] to import everything and, the first time, to compile
 _LOOK_S = 0.05  # [s] between two looks at the memory
 _END_S = 5.0  # [s] to end when asked to
