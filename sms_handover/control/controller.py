@@ -86,11 +86,11 @@ class JointController(Generic[G]):
 
     def heed_news(self, stamp_ns: int) -> None:
         """Take up the payload of the latest events, if a state comes after them."""
-        if not self._news or stamp_ns <= self._news[0].stamp_ns:
+        due = [event for event in self._news if event.stamp_ns < stamp_ns]
+        if not due:
             return
-        changes = [self._payload.grasped(event) for event in self._news]
-        self._news = ()
-        if any(changes):
+        self._news = self._news[len(due) :]
+        if any([self._payload.grasped(event) for event in due]):
             self._law.carry(self._payload.robot)
 
     def _hold(self, grip: Grip) -> None:

@@ -1,6 +1,7 @@
 """Controller node: answers every state with a joint command."""
 
 from abc import abstractmethod
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -88,7 +89,7 @@ class AnsweringNode(GraphNode[P]):
         self._answer_bytes = b""
         for topic, read in {**guidance, **state}.items():
             self.inputs.subscribe(topic, partial(self._on_input, topic), read)
-        self._due_events = self._heard_events = 0
+        self._forget_grasps()
         if isinstance(self._controller, Carrying):
             self.inputs.subscribe(GRASP_EVENT, self._on_grasp, stamped)
         self._command = self.endpoints.publisher(JOINT_COMMAND)  # last: then all of an external node is there
@@ -111,7 +112,7 @@ class AnsweringNode(GraphNode[P]):
         """Go back to the start of a run."""
         self._controller.reset()
         self._parts.reset()
-        self._due_events = self._heard_events = 0
+        self._forget_grasps()
         for order in self._orders.values():
             order.reset()
 
@@ -173,13 +174,22 @@ class AnsweringNode(GraphNode[P]):
     @property
     def _waits_for_grasps(self) -> bool:
         """Whether the result of a grasp that was commanded is still to come (lock step)."""
-        return self._lockstep and self._heard_events < self._due_events
+        stamp, count = self._commanded
+        return self._lockstep and self._heard[stamp] < count
+
+    def _forget_grasps(self) -> None:
+        """Await no result of a grasp."""
+        self._commanded = 0, 0  # stamp of the latest grasp commands, and how many they were
+        self._heard: Counter[int] = Counter()  # results by stamp
 
     def _on_grasp(self, message: Stamped[bytes], sent_ns: int) -> None:
         """Take the result of a grasp; the next state may have come before it."""
+        stamp, data = message
+        if stamp > self._answered_ns + self._reference_ns:
+            return  # it is of the run before
         if isinstance(self._controller, Carrying):
-            self._controller.grasped(read_grasp_event(message[1]))
-        self._heard_events += 1
+            self._controller.grasped(read_grasp_event(data))
+        self._heard[stamp] += 1
         waiting = self._inputs.oldest_ns
         if waiting is not None:
             self._answer(waiting)
@@ -195,8 +205,9 @@ class AnsweringNode(GraphNode[P]):
         if needed is self._everything:
             for topic in self._orders:
                 self._guide(topic, stamp, inputs[topic])
-            if isinstance(self._controller, Carrying):
-                self._due_events += len(inputs[TASK_PHASE].commands)
+            commands = inputs[TASK_PHASE].commands
+            if commands and isinstance(self._controller, Carrying):
+                self._commanded = stamp, len(commands)
         q, v = coordinates(inputs[JOINT_STATES], inputs[BASE_ODOMETRY])
         effort = self._controller.effort(stamp, q, v) if self._parts.complete else self._no_effort
         self._answer_bytes = self._command_codec.pack(stamp, effort=effort)

@@ -258,8 +258,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "payload known at the state of the grasp already",
         "control/controller",
-        "stamp_ns <= self._news[0].stamp_ns",
-        "stamp_ns < self._news[0].stamp_ns",
+        "if event.stamp_ns < stamp_ns]",
+        "if event.stamp_ns <= stamp_ns]",
         "payload",
     ),
     _core(

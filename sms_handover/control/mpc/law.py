@@ -101,8 +101,8 @@ class MpcController:
 
     def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
         """Return the efforts (n,) N m for a state, read-only; zero until first guidance has come."""
-        if self._news and stamp_ns > self._news[0].stamp_ns:
-            self._heed_news()
+        if self._news:
+            self._heed_news(stamp_ns)
         if self._coming and stamp_ns >= self._coming.begin_ns:
             self._plan, self._coming = self._coming, None
         if self._guidance is not None:
@@ -157,9 +157,10 @@ class MpcController:
         self._hold(state.grip)
         restore_memory(self._efforts, state.observed)
 
-    def _heed_news(self) -> None:
-        """Take up the payload of the latest events."""
-        news, self._news = self._news, ()
+    def _heed_news(self, stamp_ns: int) -> None:
+        """Take up the payload of the events before a state."""
+        news = [event for event in self._news if event.stamp_ns < stamp_ns]
+        self._news = self._news[len(news) :]
         for event in news:
             self._preview.grasped(event)
         if any([self._payload.grasped(event) for event in news]):
