@@ -72,7 +72,8 @@ def test_a_plan_lasts_until_the_next_one() -> None:
     short = {"plan_horizon": 0.05, "plan_intervals": 2, "law": "mpc"}
     scenario = load_scenario("paper", {"common": {"reference_period": 0.1}, "controller": short})
     with pytest.raises(
-        ConfigurationError, match=r"plan_horizon is 0.05 s, must be >= the reference period, 0.1 s"
+        ConfigurationError,
+        match=r"plan_horizon is 0.05 s, must be >= 0.6 s, one reference period and failed_plans more",
     ):
         Loop(scenario)
 

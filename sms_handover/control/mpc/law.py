@@ -73,10 +73,11 @@ class MpcController:
         self._rest = read_only(np.zeros(setup.robot.n_joints))  # N m
         period = ns_to_seconds(setup.reference_ns)
         for gains in setup.gains:
-            if gains.plan_horizon < period:
+            followed = (1 + gains.failed_plans) * period  # by the last plan before the arms brake
+            if gains.plan_horizon < followed:
                 raise ConfigurationError(
-                    f"plan_horizon is {gains.plan_horizon:g} s, must be >= the reference period, "
-                    f"{period:g} s: each plan is followed for that long"
+                    f"plan_horizon is {gains.plan_horizon:g} s, must be >= {followed:g} s, one reference period "
+                    f"and failed_plans more of {period:g} s: so long a plan may have to be followed"
                 )
             Planner(setup.robot, gains, None, np.eye(3))  # rejects what cannot be planned with
         self.reset()
