@@ -76,8 +76,8 @@ class MpcController:
             followed = (1 + gains.failed_plans) * period  # by the last plan before the arms brake
             if gains.plan_horizon < followed:
                 raise ConfigurationError(
-                    f"plan_horizon is {gains.plan_horizon:g} s, must be >= {followed:g} s, one reference period "
-                    f"and failed_plans more of {period:g} s: so long a plan may have to be followed"
+                    f"plan_horizon is {gains.plan_horizon:g} s, must be >= {followed:g} s, one reference "
+                    f"period and failed_plans more of {period:g} s: so long a plan may have to be followed"
                 )
             Planner(setup.robot, gains, None, np.eye(3))  # rejects what cannot be planned with
         self.reset()
