@@ -184,12 +184,12 @@ class AnsweringNode(GraphNode[P]):
 
     def _on_grasp(self, message: Stamped[bytes], sent_ns: int) -> None:
         """Take the result of a grasp; the next state may have come before it."""
-        stamp, data = message
-        if stamp > self._answered_ns + self._reference_ns:
-            return  # it is of the run before
+        event = read_grasp_event(message[1])
+        if self._lockstep and (not self._answer_bytes or event.stamp_ns > self._answered_ns):
+            return  # it is of the run before: the plant decides once the state has been answered
         if isinstance(self._controller, Carrying):
-            self._controller.grasped(read_grasp_event(data))
-        self._heard[stamp] += 1
+            self._controller.grasped(event)
+        self._heard[event.stamp_ns] += 1
         waiting = self._inputs.oldest_ns
         if waiting is not None:
             self._answer(waiting)

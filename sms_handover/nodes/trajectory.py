@@ -147,7 +147,10 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
 
     def _on_grasp(self, message: Stamped[bytes], sent_ns: int) -> None:
         """Take the result of a grasp; the next state may have come before it."""
-        self._generator.grasped((read_grasp_event(message[1]),))
+        event = read_grasp_event(message[1])
+        if self._lockstep and (not self._outputs or event.stamp_ns > self._stamp_ns):
+            return  # it is of the run before: the plant decides once it has the phase
+        self._generator.grasped((event,))
         if self._requested is None:
             self._proceed(self._newest_ns)
 

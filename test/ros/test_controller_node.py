@@ -1,6 +1,7 @@
 """The controller answers inputs of equal stamp only, in whatever order they arrive."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
 from typing import Any
@@ -31,12 +32,22 @@ from sms_handover.graph.topics import (
 from sms_handover.messages.stamps import stamp_ns
 from sms_handover.model.poses import pose_row
 from sms_handover.nodes.controller import ControllerNode
-from sms_handover.ros.codecs.convert import phase_message
+from sms_handover.ros.codecs.convert import event_message, phase_message
 from sms_handover.ros.codecs.loop_messages import JointStateCodec, PoseCodec, StateCodec
 from sms_handover.ros.node.endpoints import CountedPublisher, Endpoints
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.wiring import initial_joints, make_controller
-from sms_handover.types import Array, JointReference, Pose, RobotState, TaskPhase
+from sms_handover.types import (
+    Array,
+    GraspAction,
+    GraspCommand,
+    GraspEvent,
+    GraspStatus,
+    JointReference,
+    Pose,
+    RobotState,
+    TaskPhase,
+)
 
 from ..core.laws import offer
 from .bench import Bench
@@ -46,6 +57,7 @@ from .short_handover import short_handover
 pytestmark = pytest.mark.ros
 
 REFERENCE_NS = 20_000_000
+GRASP = GraspCommand(GraspAction.GRASP, "arm_a", "end_a")
 INPUTS = (JOINT_STATES, BASE_ODOMETRY, JOINT_REFERENCE, TASK_PHASE)
 
 
@@ -153,6 +165,23 @@ def test_any_order_of_arrival_gives_the_same_command(bench: Bench, law: str) -> 
         assert stamp_ns(rest.commands[-1]) == state.stamp_ns
     assert len(rest.commands) == 24
     assert rest.node.report().values == {"law": law, "answered": 24, "late": 0}
+
+
+def test_the_result_of_a_grasp_is_awaited_and_one_of_the_run_before_is_not_it(bench: Bench) -> None:
+    """A controller that joins late is given what was latched; the next state waits for its own."""
+    rest = Rest(bench)
+    old, own = (
+        event_message(GraspEvent(stamp, GRASP, GraspStatus.SUCCEEDED, 0.0, 0.0, 0.0, ""))
+        for stamp in (10 * REFERENCE_NS, 0)
+    )
+    rest.send({GRASP_EVENT: old}, GRASP_EVENT)
+    state, reference, phase = inputs(rest, 0, 0)
+    rest.send(rest.messages(state, reference, replace(phase, commands=(GRASP,))), *INPUTS)
+    rest.wait_for(1)
+    rest.bench.until(lambda: rest.node.awaited == GRASP_EVENT, "the controller to wait for the grasp")
+    rest.send(rest.messages(*inputs(rest, REFERENCE_NS, 1)), *INPUTS)
+    rest.send({GRASP_EVENT: own}, GRASP_EVENT)
+    rest.wait_for(2)
 
 
 @pytest.mark.parametrize("missing", INPUTS)
