@@ -43,7 +43,7 @@ _FRICTION = MappingSpec(
 _TORQUE = MappingSpec(
     "errors of the torque of the motors",
     optional={
-        "gain": _per_joint("relative error of the torque", "1"),
+        "gain": _per_joint("relative error of the torque; -1 would be a dead motor", "1", above=-1.0),
         "offset": _per_joint("torque that is there without a command", "N m"),
         "step": _per_joint("step to which a command is rounded; 0: none", "N m", minimum=0.0),
         "noise_density": _per_joint(

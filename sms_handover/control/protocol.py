@@ -147,7 +147,11 @@ class Carrying(Protocol):
     """
 
     def grasped(self, event: GraspEvent) -> None:
-        """Learn what came of a grasp command; the payload is another one from the next state on."""
+        """Learn what came of a grasp command; the payload is another one from the next state on.
+
+        It may come before the effort for the state of the event or after it, so the change has to wait for a
+        state with a later stamp.
+        """
 
 
 class CheckedController:
