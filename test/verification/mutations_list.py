@@ -756,7 +756,7 @@ BREAKS: tuple[Break, ...] = (
         "simulation/recorder",
         "rows.v, rows.joint_effort, rows.effort)",
         "rows.v, rows.effort, rows.effort)",
-        "analysis_runs",
+        "analysis_front_door",
     ),
     # clearance
     _core(
