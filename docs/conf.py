@@ -46,6 +46,7 @@ apidoc_modules = [
 ]
 autodoc_default_options = {"ignore-module-all": True}  # what is imported is told where it is made
 autodoc_member_order = "bysource"
+autodoc_mock_imports = ["Basilisk", "mujoco"]  # other engines, each in an extra of its own
 autodoc_preserve_defaults = True
 add_module_names = False
 viewcode_follow_imported_members = False  # the default of a field may be a type from elsewhere
