@@ -20,9 +20,9 @@ SUCCESS = "success"
 class PairedTest:
     """A paired test of two laws in a scenario.
 
-    Of success ``difference`` is that of the shares, and McNemar's exact test [McNemar1947]_ is made; of a
-    metric it is the median of the differences, and Wilcoxon's signed-rank test [Wilcoxon1945]_. ``p`` is
-    NaN where no case tells the laws apart; ``adjusted`` is Holm's [Holm1979]_ over all tests.
+    Of success ``difference`` is that of the shares, and McNemar's exact test [McNemar1947] is made; of a
+    metric it is the median of the differences, and Wilcoxon's signed-rank test [Wilcoxon1945]. ``p`` is
+    NaN where no case tells the laws apart; ``adjusted`` is Holm's [Holm1979] over all tests.
     """
 
     scenario: str

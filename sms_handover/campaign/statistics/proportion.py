@@ -1,4 +1,4 @@
-"""Proportion of successes with Wilson's interval [Wilson1927]_."""
+"""Proportion of successes with Wilson's interval [Wilson1927]."""
 
 from math import sqrt
 from typing import NamedTuple

@@ -21,8 +21,8 @@ class Sensitivity:
     """How much a metric depends on a drawn value; half widths of 95 % intervals, NaN where there are none.
 
     ``kind`` says which: ``correlation``, Spearman's, with its p value in ``second``; ``morris``, mean
-    magnitude mu* of the elementary effects and their spread sigma [Morris1991]_; ``sobol``, first-order and
-    total index [Saltelli2010]_.
+    magnitude mu* of the elementary effects and their spread sigma [Morris1991]; ``sobol``, first-order and
+    total index [Saltelli2010].
     """
 
     path: str
