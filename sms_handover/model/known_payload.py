@@ -6,7 +6,7 @@ from sms_handover.model.carrying import carrying
 from sms_handover.model.deputy import DeputyDescription
 from sms_handover.model.poses import se3_of
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.types import GraspAction, GraspEvent, GraspStatus
+from sms_handover.types import GraspAction, GraspCommand, GraspEvent, GraspStatus
 
 
 @dataclass(frozen=True)
@@ -18,6 +18,11 @@ class Grip:
 
 
 EMPTY_HANDS = Grip()
+
+
+def grip_after(command: GraspCommand) -> Grip:
+    """Return who holds the deputy after a command that succeeds."""
+    return EMPTY_HANDS if command.action is GraspAction.RELEASE else Grip(command.arm, command.grasp_frame)
 
 
 class KnownPayload:
@@ -54,7 +59,5 @@ class KnownPayload:
         """Learn what came of a grasp command; return whether the robot is another one now."""
         if event.status is not GraspStatus.SUCCEEDED or not self.has_mass:
             return False
-        command = event.command
-        released = command.action is GraspAction.RELEASE
-        self.hold(EMPTY_HANDS if released else Grip(command.arm, command.grasp_frame))
+        self.hold(grip_after(event.command))
         return True

@@ -184,12 +184,18 @@ def load_world(common: CommonParameters, role: str, scenario: ScenarioFile) -> W
     return World(robot, schedule, conditions if role == TRUTH else IDEAL, error)
 
 
-def deputy_masses(common: CommonParameters, scenario: ScenarioFile) -> tuple[float, ...]:
-    """Return the masses in kg of the deputy in truth and as it is known; raises ConfigurationError."""
-    given = _replacements(common)
-    roles = ROLES[:1] if truth_is_model(scenario, given) else ROLES
-    sections = [documents_of(scenario, given, role).schedule[DEPUTY] for role in roles]
-    return tuple(float(section["mass"]) for section in sections)
+def deputy_masses(
+    common: CommonParameters, scenario: ScenarioFile, role: str, world: World
+) -> tuple[float, ...]:
+    """Return the masses in kg of the deputy of a role and of the other; raises ConfigurationError.
+
+    ``world`` is that of the role; the other's documents are read only where they differ.
+    """
+    given, own = _replacements(common), world.schedule.deputy.mass
+    if truth_is_model(scenario, given):
+        return (own,)
+    other = MODEL if role == TRUTH else TRUTH
+    return own, float(documents_of(scenario, given, other).schedule[DEPUTY]["mass"])
 
 
 def scenario_text(common: CommonParameters, scenario: ScenarioFile) -> str:

@@ -6,8 +6,8 @@ from enum import Enum
 from types import MappingProxyType
 
 from sms_handover.model.deputy import DeputyDescription
-from sms_handover.model.known_payload import EMPTY_HANDS, Grip
-from sms_handover.types import Array, GraspAction, GraspCommand, Pose, freeze, read_only
+from sms_handover.model.known_payload import EMPTY_HANDS, Grip, grip_after
+from sms_handover.types import Array, GraspCommand, Pose, freeze, read_only
 
 
 @dataclass(frozen=True)
@@ -117,8 +117,7 @@ class Schedule:
         found, grip = [], EMPTY_HANDS
         for phase in self.phases:
             for command in phase.commands:
-                released = command.action is GraspAction.RELEASE
-                grip = EMPTY_HANDS if released else Grip(command.arm, command.grasp_frame)
+                grip = grip_after(command)
             found.append(grip)
         return tuple(found)
 

@@ -118,7 +118,7 @@ class GraphNode(LifecycleNode, Generic[P]):
             raise self._invalid
         role = TRUTH if self.get_name() in WITH_TRUTH else MODEL
         world = load_world(self.common, role, self.scenario)
-        self.common = self.common.for_deputies(*deputy_masses(self.common, self.scenario))
+        self.common = self.common.for_deputies(*deputy_masses(self.common, self.scenario, role, world))
         self.robot: RobotModel = world.robot
         self.schedule: Schedule = world.schedule
         self.conditions: Conditions = world.conditions
