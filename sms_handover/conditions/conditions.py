@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sms_handover.conditions.constant_wrench import WORLD, ConstantWrench
+from sms_handover.conditions.constant_wrench import ConstantWrench
 from sms_handover.conditions.joint_values import CommandErrors, FrictionValues, TorqueErrors
 from sms_handover.conditions.model_error import BodySpread, ModelError, MountSpread
 from sms_handover.conditions.orbit import GravityGradient, Orbit, RelativeOrbit
@@ -16,7 +16,7 @@ from sms_handover.conditions.thruster_misfire import ThrusterMisfire
 from sms_handover.conditions.wrench import WrenchModel
 from sms_handover.conditions.wrench_history import WrenchHistory
 from sms_handover.configuration.checks import check_vector
-from sms_handover.configuration.conditions_fields import AXES, CONDITIONS_FIELDS
+from sms_handover.configuration.conditions_fields import AXES, CONDITIONS_FIELDS, WORLD
 from sms_handover.configuration.sections import Section
 from sms_handover.configuration.yaml_reader import Mapping as YamlMapping
 from sms_handover.model.robot_model import RobotModel

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from sms_handover.conditions.wrench import BodyAtInstant, Wrench, at_point
+from sms_handover.configuration.conditions_fields import BODY, WORLD
 from sms_handover.types import Array, freeze
 
-BODY, WORLD = "body", "world"  # as configuration/conditions_fields.py allows
 _UPRIGHT = np.eye(3)
 
 

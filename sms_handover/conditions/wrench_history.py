@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sms_handover.conditions.constant_wrench import BODY, WORLD
 from sms_handover.conditions.wrench import BodyAtInstant, Wrench, at_point
+from sms_handover.configuration.conditions_fields import BODY, WORLD
 from sms_handover.errors import ConfigurationError
 from sms_handover.types import Array, freeze
 

@@ -11,7 +11,8 @@ from sms_handover.configuration.field_specification import (
 )
 
 WRENCH_KINDS = ("constant", "thruster_misfire", "history", "gravity_gradient", "relative_orbit")
-AXES = ("body", "world")
+BODY, WORLD = "body", "world"
+AXES = (BODY, WORLD)
 
 
 def _per_joint(

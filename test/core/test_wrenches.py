@@ -5,11 +5,12 @@ from math import cos, pi, sin
 import numpy as np
 import pytest
 
-from sms_handover.conditions.constant_wrench import BODY, ConstantWrench
+from sms_handover.conditions.constant_wrench import ConstantWrench
 from sms_handover.conditions.orbit import GravityGradient, Orbit, RelativeOrbit
 from sms_handover.conditions.thruster_misfire import ThrusterMisfire
 from sms_handover.conditions.wrench import BodyAtInstant, WrenchModel
 from sms_handover.conditions.wrench_history import WrenchHistory
+from sms_handover.configuration.conditions_fields import BODY
 from sms_handover.errors import ConfigurationError
 from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.description import load_robot
