@@ -2,7 +2,7 @@
 
 from sms_handover.graph.events import PLAN_BACK, PLAN_FAILED, RunEvent, Severity
 from sms_handover.graph.topics import CONTROLLER
-from sms_handover.types import PlanReport, PlanStatus
+from sms_handover.plan_report import PlanReport, PlanStatus
 
 
 class PlanEvents:

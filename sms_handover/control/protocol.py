@@ -8,11 +8,11 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from sms_handover.errors import ControllerError
+from sms_handover.plan_report import PlanReport
 from sms_handover.types import (
     Array,
     GraspEvent,
     JointReference,
-    PlanReport,
     Pose,
     PreviewedTargets,
     PreviewState,

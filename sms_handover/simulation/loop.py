@@ -22,6 +22,7 @@ from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import CONTROLLER
 from sms_handover.model.conserved import ConservedQuantities
+from sms_handover.plan_report import PlanReport
 from sms_handover.plant.external_wrenches import ExternalAccount
 from sms_handover.simulation.quiet_periods import QuietPeriods, QuietRunner
 from sms_handover.simulation.scenario import Scenario, load_scenario
@@ -40,7 +41,6 @@ from sms_handover.types import (
     GraspEvent,
     IkStatus,
     JointReference,
-    PlanReport,
     Pose,
     RobotState,
     TaskPhase,

@@ -25,6 +25,7 @@ from sms_handover.graph.events import PLAN_FAILED
 from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.reduced import reduced_inverse_dynamics
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
+from sms_handover.plan_report import PlanReport, PlanStatus
 from sms_handover.run_data import RunData
 from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.near_pairs import NearPairs
@@ -33,7 +34,7 @@ from sms_handover.simulation.simulate import simulate
 from sms_handover.simulation.snapshot import plain, structured
 from sms_handover.simulation.wiring import make_clearance
 from sms_handover.trajectory.preview import TargetPreview
-from sms_handover.types import Array, PlanReport, PlanStatus, PreviewedTargets, Twist
+from sms_handover.types import Array, PreviewedTargets, Twist
 
 from .conftest import Draw
 

@@ -10,7 +10,8 @@ import numpy as np
 from sms_handover.control.mpc.constraints import Constraint
 from sms_handover.control.mpc.products import times_vector
 from sms_handover.errors import MissingDependencyError
-from sms_handover.types import Array, PlanStatus
+from sms_handover.plan_report import PlanStatus
+from sms_handover.types import Array
 
 _HARD, _SOFT = 0, 8  # of DAQP
 _INFEASIBLE = -1  # of DAQP; others below 0 are ends without an answer, such as -4 after all iterations
