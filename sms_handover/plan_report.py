@@ -8,9 +8,9 @@ class PlanStatus(Enum):
     """What came of one solve of a predictive law; the value is what a user reads."""
 
     SOLVED = "solved"
-    ITERATION_LIMIT = "stopped at the limit of iterations"
+    ITERATION_LIMIT = "no solution within the limit of iterations"
     INFEASIBLE = "no plan keeps the hard limits"
-    BRAKING = "too many solves in a row gave no plan: the arms brake to rest"
+    BRAKING = "no plan for too long: the arms brake to rest"
 
 
 @dataclass(frozen=True)

@@ -291,7 +291,15 @@ class Loop:
         plant, trajectory = self._plant.snapshot(), self._generator.snapshot()
         clearance = self._monitor.snapshot() if self._monitor else None
         return Snapshot(
-            self.seed, plant, trajectory, self.law, controller, self._guidance, self.finished, clearance
+            self.seed,
+            plant,
+            trajectory,
+            self.law,
+            controller,
+            self._guidance,
+            self.finished,
+            clearance,
+            self._plan_events.state,
         )
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -312,6 +320,7 @@ class Loop:
         self._controller.reset()
         self._plan_events.reset()
         if snapshot.law == self.law:
+            self._plan_events.restore(snapshot.plan)
             restore_controller(self._controller, snapshot.controller)
         elif snapshot.plant.tick:
             self._controller.guide(self._guidance)

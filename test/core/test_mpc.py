@@ -10,9 +10,9 @@ import pytest
 
 from sms_handover.control.mpc import quadratic_program
 from sms_handover.control.mpc.constraints import Constraint
+from sms_handover.control.mpc.controller import MpcController, MpcState
 from sms_handover.control.mpc.distance_rows import DistanceModel
 from sms_handover.control.mpc.horizon import Horizon
-from sms_handover.control.mpc.law import MpcController, MpcState
 from sms_handover.control.mpc.momentum import BaseStart, base_start
 from sms_handover.control.mpc.placement import placements
 from sms_handover.control.mpc.plan import Plan
