@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sms_handover.graph.events import RunEvent
-from sms_handover.plan_report import PlanReport
+from sms_handover.plan_report import PlannedPaths, PlanReport
 from sms_handover.types import GraspEvent, TaskPhase
 
 Array = npt.NDArray[np.float64]
@@ -64,6 +64,7 @@ class RunData:
     grasp_events: tuple[GraspEvent, ...]
     run_events: tuple[RunEvent, ...] = ()
     plans: tuple[PlanReport, ...] = ()
+    planned_paths: tuple[PlannedPaths, ...] = ()
 
     def __post_init__(self) -> None:
         for item in fields(self):
