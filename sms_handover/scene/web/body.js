@@ -256,9 +256,11 @@ class Planned {
     this.points = numbers(data.points, Float32Array); // m, x y z per plan, arm and instant of its horizon
     this.width = 3 * data.size; // numbers of a line
     this.lines = arms.map(() => {
-      const material = new THREE.LineMaterial({ linewidth: PLANNED_WIDTH, dashed: true, dashSize: 0.02, gapSize: 0.012 });
-      const line = new THREE.Line2(new THREE.LineGeometry(), material);
+      const above = { depthTest: false, transparent: true }; // seen through the arms and the deputy
+      const dashes = { dashed: true, dashSize: 0.02, gapSize: 0.012 }; // m
+      const line = new THREE.Line2(new THREE.LineGeometry(), new THREE.LineMaterial({ linewidth: PLANNED_WIDTH, ...dashes, ...above }));
       line.frustumCulled = false;
+      line.renderOrder = 1;
       group.add(line);
       return line;
     });
