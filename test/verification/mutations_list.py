@@ -1142,7 +1142,7 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "distances that are to shrink",
-        "control/mpc/distance_rows",
+        "control/distance_gradients",
         "return np.asarray(normal @ (second - first))[np.newaxis]",
         "return np.asarray(normal @ (first - second))[np.newaxis]",
         "mpc",
