@@ -1028,7 +1028,7 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "p values not adjusted for their number",
-        "campaign/statistics/paired_tests",
+        "campaign/statistics/holm",
         'method="holm")[1]',
         'method="holm", is_sorted=False)[1] * 0.5',
         "campaign_statistics",
