@@ -80,11 +80,11 @@ TASK_PHASE = "task/phase"
 GRASP_EVENT = "task/grasp_event"
 DEPUTY_POSE = "deputy/pose"
 DEPUTY_ODOMETRY = "deputy/odometry"
-MEASURED_JOINT_STATES = "measured/joint_states"  # what sensors tell, only where there are any
-MEASURED_BASE_ODOMETRY = "measured/base_odometry"
-MEASURED_SAMPLED_JOINT_STATES = "measured/sampled_joint_states"
-MEASURED_SAMPLED_BASE_ODOMETRY = "measured/sampled_base_odometry"
-MEASURED_DEPUTY_POSE = "measured/deputy_pose"
+MEASURED_JOINT_STATES = "measured_joint_states"  # what sensors tell, only where there are any
+MEASURED_BASE_ODOMETRY = "measured_base_odometry"
+MEASURED_SAMPLED_JOINT_STATES = "sampled_measured_joint_states"
+MEASURED_SAMPLED_BASE_ODOMETRY = "sampled_measured_base_odometry"
+MEASURED_DEPUTY_POSE = "deputy/measured_pose"
 GYRO, STAR_TRACKER, VISION = "sensors/gyro", "sensors/star_tracker", "sensors/vision"
 SENSOR_TYPES = {  # of the topics of sensors that have one of their own
     GYRO: "sensor_msgs/msg/Imu",

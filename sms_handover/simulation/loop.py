@@ -1,7 +1,7 @@
 """The loop as an object: plant, trajectory, inverse kinematics and controller of a scenario, tick by tick."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from sms_handover.clearance.monitor import PeriodClearance
@@ -24,6 +24,7 @@ from sms_handover.graph.topics import CONTROLLER
 from sms_handover.model.conserved import ConservedQuantities
 from sms_handover.plant.external_wrenches import ExternalAccount
 from sms_handover.plant.sensed_plant import KnownState, SensedPlant, known_of
+from sms_handover.simulation.parameters import COMPILED
 from sms_handover.simulation.quiet_periods import QuietPeriods, QuietRunner
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.snapshot import Snapshot, controller_data, restore_controller
@@ -166,9 +167,10 @@ class Loop:
         parameters, truth = self.scenario.parameters, self.scenario.truth
         robot, schedule = self.scenario.model.robot, self.scenario.model.schedule
         self._common = parameters.common
-        self._plant = make_plant(
-            truth.robot, truth.schedule, self._common, parameters.plant, truth.conditions
-        )
+        conditions = truth.conditions
+        if self._common.dynamics == COMPILED and not self._common.uses_measurements:
+            conditions = replace(conditions, sensors={})  # C does not measure, and nobody would listen
+        self._plant = make_plant(truth.robot, truth.schedule, self._common, parameters.plant, conditions)
         self._generator = make_generator(robot, schedule, self._common, parameters.trajectory)
         self._find_joints = make_ik(robot, self._common, parameters.ik)
         measured = self._common.measures_clearance
