@@ -140,6 +140,8 @@ class RecorderNode(GraphNode[RecorderParameters]):
         executor.spin_once(timeout_sec=self._poll_s)
         nothing = not self.inputs.loop.poll()
         if not self.active:
+            if not self._closed:
+                self._peer_parameters.poll()  # so that the answers are there when the run could begin
             return
         self._flush(idle=nothing and monotonic() - self._last_message > _POLL_S)
         if self._run_is_over and not self.finished and self._drained():
