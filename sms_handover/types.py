@@ -143,7 +143,8 @@ class JointCommand:
 class TickRows:
     """Ticks as arrays, a row each: stamps (k,) ns, q (k, 7 + n), v (k, 6 + n), and efforts (k, n) N m.
 
-    ``joint_effort`` acted up to the state, ``effort`` answers it.
+    ``joint_effort`` acted up to the state, ``effort`` answers it. With sensors ``measured`` (k, 13 + 2 n) has
+    q and v as they are known.
     """
 
     stamp_ns: npt.NDArray[np.int64]
@@ -151,6 +152,7 @@ class TickRows:
     v: Array
     joint_effort: Array
     effort: Array
+    measured: Array | None = None
 
     def __len__(self) -> int:
         return len(self.stamp_ns)

@@ -16,15 +16,14 @@ from sms_handover.control.protocol import Carrying, Controller, Planning, Remote
 from sms_handover.control.registry import law_named
 from sms_handover.frames import BASE, WORLD
 from sms_handover.graph.topics import (
-    BASE_ODOMETRY,
     CONTROLLER,
     GRASP_EVENT,
     JOINT_COMMAND,
     JOINT_REFERENCE,
-    JOINT_STATES,
     MPC_STATUS,
     PLANNED_PATHS,
     TASK_PHASE,
+    state_topics,
 )
 from sms_handover.nodes.parts.guidance_parts import GuidanceParts
 from sms_handover.nodes.parts.marker import path_markers
@@ -48,8 +47,6 @@ from sms_handover.ros.transport.stamp_sync import StampOrder, StampSync
 from sms_handover.simulation.parameters import LOCKSTEP, REALTIME
 from sms_handover.simulation.wiring import longest_reference_ns, make_controller
 from sms_handover.units import NS_PER_S
-
-_STATE = (JOINT_STATES, BASE_ODOMETRY)
 
 
 class AnsweringNode(GraphNode[P]):
@@ -78,11 +75,12 @@ class AnsweringNode(GraphNode[P]):
         )
         guidance[TASK_PHASE] = self._phase_codec.checked
         guidance[JOINT_REFERENCE] = self._reference_codec.checked
+        self._state = self._joints, self._odometry = state_topics(measured=self.common.uses_measurements)
         state: dict[str, Decode[Stamped[Any]]] = {
-            JOINT_STATES: self._state_codec.joints.checked,
-            BASE_ODOMETRY: self._state_codec.odometry.checked,
+            self._joints: self._state_codec.joints.checked,
+            self._odometry: self._state_codec.odometry.checked,
         }
-        self._everything = (*_STATE, *guidance)
+        self._everything = (*self._state, *guidance)
         ahead_ns = self._reference_ns if self._lockstep else NS_PER_S
         self._inputs: StampSync[Any] = StampSync(ahead_ns=ahead_ns, paced=not self._lockstep)
         self._orders = {topic: StampOrder(ahead_ns) for topic in guidance}
@@ -142,11 +140,11 @@ class AnsweringNode(GraphNode[P]):
         stamp = self._inputs.oldest_ns
         if stamp is None:
             stamp = self._answered_ns + self._tick_ns if self._command.count else 0
-        return self._inputs.missing(stamp, self._needed(stamp)) or BASE_ODOMETRY
+        return self._inputs.missing(stamp, self._needed(stamp)) or self._odometry
 
     def _needed(self, stamp: int) -> tuple[str, ...]:
         """Return the inputs that belong to a stamp, the last one to come last."""
-        return self._everything if self._lockstep and stamp % self._reference_ns == 0 else _STATE
+        return self._everything if self._lockstep and stamp % self._reference_ns == 0 else self._state
 
     def _on_input(self, topic: str, message: Stamped[Any], sent_ns: int) -> None:
         """Take one input; a state of time zero after an answered one restarts the run.
@@ -155,7 +153,7 @@ class AnsweringNode(GraphNode[P]):
         """
         stamp, content = message
         if self._inputs.restarts_run(stamp):
-            if topic not in _STATE:
+            if topic not in self._state:
                 self._early[topic] = content
                 return
             self._inputs.reset()
@@ -168,7 +166,7 @@ class AnsweringNode(GraphNode[P]):
                 self._orders[topic].accept(stamp, self._answered_ns)
                 self._guide(topic, stamp, content)
             return
-        if topic == BASE_ODOMETRY and stamp == self._answered_ns and self._lockstep and self._answer_bytes:
+        if topic == self._odometry and stamp == self._answered_ns and self._lockstep and self._answer_bytes:
             self._command.publish(self._answer_bytes)  # the plant has resent it: it has missed the answer
         self._inputs.add(stamp, topic, content)
         self._answer(stamp)
@@ -210,7 +208,7 @@ class AnsweringNode(GraphNode[P]):
             commands = inputs[TASK_PHASE].commands
             if commands and isinstance(self._controller, Carrying):
                 self._commanded = stamp, len(commands)
-        q, v = coordinates(inputs[JOINT_STATES], inputs[BASE_ODOMETRY])
+        q, v = coordinates(inputs[self._joints], inputs[self._odometry])
         effort = self._controller.effort(stamp, q, v) if self._parts.complete else self._no_effort
         self._answer_bytes = self._command_codec.pack(stamp, effort=effort)
         self._command.publish(self._answer_bytes)

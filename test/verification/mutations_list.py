@@ -1028,7 +1028,7 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "p values not adjusted for their number",
-        "campaign/statistics/paired_tests",
+        "campaign/statistics/holm",
         'method="holm")[1]',
         'method="holm", is_sorted=False)[1] * 0.5',
         "campaign_statistics",
@@ -1142,7 +1142,7 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "distances that are to shrink",
-        "control/mpc/distance_rows",
+        "control/distance_gradients",
         "return np.asarray(normal @ (second - first))[np.newaxis]",
         "return np.asarray(normal @ (first - second))[np.newaxis]",
         "mpc",
