@@ -11,6 +11,7 @@ from sms_handover.clearance.monitor import ClearanceMonitor
 from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
 from sms_handover.compiled.inverse_kinematics import CompiledIk
 from sms_handover.compiled.kinematics import CompiledKinematics
+from sms_handover.compiled.linearisation import CompiledDerivatives
 from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.compiled.tool_motion import CompiledToolMotion
 from sms_handover.conditions.conditions import IDEAL, Conditions
@@ -165,6 +166,7 @@ def make_controller(
         reference_ns=common.reference_ns,
         preview=preview,
         distances=distances,
+        compiled_derivatives=CompiledDerivatives,
         start_solver=SolverProcess if in_real_time else None,
     )
     controller = law.make(setup)
