@@ -135,6 +135,12 @@ def _compared(run: RunData, name: str) -> Any:
         return tuple(event for event in own if event.kind != MESSAGE_REFUSED)
     if name == "plans":
         return tuple(replace(plan, **_UNTIMED) for plan in run.plans)
+    if name == "planned_paths":
+        # as numbers, whose repr has all digits
+        return tuple(
+            (paths.stamp_ns, {arm: path.tolist() for arm, path in paths.tool_in_world.items()})
+            for paths in run.planned_paths
+        )
     return getattr(run, name)
 
 

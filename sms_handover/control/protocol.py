@@ -8,7 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from sms_handover.errors import ControllerError
-from sms_handover.plan_report import PlanReport
+from sms_handover.plan_report import PlannedPaths, PlanReport
 from sms_handover.types import (
     Array,
     GraspEvent,
@@ -79,6 +79,14 @@ class Planning(Protocol):
 
     def take_status(self) -> PlanReport | None:
         """Return the report of the solve since the last call, None if there was none."""
+
+
+@runtime_checkable
+class Showing(Protocol):
+    """What a controller has besides that shows where its plans lead the tools."""
+
+    def take_paths(self) -> PlannedPaths | None:
+        """Return the paths that are new since the last call, None if there are none."""
 
 
 class RemoteSolver(Protocol):

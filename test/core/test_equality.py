@@ -9,7 +9,7 @@ import pytest
 
 from sms_handover.analysis.equality import Difference, compare_runs
 from sms_handover.graph.events import RunEvent, Severity
-from sms_handover.plan_report import PlanReport, PlanStatus
+from sms_handover.plan_report import PlannedPaths, PlanReport, PlanStatus
 from sms_handover.run_data import RunData
 from sms_handover.types import GraspStatus
 
@@ -17,7 +17,7 @@ from .bag_messages import made_up_run
 
 ARRAYS = [item.name for item in fields(RunData) if isinstance(getattr(made_up_run(3), item.name), np.ndarray)]
 PER_ARM = ("target_pose", "tool_pose")
-TEXTS = ("joint_names", "arms", "phases", "grasp_events", "run_events", "plans")
+TEXTS = ("joint_names", "arms", "phases", "grasp_events", "run_events", "plans", "planned_paths")
 
 
 @pytest.fixture
@@ -65,6 +65,12 @@ def test_a_plan_is_the_same_however_long_it_took(run: RunData) -> None:
     assert compare_runs(mine, replace(run, plans=(slow,))) == ()
     (difference,) = compare_runs(mine, replace(run, plans=(other,)))
     assert difference.field == "plans"
+
+
+def test_one_bit_in_a_planned_path_is_a_difference(run: RunData) -> None:
+    one, other = (PlannedPaths(0, {"arm_a": np.full((2, 3), x)}) for x in (0.1, np.nextafter(0.1, 1.0)))
+    (difference,) = compare_runs(replace(run, planned_paths=(one,)), replace(run, planned_paths=(other,)))
+    assert difference.field == "planned_paths"
 
 
 @pytest.mark.parametrize("name", PER_ARM)

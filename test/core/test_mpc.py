@@ -26,8 +26,9 @@ from sms_handover.graph.events import PLAN_FAILED
 from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.reduced import reduced_inverse_dynamics
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
-from sms_handover.plan_report import PlanReport, PlanStatus
+from sms_handover.plan_report import PlannedPaths, PlanReport, PlanStatus
 from sms_handover.run_data import RunData
+from sms_handover.scene.planned_lines import planned_lines
 from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.near_pairs import NearPairs
 from sms_handover.simulation.scenario import Scenario, load_scenario
@@ -382,6 +383,26 @@ def test_a_plan_begins_where_the_robot_will_be() -> None:
     assert np.abs(state.joint_velocity).max() > 0.1
     np.testing.assert_allclose(coming.q, state.joint_position, rtol=0.0, atol=1e-5)
     np.testing.assert_allclose(coming.w, state.joint_velocity, rtol=0.0, atol=1e-3)
+
+
+def test_planned_paths_are_those_that_the_tools_then_take() -> None:
+    """Of every fifth plan: it begins where the tools are one period later, and they go on along it."""
+    run, arm = simulate(scenario_of("smooth", 1.2)), "arm_a"
+    assert [paths.stamp_ns for paths in run.planned_paths] == run.reference_ns[::5].tolist()
+    paths = run.planned_paths[8]
+    horizon = Horizon.growing(1.6, 10, 0.02)  # as shipped
+    stamps, taken = paths.stamp_ns + 20_000_000 + 1e9 * horizon.times[:4], run.tool_pose[arm][:, :3].T
+    then = np.array([np.interp(stamps, run.reference_ns, row) for row in taken]).T
+    np.testing.assert_allclose(paths.tool_in_world[arm][0], then[0], rtol=0.0, atol=1e-8)
+    np.testing.assert_allclose(paths.tool_in_world[arm][:4], then, rtol=0.0, atol=1e-5)
+    assert np.linalg.norm(then[3] - then[0]) > 5e-4
+    lines = planned_lines(run.planned_paths, ("arm_b", arm))
+    assert lines is not None and lines.points.shape == (len(run.planned_paths), 2, 11, 3)
+    assert lines.points[3, 1].tobytes() == run.planned_paths[3].tool_in_world[arm].tobytes()
+    shorter = PlannedPaths(0, {arm: np.eye(3)[:2]})
+    padded = planned_lines([shorter, *run.planned_paths[:1]], (arm, "arm_c"))
+    assert padded is not None and np.isnan(padded.points[:, 1]).all()
+    assert (padded.points[0, 0, 1:] == np.eye(3)[1]).all()
 
 
 def test_targets_are_those_of_the_instants_of_the_plan(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1150,15 +1150,15 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "a plan made for the state of now",
         "control/mpc/controller",
-        "now, later = self._plan.at(stamp_ns), self._plan.at(begin_ns)",
-        "now, later = self._plan.at(stamp_ns), self._plan.at(stamp_ns)",
+        "now, later = plan.at(stamp_ns), plan.at(begin_ns)",
+        "now, later = plan.at(stamp_ns), plan.at(stamp_ns)",
         "mpc",
     ),
     _core(
         "targets of the instant before",
         "control/mpc/controller",
-        "for time in planner.horizon.times[1:].tolist()]",
-        "for time in planner.horizon.times[:-1].tolist()]",
+        "for time in horizon.times[1:].tolist()]",
+        "for time in horizon.times[:-1].tolist()]",
         "mpc",
     ),
     _core(
@@ -1174,6 +1174,27 @@ BREAKS: tuple[Break, ...] = (
         "self._failures += 1",
         "self._failures += 0",
         "mpc",
+    ),
+    _core(
+        "a plan used out of order",
+        "control/mpc/plan_queue",
+        "if newest is not None and plan.number <= newest.number:",
+        "if newest is not None and plan.number < 0:",
+        "mpc_real_time",
+    ),
+    _core(
+        "plans that come late are not counted",
+        "control/mpc/plan_queue",
+        "self.late += 1",
+        "self.late += 0",
+        "mpc_real_time",
+    ),
+    _core(
+        "arms that do not brake when plans stop",
+        "control/mpc/real_time",
+        "self._queue.offer(self._braking(self._here(q, v), self._solves, stamp_ns))",
+        "self._braking(self._here(q, v), self._solves, stamp_ns)",
+        "mpc_real_time",
     ),
     _core(
         "a preview that ignores the end of a phase",

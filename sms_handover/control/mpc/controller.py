@@ -28,7 +28,7 @@ from sms_handover.control.mpc.quadratic_program import require_daqp
 from sms_handover.control.protocol import Guidance
 from sms_handover.errors import ConfigurationError
 from sms_handover.model.known_payload import EMPTY_HANDS, Grip, KnownPayload
-from sms_handover.plan_report import PlanReport, PlanStatus
+from sms_handover.plan_report import PlannedPaths, PlanReport, PlanStatus
 from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, PreviewState, frozen, read_only
 from sms_handover.units import ns_to_seconds, seconds_to_ns
 
@@ -92,6 +92,7 @@ class MpcController:
         self._news: tuple[GraspEvent, ...] = ()
         self._hold(EMPTY_HANDS)
         self._report: PlanReport | None = None
+        self._paths: PlannedPaths | None = None
 
     def guide(self, guidance: Guidance) -> None:
         """Plan for these targets at the next state."""
@@ -122,6 +123,11 @@ class MpcController:
         """Return the report of the solve since the last call, None if there was none."""
         report, self._report = self._report, None
         return report
+
+    def take_paths(self) -> PlannedPaths | None:
+        """Return the paths of the tools that are new since the last call, None if there are none."""
+        paths, self._paths = self._paths, None
+        return paths
 
     @property
     def plan(self) -> Plan | None:
@@ -252,9 +258,11 @@ class MpcController:
         return PlanStart(joints, rates, replace(base, rotation=rotation, centre_of_mass=centre))
 
     def _reported(self, problem: PlanProblem, status: PlanStatus, step: Step, total: float) -> PlanReport:
-        """Return the report of a solve that took so many seconds in all."""
+        """Return the report of a solve that took so many seconds in all, and show its paths."""
         solution, plan = step.solution, self._queue.plan
         assert plan is not None
+        if step.paths:
+            self._paths = PlannedPaths(problem.stamp_ns, step.paths)
         return PlanReport(
             problem.stamp_ns,
             problem.number,
