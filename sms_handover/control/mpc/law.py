@@ -11,7 +11,7 @@ from time import perf_counter
 import numpy as np
 import pinocchio as pin
 
-from sms_handover.control.disturbance_observer import memory_of, restore_memory
+from sms_handover.control.compensation import continued, memory_of, restore_memory
 from sms_handover.control.law import Law, LawSetup, LinearFeedback, Need
 from sms_handover.control.mpc.braking import braking_plan
 from sms_handover.control.mpc.momentum import base_start, base_velocity
@@ -41,7 +41,7 @@ class MpcState:
     """Everything that later efforts depend on: plans, counts, the preview, and the initial attitude (3, 3).
 
     ``coming`` takes the place of ``plan`` when it begins; ``failures`` counts solves in a row without a plan;
-    ``news`` are grasps that count from the next state on, ``observed`` is the memory of the computed torque.
+    ``news`` are grasps that count from the next state on, ``observed`` is the memory of the compensation.
     """
 
     phase_index: int
@@ -69,6 +69,7 @@ class MpcController:
             )
         self._gains, self._preview, self._make_efforts = setup.gains, setup.preview, setup.computed_torque
         self._distances, self._period_ns = setup.distances, setup.reference_ns
+        self._efforts = self._make_efforts(setup.robot)
         self._payload = KnownPayload(setup.robot, setup.deputy)
         self._rest = read_only(np.zeros(setup.robot.n_joints))  # N m
         period = ns_to_seconds(setup.reference_ns)
@@ -93,6 +94,7 @@ class MpcController:
         self._guidance: Guidance | None = None
         self._news: tuple[GraspEvent, ...] = ()
         self._hold(EMPTY_HANDS)
+        restore_memory(self._efforts, np.zeros(0))
         self._report: PlanReport | None = None
 
     def guide(self, guidance: Guidance) -> None:
@@ -171,7 +173,7 @@ class MpcController:
         """Go on with the dynamics of the robot with what an arm holds."""
         self._payload.hold(grip)
         self._robot = self._payload.robot
-        self._efforts = self._make_efforts(self._robot)
+        self._efforts = continued(self._make_efforts(self._robot), self._efforts)
         self._planners: dict[MpcGains, Planner] = {}
 
     def _replan(self, stamp_ns: int, q: Array, v: Array, guidance: Guidance) -> None:
@@ -180,7 +182,7 @@ class MpcController:
         if self._plan is None:
             self._initial_rotation = np.array(pin.Quaternion(q[3:BASE_NQ]).normalized().matrix())
         planner = self._planner
-        self._preview.update(guidance.phase, guidance.reference, guidance.tool_in_world, q)
+        self._preview.update(guidance.phase, guidance.reference, guidance.tool_in_world, q, v)
         if self._plan is None:
             here = PlanStart(q[BASE_NQ:], v[BASE_NV:], base_start(self._robot, q, v))
             self._plan = braking_plan(planner, here, self._limit(planner.gains), 0, stamp_ns)
