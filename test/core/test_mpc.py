@@ -10,9 +10,9 @@ import pytest
 
 from sms_handover.control.mpc import quadratic_program
 from sms_handover.control.mpc.constraints import Constraint
+from sms_handover.control.mpc.controller import MpcController, MpcState
 from sms_handover.control.mpc.distance_rows import DistanceModel
 from sms_handover.control.mpc.horizon import Horizon
-from sms_handover.control.mpc.law import MpcController, MpcState
 from sms_handover.control.mpc.momentum import BaseStart, base_start
 from sms_handover.control.mpc.placement import placements
 from sms_handover.control.mpc.plan import Plan
@@ -21,18 +21,19 @@ from sms_handover.control.mpc.prediction import Prediction, PredictionModel
 from sms_handover.control.mpc.quadratic_program import solve
 from sms_handover.control.mpc.sensitivity import Sensitivity
 from sms_handover.control.mpc.tool_errors import ToolErrorModel
-from sms_handover.errors import ConfigurationError, MissingDependencyError
+from sms_handover.errors import ConfigurationError, ControllerError, MissingDependencyError
 from sms_handover.graph.events import PLAN_FAILED
 from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.model.reduced import reduced_inverse_dynamics
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
+from sms_handover.plan_report import PlanReport, PlanStatus
 from sms_handover.run_data import RunData
 from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.near_pairs import NearPairs
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
-from sms_handover.simulation.snapshot import plain, structured
+from sms_handover.simulation.snapshot import Snapshot, plain, structured
 from sms_handover.simulation.wiring import gains_by_phase, initial_joints, make_clearance
 from sms_handover.trajectory.preview import TargetPreview
 from sms_handover.types import (
@@ -42,8 +43,6 @@ from sms_handover.types import (
     GraspEvent,
     GraspStatus,
     JointReference,
-    PlanReport,
-    PlanStatus,
     Pose,
     PreviewedTargets,
     TaskPhase,
@@ -324,6 +323,9 @@ def test_rows_that_contradict_each_other_are_named(draw: Draw) -> None:
     )
     assert hard.status is PlanStatus.INFEASIBLE and hard.largest_slack_row == "hard 0"
     assert hard.change.size == 0
+    for wrong in (-np.eye(3), np.full((3, 3), np.nan)):
+        with pytest.raises(ControllerError, match="expected a convex and finite program"):
+            solve(wrong, np.zeros(3), [upper], 300)
 
 
 def test_without_its_solver_the_law_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -434,6 +436,9 @@ def test_solves_that_fail_are_carried_by_the_plan_before_then_the_arms_brake() -
     failing = Loop(scenario_of("paper", 4.0, program_iterations=1, joint_rate_limit=0.05, failed_plans=5))
     failing.restore(before)
     reports, rates, events = list[PlanReport](), list[float](), list[str]()
+    failing.advance_period()
+    snapshot = failing.snapshot()
+    failing.restore(before)
     while not failing.finished and failing.state.stamp_ns < 2_000_000_000:
         ticks = failing.advance_period()
         assert ticks.plan is not None
@@ -446,6 +451,8 @@ def test_solves_that_fail_are_carried_by_the_plan_before_then_the_arms_brake() -
     assert [report.plan_age for report in reports[:3]] == pytest.approx([0.0, 0.02, 0.04])
     assert rates[0] > 0.1 and rates[-1] < 1e-3
     assert events.count(PLAN_FAILED) == 2  # the old plan is carried on, then the arms brake
+    failing.restore(structured(Snapshot, plain(snapshot)))
+    assert not any(failing.advance_period().excesses.values())  # that has been told before the snapshot
 
 
 def test_the_state_has_every_bit_of_the_rest() -> None:
