@@ -28,7 +28,8 @@ class Scene:
     ``deputy_size`` (3,) m are the edges of the deputy and ``deputy_in_world`` (T, 7) is its centre;
     ``target_in_world`` has (T, 7) per arm. What was not recorded is NaN. ``phases`` has one entry per
     start of a phase. ``worst_pair`` has the two bodies nearest to each other, None if that is unknown, and
-    ``momentum`` that of robot and deputy, None if there is none.
+    ``momentum`` that of robot and deputy, None if there is none; ``measured_deputy`` (T, 7) is where sensors
+    have told the deputy to be, None without sensors.
     """
 
     shapes: tuple[Shape, ...]
@@ -43,6 +44,7 @@ class Scene:
     grasp_events: tuple[GraspEvent, ...]
     worst_pair: WorstPair | None = None
     momentum: Momentum | None = None
+    measured_deputy: Array | None = None
 
     def __post_init__(self) -> None:
         self.stamp_ns.setflags(write=False)
@@ -92,6 +94,7 @@ def make_scene(
         grasp_events=run.grasp_events,
         worst_pair=worst_pair.at(stamps) if worst_pair else None,
         momentum=momentum_of(run, robot, deputy, ticks, periods),
+        measured_deputy=run.measured.deputy_pose[periods] if run.measured else None,
     )
 
 
