@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sms_handover.graph.events import RunEvent
-from sms_handover.types import GraspEvent, PlanReport, TaskPhase
+from sms_handover.plan_report import PlanReport
+from sms_handover.types import GraspEvent, TaskPhase
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]

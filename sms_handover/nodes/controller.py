@@ -12,7 +12,7 @@ from sms_handover.configuration.scenario_file import LAW
 from sms_handover.control.law import Need
 from sms_handover.control.parameters import ControllerParameters, parameters_with
 from sms_handover.control.plan_events import PlanEvents
-from sms_handover.control.protocol import Carrying, Controller, Planning, inner_of
+from sms_handover.control.protocol import Carrying, Controller, Planning, Remote, inner_of
 from sms_handover.control.registry import law_named
 from sms_handover.frames import BASE, WORLD
 from sms_handover.graph.topics import (
@@ -42,7 +42,7 @@ from sms_handover.ros.node.graph_node import GraphNode, P
 from sms_handover.ros.node.message_filter import Decode
 from sms_handover.ros.process.main import run_node
 from sms_handover.ros.transport.stamp_sync import StampOrder, StampSync
-from sms_handover.simulation.parameters import LOCKSTEP
+from sms_handover.simulation.parameters import LOCKSTEP, REALTIME
 from sms_handover.simulation.wiring import longest_reference_ns, make_controller
 from sms_handover.units import NS_PER_S
 
@@ -229,6 +229,7 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
 
     def __init__(self) -> None:
         super().__init__(ControllerParameters)
+        self._remote: Remote | None = None
 
     def parameter_group(
         self, group: type[ControllerParameters], scenario: Mapping[str, object]
@@ -245,6 +246,7 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
         super().prepare()
         inner = inner_of(self._controller)
         self._solves = inner if isinstance(inner, Planning) else None
+        self._remote = inner if isinstance(inner, Remote) else None
         self._plan_events = PlanEvents()
         self._watchdog = ReferenceWatchdog(longest_reference_ns(self.common, self.parameters))
 
@@ -260,7 +262,26 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
 
     def make_controller(self) -> Controller:
         """Return the controller that the parameters ask for; raises ConfigurationError."""
-        return make_controller(self.robot, self.schedule, self.common, self.parameters)
+        real_time = self.common.mode == REALTIME
+        return make_controller(
+            self.robot, self.schedule, self.common, self.parameters, in_real_time=real_time
+        )
+
+    def clean_up(self) -> None:
+        """Give the inputs back to the middleware, and end the process of a solver."""
+        super().clean_up()
+        self._close()
+
+    def destroy_node(self) -> None:
+        """Destroy the node with its inputs, and end the process of a solver."""
+        super().destroy_node()
+        self._close()
+
+    def _close(self) -> None:
+        """End the process of a solver."""
+        if self._remote:
+            self._remote.close()
+            self._remote = None
 
     def begin(self) -> None:
         """Go back to the start of a run."""
@@ -273,7 +294,8 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
         report = self._solves.take_status() if self._solves else None
         if report:
             self._plans.publish(plan_message(report))
-            self.events.publish_all(self._plan_events.of(report))
+            trouble = self._remote.trouble if self._remote else ""
+            self.events.publish_all(self._plan_events.of(report, trouble))
         if not self._lockstep:
             event = self._watchdog.poll(self._parts.reference_ns, stamp)
             if event is not None:

@@ -22,6 +22,7 @@ from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import CONTROLLER
 from sms_handover.model.conserved import ConservedQuantities
+from sms_handover.plan_report import PlanReport
 from sms_handover.plant.external_wrenches import ExternalAccount
 from sms_handover.plant.sensed_plant import KnownState, SensedPlant, known_of
 from sms_handover.simulation.parameters import COMPILED
@@ -42,7 +43,6 @@ from sms_handover.types import (
     GraspEvent,
     IkStatus,
     JointReference,
-    PlanReport,
     Pose,
     RobotState,
     TaskPhase,
@@ -295,7 +295,15 @@ class Loop:
         plant, trajectory = self._plant.snapshot(), self._generator.snapshot()
         clearance = self._monitor.snapshot() if self._monitor else None
         return Snapshot(
-            self.seed, plant, trajectory, self.law, controller, self._guidance, self.finished, clearance
+            self.seed,
+            plant,
+            trajectory,
+            self.law,
+            controller,
+            self._guidance,
+            self.finished,
+            clearance,
+            self._plan_events.state,
         )
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -316,6 +324,7 @@ class Loop:
         self._controller.reset()
         self._plan_events.reset()
         if snapshot.law == self.law:
+            self._plan_events.restore(snapshot.plan)
             restore_controller(self._controller, snapshot.controller)
         elif snapshot.plant.tick:
             self._controller.guide(self._guidance)

@@ -9,10 +9,11 @@ import numpy.typing as npt
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.message_constants import CONSTANTS
 from sms_handover.model.poses import pose_row, twist_in_deputy
+from sms_handover.plan_report import PlanReport
 from sms_handover.run_data import MeasuredRows, RunData
 from sms_handover.simulation.loop import Period, Ticks
 from sms_handover.simulation.quiet_periods import QuietPeriods
-from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, PlanReport, TaskPhase, TickRows
+from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, TaskPhase, TickRows
 
 _BY_PERIOD = (
     *("reference_position", "reference_velocity", "deputy_pose", "deputy_twist"),

@@ -36,6 +36,7 @@ from sms_handover.plant.sensed_plant import SensedPlant
 from sms_handover.simulation.near_pairs import NearPairs
 from sms_handover.simulation.parameters import COMPILED, MEASURED, TRUE, CommonParameters
 from sms_handover.simulation.period_runner import PeriodRunner, PythonRunner
+from sms_handover.simulation.solver_process import SolverProcess
 from sms_handover.trajectory.generator import TrajectoryGenerator
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.preview import TargetPreview
@@ -135,11 +136,17 @@ def gains_by_phase(schedule: Schedule, parameters: ControllerParameters) -> tupl
 
 
 def make_controller(
-    robot: RobotModel, schedule: Schedule, common: CommonParameters, parameters: ControllerParameters
+    robot: RobotModel,
+    schedule: Schedule,
+    common: CommonParameters,
+    parameters: ControllerParameters,
+    *,
+    in_real_time: bool = False,
 ) -> Controller:
     """Return the controller of the scenario's law, with gains stable at the start.
 
-    The efforts of a law of another package are checked. Raises ConfigurationError.
+    The efforts of a law of another package are checked. ``in_real_time`` the plans of a law are made in a
+    process of their own. Raises ConfigurationError.
     """
     law, gains = law_named(parameters.law), gains_by_phase(schedule, parameters)
     start = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
@@ -158,6 +165,7 @@ def make_controller(
         reference_ns=common.reference_ns,
         preview=preview,
         distances=distances,
+        start_solver=SolverProcess if in_real_time else None,
     )
     controller = law.make(setup)
     return controller if law.name in SHIPPED else CheckedController(controller, robot.joint_names)

@@ -1028,7 +1028,7 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "p values not adjusted for their number",
-        "campaign/statistics/paired_tests",
+        "campaign/statistics/holm",
         'method="holm")[1]',
         'method="holm", is_sorted=False)[1] * 0.5',
         "campaign_statistics",
@@ -1206,21 +1206,21 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "distances that are to shrink",
-        "control/mpc/distance_rows",
+        "control/distance_gradients",
         "return np.asarray(normal @ (second - first))[np.newaxis]",
         "return np.asarray(normal @ (first - second))[np.newaxis]",
         "mpc",
     ),
     _core(
         "a plan made for the state of now",
-        "control/mpc/law",
+        "control/mpc/controller",
         "now, later = self._plan.at(stamp_ns), self._plan.at(begin_ns)",
         "now, later = self._plan.at(stamp_ns), self._plan.at(stamp_ns)",
         "mpc",
     ),
     _core(
         "targets of the instant before",
-        "control/mpc/law",
+        "control/mpc/controller",
         "for time in planner.horizon.times[1:].tolist()]",
         "for time in planner.horizon.times[:-1].tolist()]",
         "mpc",
@@ -1234,7 +1234,7 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "a failed solve does not count",
-        "control/mpc/law",
+        "control/mpc/controller",
         "self._failures += 1",
         "self._failures += 0",
         "mpc",

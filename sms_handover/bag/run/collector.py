@@ -23,7 +23,8 @@ from sms_handover.messages.values import (
     twist_values,
     vector_values,
 )
-from sms_handover.types import GraspEvent, PlanReport, TaskPhase
+from sms_handover.plan_report import PlanReport
+from sms_handover.types import GraspEvent, TaskPhase
 
 JOINT_TOPICS = (
     topics.JOINT_STATES,
