@@ -1142,21 +1142,21 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "distances that are to shrink",
-        "control/mpc/distance_rows",
+        "control/distance_gradients",
         "return np.asarray(normal @ (second - first))[np.newaxis]",
         "return np.asarray(normal @ (first - second))[np.newaxis]",
         "mpc",
     ),
     _core(
         "a plan made for the state of now",
-        "control/mpc/law",
+        "control/mpc/controller",
         "now, later = self._plan.at(stamp_ns), self._plan.at(begin_ns)",
         "now, later = self._plan.at(stamp_ns), self._plan.at(stamp_ns)",
         "mpc",
     ),
     _core(
         "targets of the instant before",
-        "control/mpc/law",
+        "control/mpc/controller",
         "for time in planner.horizon.times[1:].tolist()]",
         "for time in planner.horizon.times[:-1].tolist()]",
         "mpc",
@@ -1170,7 +1170,7 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "a failed solve does not count",
-        "control/mpc/law",
+        "control/mpc/controller",
         "self._failures += 1",
         "self._failures += 0",
         "mpc",
