@@ -166,9 +166,9 @@ $(VENV)/.verify: $(VENV)/.test
 	$(PIP) --editable '.[analysis,ros,test,verify]'
 	@touch $@
 
-$(VENV)-basilisk/.engines: $(METADATA)
+$(VENV)-basilisk/.engines: $(METADATA) .ci/basilisk.txt
 	$(PYTHON) -m venv $(VENV)-basilisk
-	$(VENV)-basilisk/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[basilisk,mpc,mujoco]' 'pytest>=8.4'
+	$(VENV)-basilisk/bin/python -m pip install --quiet --disable-pip-version-check --constraint .ci/basilisk.txt --editable '.[basilisk,mpc,mujoco]' 'pytest>=8.4'
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.test
