@@ -14,8 +14,8 @@ import numpy as np
 from benchmarks.machine import versions
 from benchmarks.results import Result, Table, publish, row
 from benchmarks.timing import interleaved
+from sms_handover.control.mpc.controller import MpcController
 from sms_handover.control.mpc.distance_rows import DistanceModel
-from sms_handover.control.mpc.law import MpcController
 from sms_handover.control.mpc.momentum import base_start
 from sms_handover.control.mpc.parameters import MpcGains
 from sms_handover.control.mpc.placement import placements

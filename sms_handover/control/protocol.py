@@ -8,11 +8,11 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from sms_handover.errors import ControllerError
+from sms_handover.plan_report import PlanReport
 from sms_handover.types import (
     Array,
     GraspEvent,
     JointReference,
-    PlanReport,
     Pose,
     PreviewedTargets,
     PreviewState,
@@ -79,6 +79,38 @@ class Planning(Protocol):
 
     def take_status(self) -> PlanReport | None:
         """Return the report of the solve since the last call, None if there was none."""
+
+
+class RemoteSolver(Protocol):
+    """What a planning law gets in real time: a process that solves its problems, one after the other."""
+
+    def submit(self, problem: Any) -> None:
+        """Send a problem."""
+
+    def take(self) -> Any:
+        """Return the next solution, None if there is none yet; never waits."""
+
+    def forget(self) -> None:
+        """Drop the solutions of all problems so far."""
+
+    @property
+    def trouble(self) -> str:
+        """How the process has ended, '' while it runs."""
+
+    def close(self) -> None:
+        """End the process."""
+
+
+@runtime_checkable
+class Remote(Planning, Protocol):
+    """What a controller has besides whose solver is another process."""
+
+    @property
+    def trouble(self) -> str:
+        """How that process has ended, '' while it runs."""
+
+    def close(self) -> None:
+        """End that process."""
 
 
 class Preview(Protocol):

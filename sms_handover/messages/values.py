@@ -5,6 +5,7 @@ from typing import Any
 
 from sms_handover.graph.events import RunEvent, Severity
 from sms_handover.graph.message_constants import member_of
+from sms_handover.plan_report import PlanReport, PlanStatus
 from sms_handover.types import (
     Collision,
     GraspAction,
@@ -12,8 +13,6 @@ from sms_handover.types import (
     GraspEvent,
     GraspStatus,
     PhaseState,
-    PlanReport,
-    PlanStatus,
     TaskPhase,
 )
 from sms_handover.units import NS_PER_S

@@ -9,8 +9,9 @@ import pytest
 
 from sms_handover.analysis.equality import Difference, compare_runs
 from sms_handover.graph.events import RunEvent, Severity
+from sms_handover.plan_report import PlanReport, PlanStatus
 from sms_handover.run_data import RunData
-from sms_handover.types import GraspStatus, PlanReport, PlanStatus
+from sms_handover.types import GraspStatus
 
 from .bag_messages import made_up_run
 

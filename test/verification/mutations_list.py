@@ -1028,7 +1028,7 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "p values not adjusted for their number",
-        "campaign/statistics/paired_tests",
+        "campaign/statistics/holm",
         'method="holm")[1]',
         'method="holm", is_sorted=False)[1] * 0.5',
         "campaign_statistics",
@@ -1149,14 +1149,14 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "a plan made for the state of now",
-        "control/mpc/law",
+        "control/mpc/controller",
         "now, later = self._plan.at(stamp_ns), self._plan.at(begin_ns)",
         "now, later = self._plan.at(stamp_ns), self._plan.at(stamp_ns)",
         "mpc",
     ),
     _core(
         "targets of the instant before",
-        "control/mpc/law",
+        "control/mpc/controller",
         "for time in planner.horizon.times[1:].tolist()]",
         "for time in planner.horizon.times[:-1].tolist()]",
         "mpc",
@@ -1170,7 +1170,7 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "a failed solve does not count",
-        "control/mpc/law",
+        "control/mpc/controller",
         "self._failures += 1",
         "self._failures += 0",
         "mpc",

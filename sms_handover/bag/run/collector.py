@@ -23,9 +23,15 @@ from sms_handover.messages.values import (
     twist_values,
     vector_values,
 )
-from sms_handover.types import GraspEvent, PlanReport, TaskPhase
+from sms_handover.plan_report import PlanReport
+from sms_handover.types import GraspEvent, TaskPhase
 
-JOINT_TOPICS = (topics.JOINT_STATES, topics.JOINT_COMMAND, topics.JOINT_REFERENCE)
+JOINT_TOPICS = (
+    topics.JOINT_STATES,
+    topics.JOINT_COMMAND,
+    topics.JOINT_REFERENCE,
+    topics.MEASURED_JOINT_STATES,
+)
 POSITION, VELOCITY, EFFORT = range(3)  # blocks gathered from a JointState
 BASE_POSE, BASE_TWIST = range(2)  # blocks gathered from an Odometry
 
@@ -45,8 +51,10 @@ class RunCollector:
             name: BlockCollector(joint_state, (POSITION, VELOCITY, EFFORT)) for name in JOINT_TOPICS
         }
         self.odometry = BlockCollector(odometry, _POSE_WITHOUT_COVARIANCE)
+        self.measured_odometry = BlockCollector(odometry, _POSE_WITHOUT_COVARIANCE)
         self.rows = {
             topics.DEPUTY_POSE: RowCollector(7, pose_values),
+            topics.MEASURED_DEPUTY_POSE: RowCollector(7, pose_values),
             topics.LINEAR_MOMENTUM: RowCollector(3, vector_values),
             topics.ANGULAR_MOMENTUM: RowCollector(3, vector_values),
             topics.LINEAR_IMPULSE: RowCollector(3, vector_values),
@@ -77,6 +85,7 @@ class RunCollector:
             **{name: collector.add for name, collector in self.joints.items()},
             topics.JOINT_STATES: self._take_state,
             topics.BASE_ODOMETRY: self.odometry.add,
+            topics.MEASURED_BASE_ODOMETRY: self.measured_odometry.add,
             **{name: decoder(self._info, self.full_name(name), take) for name, take in decoders.items()},
         }
         by_name = {self.full_name(name): taker for name, taker in takers.items()}
@@ -100,7 +109,9 @@ class RunCollector:
         return f"{self._prefix}/{name}"
 
     def _check_types(self) -> None:
-        for topic in topics.graph_topics(self.arms, clearance=True, wrenches=True):
+        for topic in topics.graph_topics(
+            self.arms, clearance=True, wrenches=True, sensors=topics.SENSOR_TYPES
+        ):
             recorded = self._info.topics.get(self.full_name(topic.name))
             if recorded is not None and (recorded.type, recorded.encoding) != (topic.type, "cdr"):
                 raise BagError(

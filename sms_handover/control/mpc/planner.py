@@ -47,6 +47,11 @@ class Step:
     program_time: float
 
 
+def horizon_of(gains: MpcGains) -> Horizon:
+    """Return the horizon that parameters ask for; raises ConfigurationError."""
+    return Horizon.growing(gains.plan_horizon, gains.plan_intervals, gains.plan_first_interval)
+
+
 class Planner:
     """Plans under one set of parameters; owns work space, so it is not to be shared between threads."""
 
@@ -55,7 +60,7 @@ class Planner:
     ) -> None:
         """Keep the base's attitude about an initial one (3, 3); raises ConfigurationError."""
         self.gains = gains
-        self.horizon = Horizon.growing(gains.plan_horizon, gains.plan_intervals, gains.plan_first_interval)
+        self.horizon = horizon_of(gains)
         self.prediction = PredictionModel(robot)
         self._tools, self._cost = ToolErrorModel(robot), PlanCost(robot, gains, self.horizon)
         self._limits = Limits(robot, gains, initial_rotation)
