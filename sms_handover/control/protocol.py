@@ -128,9 +128,14 @@ class Preview(Protocol):
         """Return to the start of a run."""
 
     def update(
-        self, phase: TaskPhase, reference: JointReference, tool_in_world: Mapping[str, Pose], q: Array
+        self,
+        phase: TaskPhase,
+        reference: JointReference,
+        tool_in_world: Mapping[str, Pose],
+        q: Array,
+        v: Array,
     ) -> None:
-        """Take the guidance of now, at a configuration (7 + n,)."""
+        """Take the guidance of now, at a configuration (7 + n,) and a velocity (6 + n,)."""
 
     def grasped(self, event: GraspEvent) -> None:
         """Learn what came of a grasp command, between two updates."""

@@ -12,7 +12,7 @@ from time import perf_counter
 import numpy as np
 import pinocchio as pin
 
-from sms_handover.control.disturbance_observer import memory_of, restore_memory
+from sms_handover.control.compensation import continued, memory_of, restore_memory
 from sms_handover.control.law import LawSetup
 from sms_handover.control.mpc.braking import braking_plan
 from sms_handover.control.mpc.horizon import Horizon
@@ -38,7 +38,7 @@ class MpcState:
     """Everything that later efforts depend on: plans, counts, the preview, and the initial attitude (3, 3).
 
     ``coming`` takes the place of ``plan`` when it begins; ``failures`` counts solves in a row without a plan;
-    ``news`` are grasps that count from the next state on, ``observed`` is the memory of the computed torque.
+    ``news`` are grasps that count from the next state on, ``observed`` is the memory of the compensation.
     """
 
     phase_index: int
@@ -70,6 +70,7 @@ class MpcController:
         )
         self._period_ns, self._queue = setup.reference_ns, PlanQueue()
         self._horizons: dict[MpcGains, Horizon] = {}
+        self._efforts = self._make_efforts(setup.robot)
         self._payload = KnownPayload(setup.robot, setup.deputy)
         self._rest = read_only(np.zeros(setup.robot.n_joints))  # N m
         period = ns_to_seconds(setup.reference_ns)
@@ -93,6 +94,7 @@ class MpcController:
         self._guidance: Guidance | None = None
         self._news: tuple[GraspEvent, ...] = ()
         self._hold(EMPTY_HANDS)
+        restore_memory(self._efforts, np.zeros(0))
         self._report: PlanReport | None = None
         self._paths: PlannedPaths | None = None
 
@@ -177,7 +179,7 @@ class MpcController:
         """Go on with the dynamics of the robot with what an arm holds."""
         self._payload.hold(grip)
         self._robot = self._payload.robot
-        self._efforts = self._make_efforts(self._robot)
+        self._efforts = continued(self._make_efforts(self._robot), self._efforts)
         self._prediction = PredictionModel(self._robot)
 
     def _replan(self, stamp_ns: int, q: Array, v: Array, guidance: Guidance) -> None:
@@ -193,7 +195,7 @@ class MpcController:
         """Take guidance; the first plan of a run is to rest where the joints are."""
         if self._queue.plan is None:
             self._initial_rotation = np.array(pin.Quaternion(q[3:BASE_NQ]).normalized().matrix())
-        self._preview.update(guidance.phase, guidance.reference, guidance.tool_in_world, q)
+        self._preview.update(guidance.phase, guidance.reference, guidance.tool_in_world, q, v)
         if self._queue.plan is None:
             self._queue.offer(self._braking(self._here(q, v), 0, stamp_ns))
 
