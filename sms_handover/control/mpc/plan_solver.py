@@ -2,9 +2,12 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from sms_handover.control.mpc.parameters import MpcGains
 from sms_handover.control.mpc.plan_problem import PlanProblem
 from sms_handover.control.mpc.planner import Planner, Step
+from sms_handover.control.mpc.quadratic_program import worst_excess
 from sms_handover.control.protocol import Distances
 from sms_handover.model.deputy import DeputyDescription
 from sms_handover.model.known_payload import EMPTY_HANDS, KnownPayload
@@ -28,6 +31,18 @@ class PlanSolver:
 
     def solve(self, problem: PlanProblem) -> Step:
         """Return one iteration."""
+        planner = self._planner(problem)
+        return planner.step(problem.start, problem.accelerations, problem.targets, shown=problem.is_shown)
+
+    def exceeded(self, problem: PlanProblem) -> tuple[float, str]:
+        """Return by how much the worst soft limit is exceeded without a change, and its row, '' for none."""
+        rows = (
+            self._planner(problem).program(problem.start, problem.accelerations, problem.targets).constraints
+        )
+        return worst_excess(rows, np.zeros(problem.accelerations.size), soft=True)
+
+    def _planner(self, problem: PlanProblem) -> Planner:
+        """Return the planner of a problem."""
         made_for = problem.grip, problem.initial_rotation.tobytes()
         if made_for != self._made_for:
             self._made_for = made_for
@@ -37,6 +52,4 @@ class PlanSolver:
         if gains not in self._planners:
             robot, initial = self._payload.robot, problem.initial_rotation
             self._planners[gains] = Planner(robot, gains, self._distances, initial)
-        planner = self._planners[gains]
-        step = planner.step(problem.start, problem.accelerations, problem.targets, shown=problem.is_shown)
-        return step
+        return self._planners[gains]
