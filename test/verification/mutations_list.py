@@ -1281,6 +1281,13 @@ BREAKS: tuple[Break, ...] = (
         "later = tool * pin.exp6(0.0 * ahead * along)",
         "mpc",
     ),
+    _core(
+        "a law that never gives up",
+        "control/mpc/patience",
+        "brakings = self._state.brakings + 1",
+        "brakings = self._state.brakings",
+        "mpc",
+    ),
     # what compensates for what a model does not know
     _core(
         "momentum observed without the Coriolis term",
