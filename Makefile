@@ -63,7 +63,7 @@ faults: $(VENV)/.test  ## inject every fault, check what is promised for it, wri
 
 docs: $(VENV)/.docs  ## build the documentation as a site, every warning an error, and look at it in a browser
 	rm -rf build/docs docs/api
-	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -d build/docs/doctrees docs $(SITE)
+	$(BIN)/python -m sphinx --jobs auto --fail-on-warning --keep-going --quiet -d build/docs/doctrees docs $(SITE)
 	$(BIN)/python -m pytest test/site --site $(SITE)
 	@echo "The site begins at $(SITE)/index.html"
 
@@ -166,9 +166,9 @@ $(VENV)/.verify: $(VENV)/.test
 	$(PIP) --editable '.[analysis,ros,test,verify]'
 	@touch $@
 
-$(VENV)-basilisk/.engines: $(METADATA)
+$(VENV)-basilisk/.engines: $(METADATA) .ci/basilisk.txt
 	$(PYTHON) -m venv $(VENV)-basilisk
-	$(VENV)-basilisk/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[basilisk,mpc,mujoco]' 'pytest>=8.4'
+	$(VENV)-basilisk/bin/python -m pip install --quiet --disable-pip-version-check --constraint .ci/basilisk.txt --editable '.[basilisk,mpc,mujoco]' 'pytest>=8.4'
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.test

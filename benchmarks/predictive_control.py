@@ -68,7 +68,7 @@ class Contest:
         for _ in range(STATES):
             state, period = loop.state, loop.advance_period().period
             assert period is not None and inner.plan is not None
-            preview.update(period.phase, period.reference, period.targets_in_world, state.q)
+            preview.update(period.phase, period.reference, period.targets_in_world, state.q, state.v)
             start = PlanStart(state.q[BASE_NQ:], state.v[BASE_NV:], base_start(robot, state.q, state.v))
             times = self.planner.horizon.times[1:].tolist()
             targets = preview.ahead([state.stamp_ns + seconds_to_ns(time) for time in times])

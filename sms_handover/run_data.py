@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sms_handover.graph.events import RunEvent
-from sms_handover.plan_report import PlanReport
+from sms_handover.plan_report import PlannedPaths, PlanReport
 from sms_handover.types import GraspEvent, TaskPhase
 
 Array = npt.NDArray[np.float64]
@@ -83,6 +83,7 @@ class RunData:
     grasp_events: tuple[GraspEvent, ...]
     run_events: tuple[RunEvent, ...] = ()
     plans: tuple[PlanReport, ...] = ()
+    planned_paths: tuple[PlannedPaths, ...] = ()
     measured: MeasuredRows | None = None
 
     def __post_init__(self) -> None:

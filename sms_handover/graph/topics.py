@@ -31,6 +31,7 @@ class Rate(Enum):
     CHANGE = "on change, latched"
     WALL = "every second of wall time"
     SOLVE = "every solve of a predictive law"
+    SHOWN = "every fifth solve of a predictive law"
     SENSOR = "as the sensor gives results"
 
 
@@ -99,6 +100,7 @@ ANGULAR_IMPULSE = "impulse/angular"
 ENERGY = "energy"
 IK_STATUS = "ik/status"
 MPC_STATUS = "mpc/status"  # only where the law solves a program as it goes on
+PLANNED_PATHS = "mpc/planned_paths"  # markers, for viewers
 ROBOT_DESCRIPTION = "robot_description"
 DEPUTY_MARKER = "deputy/marker"
 RUN_STATE = "run/state"
@@ -183,6 +185,7 @@ def graph_topics(
         Topic(ENERGY, f"{_OURS}/EnergyStamped", (PLANT,), (), Rate.REFERENCE),
         Topic(IK_STATUS, f"{_OURS}/IkStatus", (TRAJECTORY,), (), Rate.REFERENCE),
         Topic(MPC_STATUS, f"{_OURS}/MpcStatus", (CONTROLLER,), (), Rate.SOLVE),
+        Topic(PLANNED_PATHS, "visualization_msgs/msg/MarkerArray", (CONTROLLER,), (), Rate.SHOWN),
         Topic(ROBOT_DESCRIPTION, text, (PLANT,), (), Rate.CHANGE),
         Topic(TF, TF_TYPE, (PLANT, TRAJECTORY), (), Rate.REFERENCE),
         Topic(TF_STATIC, TF_TYPE, (PLANT,), (), Rate.CHANGE),

@@ -15,6 +15,7 @@ from sms_handover.control.protocol import (
     Controller,
     Guidance,
     Planning,
+    Showing,
     inner_of,
 )
 from sms_handover.control.registry import law_named
@@ -22,7 +23,7 @@ from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import CONTROLLER
 from sms_handover.model.conserved import ConservedQuantities
-from sms_handover.plan_report import PlanReport
+from sms_handover.plan_report import PlannedPaths, PlanReport
 from sms_handover.plant.external_wrenches import ExternalAccount
 from sms_handover.plant.sensed_plant import KnownState, SensedPlant, known_of
 from sms_handover.simulation.parameters import COMPILED
@@ -129,6 +130,7 @@ class Ticks:
     guidance: Guidance
     period: Period | None
     plan: PlanReport | None = None
+    paths: PlannedPaths | None = None
 
     @property
     def phases(self) -> tuple[TaskPhase, ...]:
@@ -190,6 +192,7 @@ class Loop:
             self._aims = Need.TOOL_TARGETS in law_named(self.law).needs
             self._controller = make_controller(robot, schedule, self._common, parameters.controller)
         self._solves = self.controller if isinstance(self.controller, Planning) else None
+        self._shows = self.controller if isinstance(self.controller, Showing) else None
         self._plan_events = PlanEvents()
         self._runner = make_runner(self._plant, self._controller, robot, self._common, parameters.plant)
         self._quiet: QuietRunner | None = None
@@ -260,7 +263,8 @@ class Loop:
         told = self._plan_events.of(report) if report else ()
         if told:
             excesses = {**excesses, 0: excesses.get(0, ()) + told}
-        return Ticks(rows, excesses, self._guidance, period, report)
+        paths = self._shows.take_paths() if self._shows else None
+        return Ticks(rows, excesses, self._guidance, period, report, paths)
 
     def _run(self, ticks: int, left: int) -> tuple[TickRows, Mapping[int, tuple[RunEvent, ...]]]:
         """Carry out some ticks, with ``left`` still to be integrated; return them with their excesses."""

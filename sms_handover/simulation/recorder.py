@@ -9,7 +9,7 @@ import numpy.typing as npt
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.message_constants import CONSTANTS
 from sms_handover.model.poses import pose_row, twist_in_deputy
-from sms_handover.plan_report import PlanReport
+from sms_handover.plan_report import PlannedPaths, PlanReport
 from sms_handover.run_data import MeasuredRows, RunData
 from sms_handover.simulation.loop import Period, Ticks
 from sms_handover.simulation.quiet_periods import QuietPeriods
@@ -44,6 +44,7 @@ class RunRecorder:
         self._events: list[GraspEvent] = []
         self._decisions: list[RunEvent] = []
         self._plans: list[PlanReport] = []
+        self._paths: list[PlannedPaths] = []
         self._measured = list[Array]()  # by tick
         self._measured_deputy = list[Array]()  # by period
 
@@ -57,6 +58,8 @@ class RunRecorder:
             self._add_period(ticks.period)
         if isinstance(ticks, Ticks) and ticks.plan:
             self._plans.append(ticks.plan)
+        if isinstance(ticks, Ticks) and ticks.paths:
+            self._paths.append(ticks.paths)
         for index, events in ticks.excesses.items():
             self._decisions.extend(events if index else ())
 
@@ -150,6 +153,7 @@ class RunRecorder:
             grasp_events=tuple(self._events),
             run_events=tuple(self._decisions),
             plans=tuple(self._plans),
+            planned_paths=tuple(self._paths),
             measured=self._measured_rows(),
             **{name: np.concatenate(rows) for name, rows in self._periods.items()},
         )

@@ -16,6 +16,7 @@ from sms_handover.messages.values import (
     energy_values,
     grasp_event,
     plan_report,
+    planned_paths,
     pose_values,
     run_event,
     status_values,
@@ -23,7 +24,7 @@ from sms_handover.messages.values import (
     twist_values,
     vector_values,
 )
-from sms_handover.plan_report import PlanReport
+from sms_handover.plan_report import PlannedPaths, PlanReport
 from sms_handover.types import GraspEvent, TaskPhase
 
 JOINT_TOPICS = (
@@ -69,6 +70,7 @@ class RunCollector:
         self.events: list[GraspEvent] = []
         self.run_events: list[RunEvent] = []
         self.plans: list[PlanReport] = []
+        self.planned_paths: list[PlannedPaths] = []
         self._first_ns: int | None = None
         self._newest_ns = 0
 
@@ -79,6 +81,7 @@ class RunCollector:
             topics.GRASP_EVENT: lambda message: self.events.append(grasp_event(message)),
             topics.RUN_EVENTS: lambda message: self.run_events.append(run_event(message)),
             topics.MPC_STATUS: lambda message: self.plans.append(plan_report(message)),
+            topics.PLANNED_PATHS: lambda message: self.planned_paths.append(planned_paths(message)),
             **{name: rows.add for name, rows in self.rows.items()},
         }
         takers: dict[str, Callable[[bytes], None]] = {
@@ -101,6 +104,7 @@ class RunCollector:
             self.events.clear()
             self.run_events.clear()
             self.plans.clear()
+            self.planned_paths.clear()
         self._newest_ns = time_ns
         self.joints[topics.JOINT_STATES].add(data)
 

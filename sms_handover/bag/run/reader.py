@@ -90,6 +90,7 @@ def _assemble(collector: RunCollector) -> RunData:
         grasp_events=tuple(collector.events),
         run_events=tuple(collector.run_events),
         plans=tuple(collector.plans),
+        planned_paths=tuple(collector.planned_paths),
         measured=_measured(collector, joint_names, ticks, periods),
     )
 

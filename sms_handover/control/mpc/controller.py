@@ -12,7 +12,7 @@ from time import perf_counter
 import numpy as np
 import pinocchio as pin
 
-from sms_handover.control.disturbance_observer import memory_of, restore_memory
+from sms_handover.control.compensation import continued, memory_of, restore_memory
 from sms_handover.control.law import LawSetup
 from sms_handover.control.mpc.braking import braking_plan
 from sms_handover.control.mpc.horizon import Horizon
@@ -28,7 +28,7 @@ from sms_handover.control.mpc.quadratic_program import require_daqp
 from sms_handover.control.protocol import Guidance
 from sms_handover.errors import ConfigurationError
 from sms_handover.model.known_payload import EMPTY_HANDS, Grip, KnownPayload
-from sms_handover.plan_report import PlanReport, PlanStatus
+from sms_handover.plan_report import PlannedPaths, PlanReport, PlanStatus
 from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, PreviewState, frozen, read_only
 from sms_handover.units import ns_to_seconds, seconds_to_ns
 
@@ -38,7 +38,7 @@ class MpcState:
     """Everything that later efforts depend on: plans, counts, the preview, and the initial attitude (3, 3).
 
     ``coming`` takes the place of ``plan`` when it begins; ``failures`` counts solves in a row without a plan;
-    ``news`` are grasps that count from the next state on, ``observed`` is the memory of the computed torque.
+    ``news`` are grasps that count from the next state on, ``observed`` is the memory of the compensation.
     """
 
     phase_index: int
@@ -68,6 +68,7 @@ class MpcController:
         self._solver = PlanSolver(setup.robot, setup.deputy, setup.gains, setup.distances)
         self._period_ns, self._queue = setup.reference_ns, PlanQueue()
         self._horizons: dict[MpcGains, Horizon] = {}
+        self._efforts = self._make_efforts(setup.robot)
         self._payload = KnownPayload(setup.robot, setup.deputy)
         self._rest = read_only(np.zeros(setup.robot.n_joints))  # N m
         period = ns_to_seconds(setup.reference_ns)
@@ -91,7 +92,9 @@ class MpcController:
         self._guidance: Guidance | None = None
         self._news: tuple[GraspEvent, ...] = ()
         self._hold(EMPTY_HANDS)
+        restore_memory(self._efforts, np.zeros(0))
         self._report: PlanReport | None = None
+        self._paths: PlannedPaths | None = None
 
     def guide(self, guidance: Guidance) -> None:
         """Plan for these targets at the next state."""
@@ -122,6 +125,11 @@ class MpcController:
         """Return the report of the solve since the last call, None if there was none."""
         report, self._report = self._report, None
         return report
+
+    def take_paths(self) -> PlannedPaths | None:
+        """Return the paths of the tools that are new since the last call, None if there are none."""
+        paths, self._paths = self._paths, None
+        return paths
 
     @property
     def plan(self) -> Plan | None:
@@ -169,7 +177,7 @@ class MpcController:
         """Go on with the dynamics of the robot with what an arm holds."""
         self._payload.hold(grip)
         self._robot = self._payload.robot
-        self._efforts = self._make_efforts(self._robot)
+        self._efforts = continued(self._make_efforts(self._robot), self._efforts)
         self._prediction = PredictionModel(self._robot)
 
     def _replan(self, stamp_ns: int, q: Array, v: Array, guidance: Guidance) -> None:
@@ -185,7 +193,7 @@ class MpcController:
         """Take guidance; the first plan of a run is to rest where the joints are."""
         if self._queue.plan is None:
             self._initial_rotation = np.array(pin.Quaternion(q[3:BASE_NQ]).normalized().matrix())
-        self._preview.update(guidance.phase, guidance.reference, guidance.tool_in_world, q)
+        self._preview.update(guidance.phase, guidance.reference, guidance.tool_in_world, q, v)
         if self._queue.plan is None:
             self._queue.offer(self._braking(self._here(q, v), 0, stamp_ns))
 
@@ -252,9 +260,11 @@ class MpcController:
         return PlanStart(joints, rates, replace(base, rotation=rotation, centre_of_mass=centre))
 
     def _reported(self, problem: PlanProblem, status: PlanStatus, step: Step, total: float) -> PlanReport:
-        """Return the report of a solve that took so many seconds in all."""
+        """Return the report of a solve that took so many seconds in all, and show its paths."""
         solution, plan = step.solution, self._queue.plan
         assert plan is not None
+        if step.paths:
+            self._paths = PlannedPaths(problem.stamp_ns, step.paths)
         return PlanReport(
             problem.stamp_ns,
             problem.number,

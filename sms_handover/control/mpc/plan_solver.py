@@ -37,4 +37,6 @@ class PlanSolver:
         if gains not in self._planners:
             robot, initial = self._payload.robot, problem.initial_rotation
             self._planners[gains] = Planner(robot, gains, self._distances, initial)
-        return self._planners[gains].step(problem.start, problem.accelerations, problem.targets)
+        planner = self._planners[gains]
+        step = planner.step(problem.start, problem.accelerations, problem.targets, shown=problem.is_shown)
+        return step

@@ -31,6 +31,7 @@ _CONTENTS = {
     topics.ENERGY: "kinetic energy, work of the joint efforts and from outside, and what became heat [J]",
     topics.IK_STATUS: "how the last inverse-kinematics solve ended: status, iterations, errors [m, rad]",
     topics.MPC_STATUS: "what came of a solve: status, rows that bind, slack, times [s]; only under law mpc",
+    topics.PLANNED_PATHS: "where the tools go by the plan in use, a line per arm; only under law mpc",
     topics.ROBOT_DESCRIPTION: "URDF of the robot",
     topics.TF: "every moving link in its parent [m], and in world base_link, deputy and targets",
     topics.TF_STATIC: "every link that does not move in its parent [m], and the grasp frames in deputy",
