@@ -999,6 +999,20 @@ BREAKS: tuple[Break, ...] = (
         "campaign_runs",
     ),
     _core(
+        "a campaign that stopped early taken for unfinished",
+        "campaign/statistics/stop_rule",
+        "if all(half <= rule.half_width for half in halves):",
+        "if False:",
+        "campaign_runs",
+    ),
+    _core(
+        "the scratch folder of a killed case left behind",
+        "campaign/cases/case_process",
+        "shutil.rmtree(self._scratch, ignore_errors=True)",
+        "pass",
+        "campaign_cases",
+    ),
+    _core(
         "what is not defined taken for false, and its contrary for true",
         "campaign/definition/success_expression",
         "return value == value and not value",
