@@ -56,6 +56,8 @@ if TYPE_CHECKING:
     from sms_handover.model.reduced import reduced_inverse_dynamics as reduced_inverse_dynamics
     from sms_handover.model.reduced import tool_jacobian as tool_jacobian
     from sms_handover.model.robot_model import RobotModel as RobotModel
+    from sms_handover.plan_report import PlanReport as PlanReport
+    from sms_handover.plan_report import PlanStatus as PlanStatus
     from sms_handover.report.recorded_run import RecordedRun as RecordedRun
     from sms_handover.report.recorded_run import compare_recorded as compare_recorded
     from sms_handover.report.recorded_run import read_recorded as read_recorded
@@ -75,8 +77,6 @@ if TYPE_CHECKING:
     from sms_handover.types import GraspEvent as GraspEvent
     from sms_handover.types import GraspStatus as GraspStatus
     from sms_handover.types import JointReference as JointReference
-    from sms_handover.types import PlanReport as PlanReport
-    from sms_handover.types import PlanStatus as PlanStatus
     from sms_handover.types import Pose as Pose
     from sms_handover.types import PreviewedTargets as PreviewedTargets
     from sms_handover.types import TaskPhase as TaskPhase
