@@ -230,6 +230,18 @@ def test_the_expected_motion_has_the_momentum_of_the_state(smooth: Scenario) -> 
     np.testing.assert_allclose(later.q, pin.integrate(robot.pin, q, H * v), atol=1e-12)
 
 
+def test_idle_arms_take_over_the_momentum_of_the_base(smooth: Scenario) -> None:
+    """A base that turns by its momentum is slowed down, as far as the changes of rates in one period go."""
+    robot, q, law = smooth.model.robot, start(smooth), law_of(smooth)
+    v = np.zeros(robot.pin.nv)
+    v[3:BASE_NV] = [0.002, -0.001, 0.0015]  # rad/s
+    motion = expected(robot, q, v, q[BASE_NQ:], v[BASE_NV:], H)
+    target = replace(targets_of(smooth, np.zeros(3)), tool_in_world={})
+    rates = law.program(Gains(base_turn_weight=1e8), motion, target).solve().rates
+    turns = motion.drift[3:] + motion.reaction[3:] @ rates
+    assert np.linalg.norm(turns) < 0.01 * np.linalg.norm(motion.drift[3:])
+
+
 def test_a_payload_counts_from_the_state_after_its_event(smooth: Scenario) -> None:
     """Efforts are those of the robot with the deputy in its hand, as is the reaction of the base."""
     law, q = law_of(smooth), start(smooth)
