@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sms_handover.graph.events import RunEvent
-from sms_handover.types import GraspEvent, PlanReport, TaskPhase
+from sms_handover.types import BaseWrench, GraspEvent, PlanReport, TaskPhase
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
@@ -31,7 +31,8 @@ class RunData:
     ``linear_impulse`` (M, 3) N s and ``angular_impulse`` (M, 3) N m s are what those have added to the
     momenta, 0 where there were none; ``ik_status`` (M,) the number of the IkStatus message, -1 where none was
     asked. Bags of older versions have no deputy twist (NaN), and their work is less what joint stops have
-    taken. ``plans`` has the reports of a predictive law, one per solve.
+    taken. ``plans`` has the reports of a predictive law, one per solve, and
+    ``base_wrenches`` what others have asked for and acted, each with the stamp of its tick.
     """
 
     joint_names: tuple[str, ...]
@@ -63,6 +64,7 @@ class RunData:
     grasp_events: tuple[GraspEvent, ...]
     run_events: tuple[RunEvent, ...] = ()
     plans: tuple[PlanReport, ...] = ()
+    base_wrenches: tuple[BaseWrench, ...] = ()
 
     def __post_init__(self) -> None:
         for item in fields(self):

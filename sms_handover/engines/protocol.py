@@ -21,6 +21,7 @@ class Effect(Enum):
     JOINT_STOPS = "joint stops"
     DEPUTY_MASS = "a deputy with mass"
     WRENCHES = "wrenches from outside"
+    DEPUTY_WRENCHES = "wrenches on the deputy"
     FRICTION = "joint friction"
 
 

@@ -31,6 +31,8 @@ class Rate(Enum):
     CHANGE = "on change, latched"
     WALL = "every second of wall time"
     SOLVE = "every solve of a predictive law"
+    OUTSIDE = "every tick in which one is asked for"
+    OUTSIDE_REFERENCE = "every reference period, once any has acted"
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,11 @@ class Topic:
     def is_global(self) -> bool:
         """Whether the topic is outside the namespace of the graph, where other graphs may publish too."""
         return self.name.startswith("/")
+
+    @property
+    def is_from_outside(self) -> bool:
+        """Whether no node of the graph publishes the topic; it counts by what its subscriber makes of it."""
+        return not self.publishers
 
     @property
     def is_shared(self) -> bool:
@@ -82,8 +89,10 @@ DEPUTY_ODOMETRY = "deputy/odometry"
 CLEARANCE = "clearance"  # only where it is measured online
 LINEAR_MOMENTUM = "momentum/linear"
 ANGULAR_MOMENTUM = "momentum/angular"
-LINEAR_IMPULSE = "impulse/linear"  # of wrenches from outside, only where there are any
+LINEAR_IMPULSE = "impulse/linear"  # of wrenches from outside
 ANGULAR_IMPULSE = "impulse/angular"
+BASE_WRENCH = "base_wrench"  # what anybody may ask for,
+APPLIED_BASE_WRENCH = "base_wrench/applied"  # and what acted, which is what a recording counts on
 ENERGY = "energy"
 IK_STATUS = "ik/status"
 MPC_STATUS = "mpc/status"  # only where the law solves a program as it goes on
@@ -115,17 +124,16 @@ _OURS = "sms_handover_interfaces/msg"
 RUN_STATE_TYPE = f"{_OURS}/RunState"
 
 
-def graph_topics(
-    arms: Iterable[str], *, clearance: bool = False, wrenches: bool = False
-) -> tuple[Topic, ...]:
-    """Return every topic of the graph for a robot with these arms.
+def graph_topics(arms: Iterable[str], *, clearance: bool = False) -> tuple[Topic, ...]:
+    """Return every topic of the graph for a robot with these arms; ``clearance`` if it is measured online.
 
-    ``clearance`` if it is measured online; ``wrenches`` if conditions have some from outside.
+    A topic without publishers is one that nodes outside the graph publish.
     """
     everyone_else = (TRAJECTORY, IK, CONTROLLER)
     pose, vector = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/Vector3Stamped"
     odometry = "nav_msgs/msg/Odometry"
     joints, text = "sensor_msgs/msg/JointState", "std_msgs/msg/String"
+    wrench = "geometry_msgs/msg/WrenchStamped"
     table = [
         Topic(JOINT_STATES, joints, (PLANT,), (CONTROLLER,), Rate.TICK),
         Topic(BASE_ODOMETRY, odometry, (PLANT,), (CONTROLLER,), Rate.TICK),
@@ -139,6 +147,10 @@ def graph_topics(
         Topic(GRASP_EVENT, f"{_OURS}/GraspEvent", (PLANT,), (TRAJECTORY, CONTROLLER), Rate.CHANGE),
         Topic(LINEAR_MOMENTUM, vector, (PLANT,), (), Rate.REFERENCE),
         Topic(ANGULAR_MOMENTUM, vector, (PLANT,), (), Rate.REFERENCE),
+        Topic(LINEAR_IMPULSE, vector, (PLANT,), (), Rate.OUTSIDE_REFERENCE),
+        Topic(ANGULAR_IMPULSE, vector, (PLANT,), (), Rate.OUTSIDE_REFERENCE),
+        Topic(BASE_WRENCH, wrench, (), (PLANT,), Rate.OUTSIDE),
+        Topic(APPLIED_BASE_WRENCH, wrench, (PLANT,), (), Rate.OUTSIDE),
         Topic(ENERGY, f"{_OURS}/EnergyStamped", (PLANT,), (), Rate.REFERENCE),
         Topic(IK_STATUS, f"{_OURS}/IkStatus", (TRAJECTORY,), (), Rate.REFERENCE),
         Topic(MPC_STATUS, f"{_OURS}/MpcStatus", (CONTROLLER,), (), Rate.SOLVE),
@@ -155,10 +167,6 @@ def graph_topics(
         Topic(CLOCK, "rosgraph_msgs/msg/Clock", (PLANT,), (), Rate.CLOCK),
         Topic(DIAGNOSTICS, "diagnostic_msgs/msg/DiagnosticArray", LOOP_NODES, (), Rate.WALL),
     ]
-    if wrenches:
-        table += [
-            Topic(name, vector, (PLANT,), (), Rate.REFERENCE) for name in (LINEAR_IMPULSE, ANGULAR_IMPULSE)
-        ]
     if clearance:
         table.append(Topic(CLEARANCE, f"{_OURS}/Clearance", (PLANT,), (TRAJECTORY,), Rate.REFERENCE))
     for arm in arms:

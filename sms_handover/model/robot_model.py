@@ -11,6 +11,7 @@ import pinocchio as pin
 from sms_handover.errors import RobotDescriptionError, UnknownNameError
 from sms_handover.frames import tool_frame
 from sms_handover.model.assembly import RobotDescription
+from sms_handover.model.carried import Carried
 from sms_handover.model.description import load_robot
 from sms_handover.model.poses import pose_of, se3_of, twist_of
 from sms_handover.model.urdf import to_urdf
@@ -48,6 +49,7 @@ class RobotModel:
         self.tool_frame_id: Mapping[str, int] = MappingProxyType(
             {arm: self.pin.getFrameId(tool_frame(arm)) for arm in self.arms}
         )
+        self.carried: Carried | None = None
         self._apply_rotor_inertia()
 
     @classmethod

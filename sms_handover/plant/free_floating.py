@@ -1,29 +1,31 @@
 """Free-floating plant: robot and deputy, advanced tick by tick under joint efforts."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
+from sms_handover.conditions.conditions import IDEAL
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
 from sms_handover.model.conserved import ConservedQuantities, together
 from sms_handover.model.robot_model import BASE_NQ, RobotModel
-from sms_handover.plant.deputy import DeputyMotion, MasslessDeputy
+from sms_handover.plant.base_wrenches import BaseWrenches
+from sms_handover.plant.deputy import MasslessDeputy
 from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics, pinocchio_dynamics
-from sms_handover.plant.effects import EffectsState, PlantEffects
+from sms_handover.plant.effects import PlantEffects
 from sms_handover.plant.enforced_limits import EnforcedLimits
-from sms_handover.plant.external_wrenches import Companion, ExternalAccount
+from sms_handover.plant.external_wrenches import ExternalAccount
 from sms_handover.plant.grasping import execute_grasp
 from sms_handover.plant.integrators import TABLEAUS
-from sms_handover.plant.joint_limits import ENFORCE, Excess, JointLimitWatch
+from sms_handover.plant.joint_limits import ENFORCE, JointLimitWatch
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.plant.payload import Payload
+from sms_handover.plant.plant_state import InitialState, PlantState
 from sms_handover.plant.rigid_deputy import RigidDeputy
 from sms_handover.types import (
     Array,
+    BaseWrench,
     DeputyState,
     GraspAction,
     GraspCommand,
@@ -32,45 +34,12 @@ from sms_handover.types import (
     Pose,
     RobotState,
     TickRows,
-    Twist,
     frozen,
     read_only,
 )
 from sms_handover.units import ns_to_seconds
 
 Counts = npt.NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class InitialState:
-    """Where a run starts: base pose in ``world`` and joint angles (n,) rad, at rest, and the deputy.
-
-    The deputy floats with a twist of its origin in ``world`` axes; its inertia is in its own axes, None if
-    it has no mass.
-    """
-
-    base_in_world: Pose
-    joint_position: Array
-    deputy_in_world: Pose
-    deputy_grasp_frames: Mapping[str, Pose]
-    deputy_twist_in_world: Twist | None = None
-    deputy_inertia: pin.Inertia | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class PlantState:
-    """Everything that the later motion of a plant, its counts and its events depend on."""
-
-    tick: int
-    q: Array
-    v: Array
-    joint_effort: Array
-    work: float
-    losses: float
-    saturated_ticks: tuple[int, ...]
-    excesses: tuple[Excess, ...]
-    deputy: DeputyMotion
-    effects: EffectsState | None
 
 
 class FreeFloatingPlant:
@@ -102,13 +71,21 @@ class FreeFloatingPlant:
         self._tick_s = ns_to_seconds(tick_ns)
         tableau = TABLEAUS[parameters.integrator]
         make = make_dynamics or pinocchio_dynamics(tableau, self._tick_s)
-        self._effects = effects
-        self._make = effects.dynamics(make, tableau) if effects else make
+        self.base_wrenches = BaseWrenches(tick_ns)
+        self._inner = self._make = make
+        self._tableau = tableau
         self._watch = JointLimitWatch(robot, tick_ns)
         self._enforces, self._rated_speed = parameters.joint_limits == ENFORCE, parameters.rated_speed
         self._check_start()
-        self._bare = self._dynamics_of(robot)
+        self._use(effects)
         self.reset()
+
+    def _use(self, effects: PlantEffects | None) -> None:
+        """Go on with effects, from the next integration on."""
+        self._effects = effects
+        if effects:
+            self._make = effects.dynamics(self._inner, self._tableau)
+        self._bare = self._dynamics_of(self._robot)
 
     def reset(self) -> None:
         """Go back to the initial state at time zero."""
@@ -154,7 +131,7 @@ class FreeFloatingPlant:
         )
 
     def restore(self, state: PlantState) -> None:
-        """Go back to a former state; raises ConfigurationError if it is that of another robot or deputy."""
+        """Go back to a former state; raises ConfigurationError on another robot, deputy or conditions."""
         shapes = [array.shape for array in (state.q, state.v, state.joint_effort)]
         if shapes != [self.q.shape, self.v.shape, self.joint_effort.shape]:
             raise ConfigurationError(
@@ -172,7 +149,9 @@ class FreeFloatingPlant:
         self._saturated_ticks = np.array(state.saturated_ticks, dtype=np.int64)
         self._watch.restore(state.excesses)
         self._deputy.restore(state.deputy)
-        if self._effects and state.effects:
+        if self._effects is None and state.effects:
+            self._use_ideal_effects()
+        if self._effects:
             self._effects.restore(state.effects)
         self._next_v, self._next_losses = None, 0.0
         if self._payload:
@@ -233,7 +212,7 @@ class FreeFloatingPlant:
     @property
     def external_impulse(self) -> ExternalAccount | None:
         """What wrenches from outside have given since the start, None where conditions have none."""
-        return self._effects.external if self._effects and self._effects.has_wrenches else None
+        return self._effects.given if self._effects else None
 
     @property
     def losses(self) -> float:
@@ -315,7 +294,7 @@ class FreeFloatingPlant:
         if self._next_v is not None:
             self._jump(self._next_v)
         if effects:
-            effects.begins(self.tick, self._stepper)
+            effects.begins(self.tick, self._stepper, self.base_wrenches.at(self.tick))
         before = self.q
         if self._enforced is None:
             q, v = self._stepper.step(before, self.v, effort)
@@ -323,13 +302,33 @@ class FreeFloatingPlant:
             q, v, effort, lost = self._enforced.step(before, self.v, effort)
             self._losses += lost
         if effects:
-            self._losses += effects.settle(self._companion)
+            self._losses += effects.settle(self._floating)
         for part in (effort * (q[BASE_NQ:] - before[BASE_NQ:])).tolist():
             self._work += part
         self.q, self.v, self.joint_effort = q, v, effort
         self.tick += 1
-        if not self._deputy.holder:
+        if not (self._deputy.holder or (effects and effects.has_moved_deputy)):
             self._deputy.drift(self._tick_s)
+
+    def push(self, wrench: BaseWrench) -> None:
+        """Let a wrench act on the base over the tick of its stamp, and no other tick.
+
+        Raises MessageError if that tick is over or has one already, or on an unknown frame.
+        """
+        self.base_wrenches.add(wrench, self.tick)
+        if self._effects is None:
+            self._use_ideal_effects()
+            if self._next_v is None:  # else as that velocity is taken on
+                self._load()
+
+    def _use_ideal_effects(self) -> None:
+        """Go on with effects of ideal conditions, which know of the wrenches that are asked for."""
+        self._use(PlantEffects(IDEAL, self._robot.n_joints, self._tick_ns, seed=0))  # nothing is drawn
+
+    @property
+    def pushed(self) -> BaseWrench | None:
+        """The wrench that was asked for and acted over the latest tick."""
+        return self._effects.asked if self._effects else None
 
     def adopt(
         self, steps: int, q: Array, v: Array, joint_effort: Array, work: float, saturated: Counts
@@ -366,13 +365,10 @@ class FreeFloatingPlant:
         return dynamics, EnforcedLimits(robot, dynamics.stepper, self._rated_speed, self._tick_s)
 
     @property
-    def _companion(self) -> Companion | None:
+    def _floating(self) -> RigidDeputy | None:
         """The deputy where it floats and has mass."""
         deputy = self._deputy
-        if not isinstance(deputy, RigidDeputy) or deputy.holder:
-            return None
-        conserved, mass = deputy.conserved, deputy.inertia.mass
-        return Companion(mass, conserved.centre_of_mass, conserved.linear_momentum / mass)
+        return deputy if isinstance(deputy, RigidDeputy) and not deputy.holder else None
 
     def _limited(self, asked: Array) -> Array:
         """Return the efforts that act, and count those at their limit or beyond."""

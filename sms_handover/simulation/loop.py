@@ -1,6 +1,6 @@
 """The loop as an object: plant, trajectory, inverse kinematics and controller of a scenario, tick by tick."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -36,6 +36,7 @@ from sms_handover.simulation.wiring import (
 )
 from sms_handover.types import (
     Array,
+    BaseWrench,
     DeputyState,
     GraspEvent,
     IkStatus,
@@ -154,11 +155,17 @@ class Loop:
     a retry or failure of the task; it is ``finished`` once the last state has been answered.
     """
 
-    def __init__(self, scenario: Scenario | None = None, controller: Controller | None = None) -> None:
+    def __init__(
+        self,
+        scenario: Scenario | None = None,
+        controller: Controller | None = None,
+        base_wrenches: Sequence[BaseWrench] = (),
+    ) -> None:
         """Make the loop of a scenario, by default the shipped one; ``controller`` replaces that of its law.
 
-        Raises ConfigurationError where the scenario cannot be run, and where its controller is external and
-        none is given.
+        ``base_wrenches`` act over the ticks of their stamps. Raises ConfigurationError where the scenario
+        cannot be run, and where its controller is external and none is given, and MessageError on wrenches of
+        one tick or an unknown frame.
         """
         self.scenario = scenario or load_scenario()
         parameters, truth = self.scenario.parameters, self.scenario.truth
@@ -167,6 +174,8 @@ class Loop:
         self._plant = make_plant(
             truth.robot, truth.schedule, self._common, parameters.plant, truth.conditions
         )
+        for wrench in base_wrenches:
+            self._plant.push(wrench)
         self._generator = make_generator(robot, schedule, self._common, parameters.trajectory)
         self._find_joints = make_ik(robot, self._common, parameters.ik)
         measured = self._common.measures_clearance
@@ -224,6 +233,11 @@ class Loop:
     def deputy(self) -> DeputyState:
         """The deputy at the same instant."""
         return self._plant.deputy
+
+    @property
+    def base_wrenches(self) -> tuple[BaseWrench, ...]:
+        """The wrenches that others have asked for and that have acted so far."""
+        return tuple(w for w in self._plant.base_wrenches if w.stamp_ns < self._plant.stamp_ns)
 
     @property
     def controller(self) -> Controller:

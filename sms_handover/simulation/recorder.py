@@ -12,7 +12,16 @@ from sms_handover.model.poses import pose_row, twist_in_deputy
 from sms_handover.run_data import RunData
 from sms_handover.simulation.loop import Period, Ticks
 from sms_handover.simulation.quiet_periods import QuietPeriods
-from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, PlanReport, TaskPhase, TickRows
+from sms_handover.types import (
+    BASE_NQ,
+    BASE_NV,
+    Array,
+    BaseWrench,
+    GraspEvent,
+    PlanReport,
+    TaskPhase,
+    TickRows,
+)
 
 _BY_PERIOD = (
     *("reference_position", "reference_velocity", "deputy_pose", "deputy_twist"),
@@ -124,8 +133,8 @@ class RunRecorder:
             self._tool_pose[arm].append(rows.tool_pose[arm])
         self._phases.extend(quiet.phases)
 
-    def data(self) -> RunData:
-        """Return the run so far."""
+    def data(self, base_wrenches: tuple[BaseWrench, ...] = ()) -> RunData:
+        """Return the run so far; ``base_wrenches`` are those that others asked for and that acted."""
         rows, (nq, nv, acted, _) = self._table[: self._count], self._ends
         return RunData(
             joint_names=self._joint_names,
@@ -143,5 +152,6 @@ class RunRecorder:
             grasp_events=tuple(self._events),
             run_events=tuple(self._decisions),
             plans=tuple(self._plans),
+            base_wrenches=base_wrenches,
             **{name: np.concatenate(rows) for name, rows in self._periods.items()},
         )

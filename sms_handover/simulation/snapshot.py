@@ -13,7 +13,7 @@ import numpy as np
 from sms_handover.clearance.monitor import MonitorState
 from sms_handover.control.protocol import Controller, Guidance, Resumable, inner_of
 from sms_handover.errors import ConfigurationError, ControllerError
-from sms_handover.plant.free_floating import PlantState
+from sms_handover.plant.plant_state import PlantState
 from sms_handover.trajectory.generator import GeneratorState
 from sms_handover.types import read_only
 

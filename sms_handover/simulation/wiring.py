@@ -27,10 +27,11 @@ from sms_handover.ik.parameters import IkParameters
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics, pinocchio_dynamics
 from sms_handover.plant.effects import PlantEffects
-from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
+from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.plant.integrators import TABLEAUS, Tableau
 from sms_handover.plant.joint_limits import ENFORCE
 from sms_handover.plant.parameters import PlantParameters
+from sms_handover.plant.plant_state import InitialState
 from sms_handover.simulation.near_pairs import NearPairs
 from sms_handover.simulation.parameters import COMPILED, CommonParameters
 from sms_handover.simulation.period_runner import PeriodRunner, PythonRunner

@@ -867,8 +867,8 @@ BREAKS: tuple[Break, ...] = (
     Break(
         "a torque from outside held in axes of the base",
         "sms_handover/plant/external_wrenches.py",
-        "self._generalized[3:BASE_NV] = to_base @ self._wrench.torque",
-        "self._generalized[3:BASE_NV] = self._wrench.torque",
+        "generalized[3:BASE_NV] = to_base @ acting.base.torque",
+        "generalized[3:BASE_NV] = acting.base.torque",
         "test/verification/test_second_engine.py",
     ),
     Break(
@@ -1079,8 +1079,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "heat of friction not booked",
         "plant/free_floating",
-        "self._losses += effects.settle(self._companion)",
-        "effects.settle(self._companion)",
+        "self._losses += effects.settle(self._floating)",
+        "effects.settle(self._floating)",
         "conditions",
     ),
     _core(
@@ -1100,8 +1100,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "wrenches from outside not applied",
         "plant/external_wrenches",
-        "to_base @ self._wrench.force",
-        "0.0 * to_base @ self._wrench.force",
+        "to_base @ acting.base.force",
+        "0.0 * to_base @ acting.base.force",
         "wrenches",
     ),
     _core(
@@ -1109,6 +1109,34 @@ BREAKS: tuple[Break, ...] = (
         "plant/external_wrenches",
         "lever = np.array([q[:3] - centre,",
         "lever = np.array([q[:3],",
+        "wrenches",
+    ),
+    _core(
+        "wrench on a deputy that floats not applied",
+        "plant/effects",
+        "pushed = sum_over(",
+        "sum_over(",
+        "wrenches",
+    ),
+    _core(
+        "wrench on a deputy in a hand not applied",
+        "plant/outside_wrenches",
+        "held = sum_over(",
+        "sum_over(",
+        "wrenches",
+    ),
+    _core(
+        "frame of a wrench from a topic ignored",
+        "plant/base_wrenches",
+        "base_in_world if wrench.frame == BASE else _UPRIGHT",
+        "_UPRIGHT",
+        "wrenches",
+    ),
+    _core(
+        "stamp of a wrench from a topic ignored",
+        "plant/base_wrenches",
+        "wanted = wrench.stamp_ns // self._tick_ns",
+        "wanted = tick",
         "wrenches",
     ),
     _core(

@@ -13,6 +13,7 @@ from sms_handover.graph.events import RunEvent
 from sms_handover.messages.layout import joint_state, odometry
 from sms_handover.messages.stamps import stamp_ns
 from sms_handover.messages.values import (
+    base_wrench,
     energy_values,
     grasp_event,
     plan_report,
@@ -23,7 +24,7 @@ from sms_handover.messages.values import (
     twist_values,
     vector_values,
 )
-from sms_handover.types import GraspEvent, PlanReport, TaskPhase
+from sms_handover.types import BaseWrench, GraspEvent, PlanReport, TaskPhase
 
 JOINT_TOPICS = (topics.JOINT_STATES, topics.JOINT_COMMAND, topics.JOINT_REFERENCE)
 POSITION, VELOCITY, EFFORT = range(3)  # blocks gathered from a JointState
@@ -61,6 +62,7 @@ class RunCollector:
         self.events: list[GraspEvent] = []
         self.run_events: list[RunEvent] = []
         self.plans: list[PlanReport] = []
+        self.base_wrenches: list[BaseWrench] = []
         self._first_ns: int | None = None
         self._newest_ns = 0
 
@@ -70,6 +72,7 @@ class RunCollector:
             topics.TASK_PHASE: lambda message: self.phases.append(task_phase(message)),
             topics.GRASP_EVENT: lambda message: self.events.append(grasp_event(message)),
             topics.RUN_EVENTS: lambda message: self.run_events.append(run_event(message)),
+            topics.APPLIED_BASE_WRENCH: lambda message: self.base_wrenches.append(base_wrench(message)),
             topics.MPC_STATUS: lambda message: self.plans.append(plan_report(message)),
             **{name: rows.add for name, rows in self.rows.items()},
         }
@@ -92,6 +95,7 @@ class RunCollector:
             self.events.clear()
             self.run_events.clear()
             self.plans.clear()
+            self.base_wrenches.clear()
         self._newest_ns = time_ns
         self.joints[topics.JOINT_STATES].add(data)
 
@@ -100,7 +104,7 @@ class RunCollector:
         return f"{self._prefix}/{name}"
 
     def _check_types(self) -> None:
-        for topic in topics.graph_topics(self.arms, clearance=True, wrenches=True):
+        for topic in topics.graph_topics(self.arms, clearance=True):
             recorded = self._info.topics.get(self.full_name(topic.name))
             if recorded is not None and (recorded.type, recorded.encoding) != (topic.type, "cdr"):
                 raise BagError(

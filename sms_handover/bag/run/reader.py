@@ -51,6 +51,13 @@ def _assemble(collector: RunCollector) -> RunData:
     def rows(topic: str) -> Array:
         return collector.rows[topic].series().settled().at(periods)
 
+    def impulse(topic: str) -> Array:
+        found = collector.rows[topic].series().settled()
+        first_ns = found.stamp_ns[0] if len(found.stamp_ns) else np.inf
+        values = found.at(periods)
+        values[periods < first_ns] = 0.0  # nothing had acted
+        return values
+
     position = joint(topics.JOINT_STATES, POSITION)
     pose = collector.odometry.series(BASE_POSE, 7).settled()
     twist = collector.odometry.series(BASE_TWIST, 6).settled()
@@ -59,7 +66,6 @@ def _assemble(collector: RunCollector) -> RunData:
     periods = reference.stamp_ns
     arms = _by_first_joint(collector.arms, joint_names)
     energy = rows(topics.ENERGY)
-    has_wrenches = bool(len(collector.rows[topics.LINEAR_IMPULSE].series().stamp_ns))
     return RunData(
         joint_names=joint_names,
         arms=tuple(arms),
@@ -83,13 +89,14 @@ def _assemble(collector: RunCollector) -> RunData:
         work=energy[:, 1].copy(),
         external_work=energy[:, 2].copy(),
         lost=energy[:, 3].copy(),
-        linear_impulse=rows(topics.LINEAR_IMPULSE) if has_wrenches else np.zeros((len(periods), 3)),
-        angular_impulse=rows(topics.ANGULAR_IMPULSE) if has_wrenches else np.zeros((len(periods), 3)),
+        linear_impulse=impulse(topics.LINEAR_IMPULSE),
+        angular_impulse=impulse(topics.ANGULAR_IMPULSE),
         ik_status=np.nan_to_num(rows(topics.IK_STATUS)[:, 0], nan=_NO_IK).astype(np.int64),
         phases=_last_run(collector.phases),
         grasp_events=tuple(collector.events),
         run_events=tuple(collector.run_events),
         plans=tuple(collector.plans),
+        base_wrenches=tuple(collector.base_wrenches),
     )
 
 

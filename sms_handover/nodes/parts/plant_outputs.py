@@ -9,6 +9,7 @@ from sms_handover.frames import BASE, DEPUTY, WORLD
 from sms_handover.graph.topics import (
     ANGULAR_IMPULSE,
     ANGULAR_MOMENTUM,
+    APPLIED_BASE_WRENCH,
     BASE_ODOMETRY,
     CLOCK,
     CLOCK_PERIOD_NS,
@@ -26,6 +27,7 @@ from sms_handover.messages.layout import head
 from sms_handover.model.poses import pose_row, twist_in_deputy
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant
+from sms_handover.ros.codecs.base_wrench import wrench_message
 from sms_handover.ros.codecs.loop_messages import (
     OdometryCodec,
     PoseCodec,
@@ -37,7 +39,7 @@ from sms_handover.ros.node.endpoints import CountedPublisher
 
 _LOOP = (JOINT_STATES, BASE_ODOMETRY, SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
 _PERIOD = (DEPUTY_ODOMETRY, LINEAR_MOMENTUM, ANGULAR_MOMENTUM, ENERGY)
-_IMPULSE = (LINEAR_IMPULSE, ANGULAR_IMPULSE)
+_OUTSIDE = (LINEAR_IMPULSE, ANGULAR_IMPULSE, APPLIED_BASE_WRENCH)
 
 
 class PlantOutputs:
@@ -49,14 +51,13 @@ class PlantOutputs:
         publisher: Callable[[str], CountedPublisher],
         *,
         lockstep: bool,
-        wrenches: bool = False,
     ) -> None:
-        """Make the publishers; ``publisher`` returns the one of a topic, ``wrenches`` act from outside."""
+        """Make the publishers; ``publisher`` returns the one of a topic."""
         self._lockstep = lockstep
         names = (
             *_LOOP,
             *_PERIOD,
-            *(_IMPULSE if wrenches else ()),
+            *_OUTSIDE,
             CLOCK,
             *(tool_pose(arm) for arm in robot.arms),
         )
@@ -91,6 +92,8 @@ class PlantOutputs:
     def publish_rest(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
         """Publish what nobody in the loop waits for: tools, momenta, energy, the clock."""
         now_ns, publish = plant.stamp_ns, self._publish
+        if plant.pushed:
+            publish[APPLIED_BASE_WRENCH](wrench_message(plant.pushed))
         if with_reference:
             conserved = plant.conserved
             for arm, pose in plant.tools_in_world.items():

@@ -122,8 +122,7 @@ class GraphNode(LifecycleNode, Generic[P]):
         self.robot: RobotModel = world.robot
         self.schedule: Schedule = world.schedule
         self.conditions: Conditions = world.conditions
-        clearance, wrenches = self.common.measures_clearance, bool(world.conditions.wrenches)
-        topics = graph_topics(self.robot.arms, clearance=clearance, wrenches=wrenches)
+        topics = graph_topics(self.robot.arms, clearance=self.common.measures_clearance)
         self.endpoints = Endpoints(self, topics, self.common.peers, self.common.external)
         self.message_filter = MessageFilter(self.get_logger().warning, self._on_first_rejected)
         self.inputs.connect(self.endpoints, self.message_filter)
