@@ -30,6 +30,12 @@ class FrictionValues:
                 f"must be >= the Coulomb friction of {self.coulomb[joint]:g} N m"
             )
 
+    def with_free(self, count: int) -> "FrictionValues":
+        """Return those of these joints and so many more without friction behind them."""
+        none = np.zeros(count)
+        parts = ([part, none] for part in (self.viscous, self.coulomb, self.stiction))
+        return FrictionValues(*map(np.concatenate, parts), np.concatenate([self.stribeck_speed, none + 1.0]))
+
     @property
     def any(self) -> bool:
         """Whether a joint has friction."""

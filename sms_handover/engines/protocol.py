@@ -23,6 +23,7 @@ class Effect(Enum):
     WRENCHES = "wrenches from outside"
     DEPUTY_WRENCHES = "wrenches on the deputy"
     FRICTION = "joint friction"
+    PANELS = "flexible panels"
 
 
 @dataclass(frozen=True, eq=False)

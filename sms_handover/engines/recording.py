@@ -103,6 +103,8 @@ def _effects(run: RunData, scenario: Scenario) -> list[Effect]:
         found.append(Effect.JOINT_STOPS)
     if scenario.truth.schedule.deputy.mass:
         found.append(Effect.DEPUTY_MASS)
+    if scenario.truth.robot.description.flexible_panels:
+        found.append(Effect.PANELS)
     conditions = scenario.truth.conditions
     if conditions.wrenches or run.base_wrenches:
         found.append(Effect.WRENCHES)

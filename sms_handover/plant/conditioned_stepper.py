@@ -45,7 +45,9 @@ class ConditionedStepper:
     ) -> None:
         self._robot, self._resistance, self._inner, self._h = robot, resistance, inner, h
         self._outside = OutsideWrenches(robot, resistance.wrenches, resistance.deputy_wrenches, h)
-        self._under_wrench = WrenchStepper(robot.pin, robot.data, tableau, h, self._outside.held)
+        self._under_wrench = WrenchStepper(
+            robot.pin, robot.data, tableau, h, self._outside.held, robot.springs
+        )
         self._generalized = np.zeros(robot.pin.nv)
         self.start_s = 0.0
         self.asked: BaseWrench | None = None
@@ -58,9 +60,11 @@ class ConditionedStepper:
         robot, under_wrench = self._robot, self._under_wrench
         generalized, friction = self._generalized, self._resistance.friction
         generalized[BASE_NV:] = effort
+        if robot.springs:
+            generalized[-len(robot.springs) :] = robot.springs.torque(q, v)
         acting = self.acting = self._outside.over(self.start_s, q, v, self.asked)
         if acting:
-            generalized = under_wrench.forces(q, effort, acting)
+            generalized = under_wrench.forces(q, v, effort, acting)
         total, self._friction = effort, None
         if friction:
             self._friction = friction.torque(robot, q, v, generalized)

@@ -1,6 +1,6 @@
 """Effects of conditions that are not ideal on the plant: one object that it asks in every tick."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -109,7 +109,11 @@ class PlantEffects:
 
         def make(robot: RobotModel) -> PlantDynamics:
             bare = inner(robot)
-            stepper = ConditionedStepper(robot, self._resistance, bare.stepper, tableau, self._h)
+            resistance, values = self._resistance, self._conditions.friction
+            if robot.springs and values:
+                friction = JointFriction(values.with_free(len(robot.springs)), self._h)
+                resistance = replace(resistance, friction=friction)
+            stepper = ConditionedStepper(robot, resistance, bare.stepper, tableau, self._h)
             return PlantDynamics(stepper, bare.kinematics)
 
         return make

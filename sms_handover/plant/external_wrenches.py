@@ -8,6 +8,7 @@ import pinocchio as pin
 
 from sms_handover.conditions.wrench import BodyAtInstant, Wrench, WrenchModel, cross
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV
+from sms_handover.model.springs import Springs
 from sms_handover.plant.held_body import HeldBody, LeverArm
 from sms_handover.plant.integrators import LieGroupIntegrator, Tableau
 from sms_handover.types import Array, freeze
@@ -98,9 +99,16 @@ class WrenchStepper:
     """
 
     def __init__(
-        self, model: pin.Model, data: pin.Data, tableau: Tableau, h: float, held: HeldBody | None = None
+        self,
+        model: pin.Model,
+        data: pin.Data,
+        tableau: Tableau,
+        h: float,
+        held: HeldBody | None = None,
+        springs: Springs | None = None,
     ) -> None:
-        self._model, self._data, self._h, self._held = model, data, h, held
+        self._model, self._data, self._h = model, data, h
+        self._held, self._springs = held, springs
         self._integrator = LieGroupIntegrator(model, tableau, h)
         self._generalized = np.zeros(model.nv)
         self._effort = np.zeros(model.nv - BASE_NV)
@@ -138,10 +146,12 @@ class WrenchStepper:
                 work = work + (float(wrench.force @ (arm_1.origin - arm_0.origin)) + turned)
         return ExternalAccount(linear, angular, work)
 
-    def forces(self, q: Array, effort: Array, acting: Acting) -> Array:
-        """Return the generalized forces (6 + n,) of joint efforts and wrenches at a configuration."""
+    def forces(self, q: Array, v: Array, effort: Array, acting: Acting) -> Array:
+        """Return the generalized forces (6 + n,) of joint efforts, springs and wrenches at a state."""
         generalized = self._generalized
         generalized[:BASE_NV], generalized[BASE_NV:] = 0.0, effort
+        if self._springs:
+            generalized[-len(self._springs) :] = self._springs.torque(q, v)
         if acting.base:
             to_base = pin.Quaternion(q[3:BASE_NQ]).toRotationMatrix().T
             generalized[:3] = to_base @ acting.base.force
@@ -153,7 +163,7 @@ class WrenchStepper:
     def _acceleration(self, q: Array, v: Array) -> Array:
         """Return v' (6 + n,)."""
         assert self._acting is not None
-        forces = self.forces(q, self._effort, self._acting)
+        forces = self.forces(q, v, self._effort, self._acting)
         result: Array = pin.aba(self._model, self._data, q, v, forces, pin.Convention.WORLD)
         return result
 

@@ -22,6 +22,7 @@ from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import CONTROLLER
 from sms_handover.model.conserved import ConservedQuantities
+from sms_handover.plant.arm_part import PanelState
 from sms_handover.plant.external_wrenches import ExternalAccount
 from sms_handover.simulation.quiet_periods import QuietPeriods, QuietRunner
 from sms_handover.simulation.scenario import Scenario, load_scenario
@@ -53,9 +54,9 @@ from sms_handover.types import (
 class Period:
     """What is worked out once per reference period, at the instant at which it begins.
 
-    Tool poses and targets are in ``world``; since the start the joint efforts have done ``work`` J, wrenches
-    from outside ``external_work`` J, and ``lost`` J have become heat;
-    ``external_impulse`` is None where no such wrenches act; ``ik_status`` is None where no tool had
+    Tool poses and targets are in ``world``; since the start the joint efforts have done ``work`` J,
+    wrenches from outside ``external_work`` J, and ``lost`` J have become heat; ``external_impulse`` is None
+    where no such wrenches act, ``panels`` where none is on a hinge; ``ik_status`` is None where no tool had
     a target. ``events`` has what came of grasp commands, ``decisions`` what was decided about the task.
     ``clearance`` is None unless it is measured online.
     """
@@ -70,6 +71,7 @@ class Period:
     external_work: float
     lost: float
     external_impulse: ExternalAccount | None
+    panels: PanelState | None
     ik_status: IkStatus | None
     events: tuple[GraspEvent, ...]
     decisions: tuple[RunEvent, ...]
@@ -369,6 +371,7 @@ class Loop:
             plant.external_work,
             plant.losses,
             plant.external_impulse,
+            plant.panels,
             status,
             events,
             decisions,

@@ -27,7 +27,8 @@ def simulate(
     """
     loop = Loop(scenario, controller, base_wrenches)
     robot = loop.scenario.model.robot
-    recorder = RunRecorder(robot.joint_names, robot.arms, loop.last_tick + 1)
+    panels = tuple(panel.joint for panel in loop.scenario.truth.robot.description.flexible_panels)
+    recorder = RunRecorder(robot.joint_names, robot.arms, loop.last_tick + 1, panels)
     while not loop.finished:
         ticks = loop.advance_quietly(recorder.room)
         recorder.add(ticks)

@@ -84,7 +84,14 @@ def make_dynamics(dynamics: str, tableau: Tableau, h: float) -> MakeDynamics:
     """Return what makes the dynamics of the plant, by Pinocchio or compiled."""
     if dynamics != COMPILED:
         return pinocchio_dynamics(tableau, h)
-    return lambda robot: PlantDynamics(CompiledStepper(robot, tableau, h), CompiledKinematics(robot))
+    by_pinocchio = pinocchio_dynamics(tableau, h)
+
+    def make(robot: RobotModel) -> PlantDynamics:
+        if robot.springs:  # C knows of no springs
+            return by_pinocchio(robot)
+        return PlantDynamics(CompiledStepper(robot, tableau, h), CompiledKinematics(robot))
+
+    return make
 
 
 def make_generator(
@@ -193,7 +200,8 @@ def make_runner(
     if not has_all or not CompiledTicks.fits(plant, controller, known):
         _LOG.warning(
             "ticks are carried out by Python: C has only laws nmpc and pid without an observer, joints that "
-            "are alike in truth and model, limits that are not enforced, and ideal conditions"
+            "are alike in truth and model, limits that are not enforced, panels that are locked, and ideal "
+            "conditions"
         )
         return PythonRunner(plant, controller)
     return CompiledTicks(plant, controller, known, parameters.integrator, common.tick_ns)

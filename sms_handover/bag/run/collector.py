@@ -38,7 +38,7 @@ class RunCollector:
 
     def __init__(self, info: BagInfo, prefix: str) -> None:
         """Prepare for each topic of a run; ``prefix`` is the namespace, '' for the root."""
-        self._info = info
+        self.info = info
         self._prefix = prefix
         self.arms = tuple(self._found_arms())
         self._check_types()
@@ -80,10 +80,10 @@ class RunCollector:
             **{name: collector.add for name, collector in self.joints.items()},
             topics.JOINT_STATES: self._take_state,
             topics.BASE_ODOMETRY: self.odometry.add,
-            **{name: decoder(self._info, self.full_name(name), take) for name, take in decoders.items()},
+            **{name: decoder(self.info, self.full_name(name), take) for name, take in decoders.items()},
         }
         by_name = {self.full_name(name): taker for name, taker in takers.items()}
-        for message in read_messages(self._info.path, by_name):
+        for message in read_messages(self.info.path, by_name):
             by_name[message.topic](message.data)
 
     def _take_state(self, data: bytes) -> None:
@@ -105,16 +105,16 @@ class RunCollector:
 
     def _check_types(self) -> None:
         for topic in topics.graph_topics(self.arms, clearance=True):
-            recorded = self._info.topics.get(self.full_name(topic.name))
+            recorded = self.info.topics.get(self.full_name(topic.name))
             if recorded is not None and (recorded.type, recorded.encoding) != (topic.type, "cdr"):
                 raise BagError(
-                    f"{self._info.path} holds no run of sms_handover: {recorded.name} has the type"
+                    f"{self.info.path} holds no run of sms_handover: {recorded.name} has the type"
                     f" {recorded.type} ({recorded.encoding}), expected is {topic.type} (cdr)"
                 )
 
     def _found_arms(self) -> Iterator[str]:
         head, tail = f"{self._prefix}/", topics.tool_pose("")
-        for name in self._info.topics:
+        for name in self.info.topics:
             arm = name.removeprefix(head).removesuffix(tail)
             if f"{head}{arm}{tail}" == name and "/" not in arm:  # else it is of another namespace
                 yield arm

@@ -62,7 +62,8 @@ class PlantOutputs:
             *(tool_pose(arm) for arm in robot.arms),
         )
         self._publish: dict[str, Callable[[Any], None]] = {name: publisher(name).publish for name in names}
-        self._state_codec = StateCodec(robot.joint_names, WORLD, BASE)
+        hinges = tuple(panel.joint for panel in robot.description.flexible_panels)
+        self._state_codec = StateCodec((*robot.joint_names, *hinges), WORLD, BASE)
         self._pose_codec, self._vector_codec = PoseCodec(WORLD), vector_codec(WORLD)
         self._energy_codec = energy_codec(WORLD)
         self._deputy_codec = OdometryCodec(WORLD, DEPUTY)
@@ -74,7 +75,11 @@ class PlantOutputs:
         done with it. In real time the controller is the one who must not wait.
         """
         publish = self._publish
-        joints, odometry = self._state_codec.pack_arrays(plant.stamp_ns, plant.q, plant.v, plant.joint_effort)
+        state, panels = (plant.q, plant.v, plant.joint_effort), plant.panels
+        if panels:
+            beside = (panels.angle, panels.rate, panels.torque)
+            state = tuple(np.concatenate(pair) for pair in zip(state, beside, strict=True))
+        joints, odometry = self._state_codec.pack_arrays(plant.stamp_ns, *state)
         if with_reference and self._lockstep:
             self._publish_sample(plant, joints, odometry)
         publish[JOINT_STATES](joints)
