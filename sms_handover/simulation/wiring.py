@@ -24,6 +24,7 @@ from sms_handover.control.stability import check_stability
 from sms_handover.errors import ConfigurationError, ScheduleError
 from sms_handover.ik.levenberg_marquardt import FindJoints, find_joints
 from sms_handover.ik.parameters import IkParameters
+from sms_handover.model.poses import se3_of
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics, pinocchio_dynamics
 from sms_handover.plant.effects import PlantEffects
@@ -213,10 +214,19 @@ def longest_reference_ns(common: CommonParameters, parameters: ControllerParamet
 
 
 def _check_deputy_twist(schedule: Schedule, h: float) -> None:
-    """Raise ScheduleError where a deputy turns too far in one tick of ``h`` s for its integration."""
-    rate = float(np.linalg.norm(schedule.deputy.twist_in_world.angular))
+    """Raise ScheduleError where a deputy may turn too far in one tick of ``h`` s for its integration.
+
+    A body that tumbles freely turns at most with |L| / I_min, with I_min its least moment of inertia.
+    """
+    deputy = schedule.deputy
+    rate = float(np.linalg.norm(deputy.twist_in_world.angular))
+    if deputy.inertia is not None:
+        moments = np.array(deputy.inertia.inertia)
+        turn = se3_of(deputy.deputy_in_world).rotation.T @ deputy.twist_in_world.angular
+        rate = max(rate, float(np.linalg.norm(moments @ turn) / np.linalg.eigvalsh(moments)[0]))
     if rate * h > _MOST_TURN:
         raise ScheduleError(
-            f"deputy.twist_in_world turns it at {rate:g} rad/s, must be at most {_MOST_TURN / h:g} rad/s, "
-            f"{_MOST_TURN:g} rad in a tick of {h:g} s; use a shorter tick or a slower deputy"
+            f"deputy.twist_in_world lets it turn at up to {rate:g} rad/s, must be at most "
+            f"{_MOST_TURN / h:g} rad/s, {_MOST_TURN:g} rad in a tick of {h:g} s; use a shorter tick or a slower "
+            "deputy"
         )
