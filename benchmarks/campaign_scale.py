@@ -10,7 +10,7 @@ import sys
 import tempfile
 import time
 from argparse import ArgumentParser
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -55,10 +55,10 @@ class Driver(NamedTuple):
 class Stubs:
     """Workers that have every row at once."""
 
-    def run(self, tasks: Iterable[Task]) -> Iterator[Done]:
+    def run(self, tasks: Iterable[Task]) -> Iterator[Sequence[Done]]:
         """Yield made-up rows."""
         for task in tasks:
-            yield Done(row_of(json.loads(row_text(*task))), Beside(0.0, 0.0, "stub"))
+            yield (Done(row_of(json.loads(row_text(*task))), Beside(0.0, 0.0, "stub")),)
 
     def close(self) -> None:
         """There is nothing to end."""

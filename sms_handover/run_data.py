@@ -8,10 +8,29 @@ import numpy as np
 import numpy.typing as npt
 
 from sms_handover.graph.events import RunEvent
-from sms_handover.types import BaseWrench, GraspEvent, PlanReport, TaskPhase
+from sms_handover.plan_report import PlannedPaths, PlanReport
+from sms_handover.types import BaseWrench, GraspEvent, TaskPhase
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredRows:
+    """What sensors have told of a run, and the truth of what none measures; shapes and frames as in RunData.
+
+    There are rows per tick but for ``deputy_pose``, which has one per reference period.
+    """
+
+    joint_position: Array
+    joint_velocity: Array
+    base_pose: Array
+    base_twist: Array
+    deputy_pose: Array
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            getattr(self, item.name).setflags(write=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +52,9 @@ class RunData:
     ``panel_names``. ``linear_impulse`` (M, 3) N s and ``angular_impulse`` (M, 3) N m s are what those have
     added to the momenta, 0 where there were none; ``ik_status`` (M,) the number of the IkStatus message, -1
     where none was asked. Bags of older versions have no deputy twist (NaN), and their work is less what
-    joint stops have taken. ``plans`` has the reports of a predictive law, one per solve, and
-    ``base_wrenches`` what others have asked for and acted, each with the stamp of its tick.
+    joint stops have taken. ``plans`` has the reports of a predictive law, one per solve, ``base_wrenches``
+    what others have asked for and acted, each with the stamp of its tick; ``measured`` is None where no
+    sensor was simulated.
     """
 
     joint_names: tuple[str, ...]
@@ -71,6 +91,8 @@ class RunData:
     plans: tuple[PlanReport, ...] = ()
     base_wrenches: tuple[BaseWrench, ...] = ()
     panel_names: tuple[str, ...] = ()
+    planned_paths: tuple[PlannedPaths, ...] = ()
+    measured: MeasuredRows | None = None
 
     def __post_init__(self) -> None:
         for item in fields(self):

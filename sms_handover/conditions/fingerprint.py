@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,9 @@ from sms_handover.conditions.conditions import Conditions
 
 
 def fingerprint(conditions: Conditions) -> str:
-    """Return SHA-256 of every value of some conditions, as hexadecimal digits."""
+    """Return SHA-256 of every value of what acts in the plant, as hexadecimal digits; no sensor does."""
     digest = hashlib.sha256()
-    _add(digest, conditions)
+    _add(digest, replace(conditions, sensors={}))
     return digest.hexdigest()
 
 

@@ -33,8 +33,12 @@ class FrictionValues:
     def with_free(self, count: int) -> "FrictionValues":
         """Return those of these joints and so many more without friction behind them."""
         none = np.zeros(count)
-        parts = ([part, none] for part in (self.viscous, self.coulomb, self.stiction))
-        return FrictionValues(*map(np.concatenate, parts), np.concatenate([self.stribeck_speed, none + 1.0]))
+        viscous, coulomb, stiction, speed = (
+            np.concatenate([part, none])
+            for part in (self.viscous, self.coulomb, self.stiction, self.stribeck_speed)
+        )
+        speed[speed.size - count :] = 1.0  # [rad/s], of no effect
+        return FrictionValues(viscous, coulomb, stiction, speed)
 
     @property
     def any(self) -> bool:

@@ -109,15 +109,29 @@ def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outc
         processes = stack.enter_context(
             NodeProcesses(plan.log_folder, graph_environment(plan), plan.inherited, plan.server)
         )
-        for name, arguments in arguments_of(plan).items():
+        driver = LifecycleDriver(node, plan.own_nodes)
+        _wait_for_server(plan.server, interrupts)
+        started = arguments_of(plan)
+        for name in sorted(started, key=lambda name: name != RECORDER):  # which takes longest to configure
+            arguments = started[name]
             if name not in plan.external:
                 processes.start(name, arguments.line)
             elif plan.controller:
                 named = ("--remap", f"__node:={name}")
                 processes.start(name, (*arguments.line, *named), plan.controller)
-        driver = LifecycleDriver(node, plan.own_nodes)
         display = stack.enter_context(Display(end_ns))
         return _Run(plan, monitor, driver, executor, processes, display, interrupts, memory).to_the_end()
+
+
+def _wait_for_server(server: NodeServer | None, interrupts: Interrupts) -> None:
+    """Wait until nodes can be started; raises GraphError after a while, KeyboardInterrupt on a signal."""
+    time = ActiveTime()
+    while server is not None and not server.is_ready(_START_POLL_S):
+        time.update()
+        if interrupts.asked:
+            raise KeyboardInterrupt
+        if time.seconds > _START_TIMEOUT_S:
+            raise GraphError(f"the node server has not imported its modules within {_START_TIMEOUT_S:g} s")
 
 
 @contextmanager

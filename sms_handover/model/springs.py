@@ -28,7 +28,8 @@ class Springs:
 
     def energy(self, angle: Array) -> Array:
         """Return sum k q^2 / 2 in J at angles (..., p) rad."""
-        return 0.5 * np.add.reduce(self.stiffness * angle * angle, axis=-1)
+        result: Array = 0.5 * np.add.reduce(self.stiffness * angle * angle, axis=-1)
+        return result
 
     def taken(self, start: tuple[Array, Array], end: tuple[Array, Array], h: float) -> float:
         """Return what the dampers take in J over a step of ``h`` s, from q and v at its ends.

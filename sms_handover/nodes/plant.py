@@ -163,7 +163,8 @@ class PlantNode(GraphNode[PlantParameters]):
     def _make_endpoints(self) -> None:
         names = [GRASP_EVENT, RUN_STATE, LOOP_TIMING]
         self._publish = {name: self.endpoints.publisher(name) for name in names}
-        self._outputs = PlantOutputs(self.robot, self.endpoints.publisher, lockstep=self.lockstep)
+        publisher = self.endpoints.publisher
+        self._outputs = PlantOutputs(self.robot, publisher, self.common, self.conditions)
         BaseWrenchInput(self._plant, self.inputs, lambda: self._last_tick * self._tick_ns)
         for topic, codec in ((TASK_PHASE, self._phase_codec), (JOINT_COMMAND, self._command_codec)):
             self.inputs.subscribe(topic, partial(self._on_input, topic), codec.checked)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import pinocchio as pin
 
+from sms_handover.conditions.sensors.suite import SensorsState
 from sms_handover.plant.deputy import DeputyMotion
 from sms_handover.plant.effects import EffectsState
 from sms_handover.plant.joint_limits import Excess
@@ -41,3 +42,4 @@ class PlantState:
     excesses: tuple[Excess, ...]
     deputy: DeputyMotion
     effects: EffectsState | None
+    sensors: SensorsState | None = None

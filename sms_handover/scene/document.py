@@ -11,6 +11,7 @@ from sms_handover.frames import DEPUTY
 from sms_handover.model.poses import pose_row
 from sms_handover.run_data import Stamps
 from sms_handover.scene.momentum import Momentum
+from sms_handover.scene.planned_lines import PlannedLines
 from sms_handover.scene.scene import Scene
 from sms_handover.scene.shapes import Shape
 from sms_handover.types import Array, GraspAction, GraspEvent, TaskPhase
@@ -29,6 +30,7 @@ def scene_document(name: str, scene: Scene) -> Document:
         **task_document(scene.phases, scene.grasp_events),
         **({"clearance": _clearance(scene.worst_pair)} if scene.worst_pair else {}),
         **({"momentum": _momentum(scene.momentum)} if scene.momentum else {}),
+        **({"planned": _planned(scene.planned)} if scene.planned else {}),
     }
 
 
@@ -74,6 +76,15 @@ def _momentum(momentum: Momentum) -> Document:
     return {
         "centres": _base64(momentum.centre_of_mass, "<f4"),
         "angular": _base64(momentum.angular_momentum, "<f4"),
+    }
+
+
+def _planned(planned: PlannedLines) -> Document:
+    """Return the instants (P,) s of plans, and their lines (P, A, K, 3) m with K points each."""
+    return {
+        "times": _base64(planned.stamp_ns / NS_PER_S, "<f8"),
+        "points": _base64(planned.points, "<f4"),
+        "size": planned.points.shape[2],
     }
 
 

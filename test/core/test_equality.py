@@ -9,8 +9,9 @@ import pytest
 
 from sms_handover.analysis.equality import Difference, compare_runs
 from sms_handover.graph.events import RunEvent, Severity
+from sms_handover.plan_report import PlannedPaths, PlanReport, PlanStatus
 from sms_handover.run_data import RunData
-from sms_handover.types import GraspStatus, PlanReport, PlanStatus
+from sms_handover.types import GraspStatus
 
 from .bag_messages import made_up_run
 
@@ -21,16 +22,8 @@ PANELS: dict[str, Any] = {  # of a run whose panels swing
 }
 ARRAYS = [item.name for item in fields(RunData) if isinstance(getattr(made_up_run(3), item.name), np.ndarray)]
 PER_ARM = ("target_pose", "tool_pose")
-TEXTS = (
-    "joint_names",
-    "arms",
-    "phases",
-    "grasp_events",
-    "run_events",
-    "plans",
-    "base_wrenches",
-    "panel_names",
-)
+EVENTS = ("grasp_events", "run_events", "plans", "base_wrenches")
+TEXTS = ("joint_names", "arms", "phases", "panel_names", "planned_paths", *EVENTS)
 
 
 @pytest.fixture
@@ -78,6 +71,12 @@ def test_a_plan_is_the_same_however_long_it_took(run: RunData) -> None:
     assert compare_runs(mine, replace(run, plans=(slow,))) == ()
     (difference,) = compare_runs(mine, replace(run, plans=(other,)))
     assert difference.field == "plans"
+
+
+def test_one_bit_in_a_planned_path_is_a_difference(run: RunData) -> None:
+    one, other = (PlannedPaths(0, {"arm_a": np.full((2, 3), x)}) for x in (0.1, np.nextafter(0.1, 1.0)))
+    (difference,) = compare_runs(replace(run, planned_paths=(one,)), replace(run, planned_paths=(other,)))
+    assert difference.field == "planned_paths"
 
 
 @pytest.mark.parametrize("name", PER_ARM)

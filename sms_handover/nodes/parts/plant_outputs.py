@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from sms_handover.conditions.conditions import Conditions
 from sms_handover.frames import BASE, DEPUTY, WORLD
 from sms_handover.graph.topics import (
     ANGULAR_IMPULSE,
@@ -26,7 +27,9 @@ from sms_handover.graph.topics import (
 from sms_handover.messages.layout import head
 from sms_handover.model.poses import pose_row, twist_in_deputy
 from sms_handover.model.robot_model import RobotModel
+from sms_handover.nodes.parts.measured_outputs import MeasuredOutputs
 from sms_handover.plant.free_floating import FreeFloatingPlant
+from sms_handover.plant.sensed_plant import SensedPlant
 from sms_handover.ros.codecs.base_wrench import wrench_message
 from sms_handover.ros.codecs.loop_messages import (
     OdometryCodec,
@@ -36,6 +39,7 @@ from sms_handover.ros.codecs.loop_messages import (
     vector_codec,
 )
 from sms_handover.ros.node.endpoints import CountedPublisher
+from sms_handover.simulation.parameters import LOCKSTEP, CommonParameters
 
 _LOOP = (JOINT_STATES, BASE_ODOMETRY, SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
 _PERIOD = (DEPUTY_ODOMETRY, LINEAR_MOMENTUM, ANGULAR_MOMENTUM, ENERGY)
@@ -49,11 +53,11 @@ class PlantOutputs:
         self,
         robot: RobotModel,
         publisher: Callable[[str], CountedPublisher],
-        *,
-        lockstep: bool,
+        common: CommonParameters,
+        conditions: Conditions,
     ) -> None:
         """Make the publishers; ``publisher`` returns the one of a topic."""
-        self._lockstep = lockstep
+        self._lockstep, self._by_measurement = common.mode == LOCKSTEP, common.uses_measurements
         names = (
             *_LOOP,
             *_PERIOD,
@@ -61,6 +65,8 @@ class PlantOutputs:
             CLOCK,
             *(tool_pose(arm) for arm in robot.arms),
         )
+        sensors = conditions.sensors
+        self._measured = MeasuredOutputs(robot, publisher, sensors) if sensors else None
         self._publish: dict[str, Callable[[Any], None]] = {name: publisher(name).publish for name in names}
         hinges = tuple(panel.joint for panel in robot.description.flexible_panels)
         self._state_codec = StateCodec((*robot.joint_names, *hinges), WORLD, BASE)
@@ -74,6 +80,19 @@ class PlantOutputs:
         At a reference period in lock step what the trajectory waits for goes first, because more has to be
         done with it. In real time the controller is the one who must not wait.
         """
+        if self._by_measurement:
+            self._publish_measured(plant, with_reference=with_reference)
+        self._publish_truth(plant, with_reference=with_reference)
+        if not self._by_measurement:
+            self._publish_measured(plant, with_reference=with_reference)
+
+    def _publish_measured(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
+        """Publish what sensors tell, if there are any."""
+        if self._measured and isinstance(plant, SensedPlant):
+            self._measured.publish_loop(plant, with_reference=with_reference)
+
+    def _publish_truth(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
+        """Publish the state as it is."""
         publish = self._publish
         state, panels = (plant.q, plant.v, plant.joint_effort), plant.panels
         if panels:
@@ -99,6 +118,8 @@ class PlantOutputs:
         now_ns, publish = plant.stamp_ns, self._publish
         if plant.pushed:
             publish[APPLIED_BASE_WRENCH](wrench_message(plant.pushed))
+        if self._measured and isinstance(plant, SensedPlant):
+            self._measured.publish_readings(plant)
         if with_reference:
             conserved = plant.conserved
             for arm, pose in plant.tools_in_world.items():
