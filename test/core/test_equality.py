@@ -23,7 +23,7 @@ PANELS: dict[str, Any] = {  # of a run whose panels swing
 ARRAYS = [item.name for item in fields(RunData) if isinstance(getattr(made_up_run(3), item.name), np.ndarray)]
 PER_ARM = ("target_pose", "tool_pose")
 EVENTS = ("grasp_events", "run_events", "plans", "base_wrenches")
-TEXTS = ("joint_names", "arms", "phases", "panel_names", "planned_paths", *EVENTS)
+TEXTS = ("joint_names", "arms", "phases", "panel_names", "planned_paths", "measured", *EVENTS)
 
 
 @pytest.fixture

@@ -406,8 +406,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "state reports the effort asked for, not the one given",
         "plant/free_floating",
-        "self.q, self.v, self.joint_effort = q, v, effort",
-        "self.q, self.v, self.joint_effort = q, v, asked",
+        "self.joint_effort = effort",
+        "self.joint_effort = asked",
         "plant",
     ),
     _core(
@@ -1138,6 +1138,20 @@ BREAKS: tuple[Break, ...] = (
         "wanted = wrench.stamp_ns // self._tick_ns",
         "wanted = tick",
         "wrenches",
+    ),
+    _core(
+        "spring that pushes away from rest",
+        "model/springs",
+        "-self.stiffness * q[-count:]",
+        "self.stiffness * q[-count:]",
+        "panels",
+    ),
+    _core(
+        "heat of dampers not booked",
+        "plant/free_floating",
+        "self._losses += self._swinging.taken",
+        "self._losses += 0.0 * self._swinging.taken",
+        "panels",
     ),
     _core(
         "gravity gradient without its factor of three",
