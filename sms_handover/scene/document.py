@@ -19,13 +19,20 @@ from sms_handover.units import NS_PER_S, ns_to_seconds
 
 Document = dict[str, object]
 
+_MEASURED = f"{DEPUTY}/measured"  # a body of the page
+
 
 def scene_document(name: str, scene: Scene) -> Document:
     """Return a whole scene with the name of its run."""
     blocks = [scene.link_in_world, scene.deputy_in_world[:, None]]
     blocks += [scene.target_in_world[arm][:, None] for arm in scene.arms]
+    measured = scene.measured_deputy
+    if measured is not None:
+        blocks.append(measured[:, None])
     return {
-        **still_document(name, scene.shapes, scene.links, scene.arms, scene.deputy_size),
+        **still_document(
+            name, scene.shapes, scene.links, scene.arms, scene.deputy_size, measured=measured is not None
+        ),
         **moving_document(scene.stamp_ns, np.concatenate(blocks, axis=1)),
         **task_document(scene.phases, scene.grasp_events),
         **({"clearance": _clearance(scene.worst_pair)} if scene.worst_pair else {}),
@@ -35,13 +42,22 @@ def scene_document(name: str, scene: Scene) -> Document:
 
 
 def still_document(
-    name: str, shapes: Sequence[Shape], links: Sequence[str], arms: Sequence[str], deputy_size: Array
+    name: str,
+    shapes: Sequence[Shape],
+    links: Sequence[str],
+    arms: Sequence[str],
+    deputy_size: Array,
+    *,
+    measured: bool = False,
 ) -> Document:
-    """Return the static part: the bodies, in the order of their poses, and their shapes."""
+    """Return the static part: the bodies, in the order of their poses, and their shapes.
+
+    With ``measured`` the last one is the deputy where sensors have told it to be.
+    """
     return {
         "name": name,
         "arms": list(arms),
-        "bodies": [*links, DEPUTY, *(f"{arm}/target" for arm in arms)],
+        "bodies": [*links, DEPUTY, *(f"{arm}/target" for arm in arms), *([_MEASURED] if measured else [])],
         "shapes": [_shape(shape) for shape in shapes],
         "deputy_size": deputy_size.tolist(),
     }

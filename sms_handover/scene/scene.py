@@ -29,7 +29,8 @@ class Scene:
     ``deputy_size`` (3,) m are the edges of the deputy and ``deputy_in_world`` (T, 7) is its centre;
     ``target_in_world`` has (T, 7) per arm. What was not recorded is NaN. ``phases`` has one entry per
     start of a phase. ``worst_pair`` has the two bodies nearest to each other, None if that is unknown,
-    ``momentum`` that of robot and deputy, and ``planned`` where plans led the tools, None if there is none.
+    ``momentum`` that of robot and deputy, and ``planned`` where plans led the tools, None if there is none;
+    ``measured_deputy`` (T, 7) is where sensors have told the deputy to be, None without sensors.
     """
 
     shapes: tuple[Shape, ...]
@@ -45,6 +46,7 @@ class Scene:
     worst_pair: WorstPair | None = None
     momentum: Momentum | None = None
     planned: PlannedLines | None = None
+    measured_deputy: Array | None = None
 
     def __post_init__(self) -> None:
         self.stamp_ns.setflags(write=False)
@@ -95,6 +97,7 @@ def make_scene(
         worst_pair=worst_pair.at(stamps) if worst_pair else None,
         momentum=momentum_of(run, robot, deputy, ticks, periods),
         planned=planned_lines(run.planned_paths, run.arms),
+        measured_deputy=run.measured.deputy_pose[periods] if run.measured else None,
     )
 
 

@@ -13,6 +13,7 @@ from sms_handover.trajectory.pose_path import AT_REST, PosePath
 from sms_handover.trajectory.schedule import ArmTarget, GraspFrameTarget, Hold, JointTarget, Schedule
 from sms_handover.trajectory.time_law import TIME_LAWS, Progress
 from sms_handover.types import (
+    BASE_NQ,
     Array,
     GraspAction,
     GraspEvent,
@@ -98,6 +99,7 @@ class TargetPreview:
         since = ns_to_seconds(phase.stamp_ns - now.stamp_ns)
         self._drifts = {arm: _drift(now.corrections.get(arm), one, since) for arm, one in found.items()}
         self._now = replace(now, stamp_ns=phase.stamp_ns, corrections=found)
+        self._base = q[:BASE_NQ]
 
     def grasped(self, event: GraspEvent) -> None:
         """Learn what came of a grasp command, between two updates."""
@@ -143,7 +145,7 @@ class TargetPreview:
         if phase.commands:
             return None
         end_ns = leg.end_ns + phase.end_ns - phase.start_ns
-        tools = {**leg.tools, **leg.goals}
+        tools = {**self._robot.tools_at(np.concatenate([self._base, leg.ends])), **leg.goals}
         joints = np.array(leg.ends)
         for arm in leg.goals:  # where inverse kinematics will take it is not known
             joints[self._robot.arm_joints[arm]] = self._joints[self._robot.arm_joints[arm]]

@@ -274,6 +274,10 @@ def test_a_scheduler_is_reached_safely_or_on_request(url: str, trusted: bool, to
         require_safe(url, trust_network=trusted)
 
 
+# What it keeps of the worker is not looked at.
+DIED_AGAIN = distributed.KilledWorker("chunk", None, 20)  # type: ignore[arg-type]
+
+
 class Broken:
     """A future of a chunk that failed."""
 
@@ -287,7 +291,7 @@ class Broken:
 @pytest.mark.parametrize(
     ("error", "told"),
     [
-        (distributed.KilledWorker("chunk", None, 20), "workers die again and again: see what kills them"),
+        (DIED_AGAIN, "workers die again and again: see what kills them"),
         (distributed.CancelledError("chunk"), "a worker failed: CancelledError: chunk"),
         (ModuleNotFoundError("No module named 'casadi'"), "a worker failed: ModuleNotFoundError: No module"),
         (SmsHandoverError("a process for cases cannot start"), "^a process for cases cannot start$"),

@@ -53,6 +53,7 @@ def columns(
         np.ones(count),
         {"grasp_error": values},
         {name: np.asarray(column) for name, column in inputs.items()},
+        np.full(count, nan),
     )
 
 
@@ -88,7 +89,7 @@ def test_only_cases_that_both_laws_have_are_paired() -> None:
 def test_tables_say_of_how_many_cases_and_adjust_for_how_many_draws(tmp_path: Path) -> None:
     """Of six draws one matters; Holm's least p is six times what it was [Holm1979]."""
     rng = np.random.default_rng(4)
-    drawn = {f"x{k}": rng.normal(size=30) for k in range(6)}
+    drawn: dict[str, Any] = {f"x{k}": rng.normal(size=30) for k in range(6)}
     values = [*drawn["x2"][:29], nan]
     campaign = read_campaign(written(tmp_path))
     found = {("smooth", "nmpc"): columns(values, **drawn)}

@@ -16,13 +16,6 @@ class Gains:
         maximum=1e9,
         default=1e4,
     )
-    base_return: float = sms.parameter(
-        "rate at which the base is to turn back, per angle that it is off its initial attitude",
-        unit="1/s",
-        minimum=0.0,
-        maximum=10.0,
-        default=0.2,
-    )
     arm_rate_limit: float = sms.parameter(
         "limit of all joint rates; 0: those of the robot",
         unit="rad/s",

@@ -11,12 +11,14 @@ from balancer.motion import Motion, expected
 from balancer.program import Program, Rates
 from balancer.setpoint import Setpoint
 
-_TOOL_WEIGHT = np.array([1e4] * 3 + [1e3] * 3)  # [s^2/m^2, s^2/rad^2] of the twist of a tool
+_TOOL_WEIGHT = np.array([1e6] * 3 + [1e5] * 3)  # [s^2/m^2, s^2/rad^2] of the twist of a tool
 _TOOL_GAIN = 4.0  # [1/s] by which errors of tools, and of joints that lead their arm, decay
-_JOINT_WEIGHT = 1e4  # [s^2/rad^2] of rates of joints that lead their arm
-_POSTURE_WEIGHT = 1.0  # [s^2/rad^2] of rates other than those of the reference, in any other arm
-_POSTURE_GAIN = 0.1  # [1/s] by which an idle arm goes back to where it is to stay
-_CHANGE_WEIGHT = 1.0  # [s^2/rad^2] of changes of rates in a period
+_JOINT_WEIGHT = 1e6  # [s^2/rad^2] of rates of joints that lead their arm
+_ELBOW_WEIGHT = 100.0  # [s^2/rad^2] of what the joints of a tool's arm do besides, other than the reference
+_REST_WEIGHT = 0.01  # [s^2/rad^2] of all rates of such an arm other than those of the reference
+_SINGULAR = 1e-3  # [-] of the largest singular value of a tool's Jacobian: what is less moves nothing
+_IDLE_WEIGHT, _IDLE_GAIN = 1.0, 0.1  # [s^2/rad^2, 1/s] by which an idle arm goes back to its posture
+_CHANGE_WEIGHT = 10.0  # [s^2/rad^2] of changes of its rates in a period
 _BOUND_GAIN = 2.0  # [1/s] a bound is approached no faster than this times the way left
 _PUSH = 0.01  # [m/s] at most, by which bodies that are too near come apart
 _NEAR = 0.1  # [m] above the least distance: what is farther off does not get there in a period
@@ -49,7 +51,6 @@ class Balancer:
         self._guidance: sms.Guidance | None = None
         self._setpoint: Setpoint | None = None
         self._entry: object = None
-        self._initial_rotation: sms.Array = np.eye(3)
         self._solves = self._failures = 0
         self._report: sms.PlanReport | None = None
 
@@ -70,7 +71,6 @@ class Balancer:
         """Return the joint efforts (n,) N m."""
         self._heed_news(stamp_ns)
         if self._setpoint is None:
-            self._initial_rotation = np.array(pin.Quaternion(q[3 : sms.BASE_NQ]).normalized().matrix())
             self._setpoint = self._next(stamp_ns, q[sms.BASE_NQ :], v[sms.BASE_NV :], 0.0 * v[sms.BASE_NV :])
         if self._guidance is not None:
             guidance, self._guidance = self._guidance, None
@@ -82,6 +82,11 @@ class Balancer:
         report, self._report = self._report, None
         return report
 
+    @property
+    def setpoint(self) -> Setpoint | None:
+        """What the joints follow, None before the first state."""
+        return self._setpoint
+
     def program(
         self, gains: Gains, motion: Motion, target: sms.PreviewedTargets, *, failed: bool = False
     ) -> Program:
@@ -89,10 +94,7 @@ class Balancer:
         robot = self._payload.robot
         program = Program(robot.joint_names)
         self._add_arms(program, motion, target, failed=failed)
-        turn = pin.log3(self._initial_rotation.T @ pin.Quaternion(motion.q[3 : sms.BASE_NQ]).matrix())
-        rows = motion.approaching(turn, motion.reaction[3:], motion.drift[3:], gains.base_return)
-        program.add(*rows, gains.base_turn_weight)
-        program.add(np.eye(robot.n_joints), motion.w, _CHANGE_WEIGHT)
+        program.add(motion.reaction[3:], -motion.drift[3:], gains.base_turn_weight)
         self._bound_joints(program, gains, motion)
         self._keep_apart(program, gains, motion, target)
         return program
@@ -161,13 +163,18 @@ class Balancer:
                 jacobian, rest = motion.rates(sms.tool_jacobian(robot, motion.q, arm))
                 rest = rest - target.tool_twist_in_world[arm].row
                 program.add(*motion.approaching(error, jacobian, rest, _TOOL_GAIN), _TOOL_WEIGHT)
-                program.add(every[part], self._led_rates[part], _POSTURE_WEIGHT)
+                own = jacobian[:, part]
+                besides = (np.eye(own.shape[1]) - np.linalg.pinv(own, _SINGULAR) @ own) @ every[part]
+                program.add(besides, besides @ self._led_rates, _ELBOW_WEIGHT)
+                program.add(every[part], self._led_rates[part], _REST_WEIGHT)
                 continue
             idle = not (failed or self._moved[part].any() or arm == target.holder)
-            weight, gain = (_POSTURE_WEIGHT, _POSTURE_GAIN) if idle else (_JOINT_WEIGHT, _TOOL_GAIN)
+            weight, gain = (_IDLE_WEIGHT, _IDLE_GAIN) if idle else (_JOINT_WEIGHT, _TOOL_GAIN)
             error = motion.q[sms.BASE_NQ :][part] - target.joint_position[part]
             rows = motion.approaching(error, every[part], -target.joint_velocity[part], gain)
             program.add(*rows, weight)
+            if idle:
+                program.add(every[part], motion.w[part], _CHANGE_WEIGHT)
 
     def _bound_joints(self, program: Program, gains: Gains, motion: Motion) -> None:
         """Bound rates, and rates towards the limits of joints, so that no limit is ever passed."""

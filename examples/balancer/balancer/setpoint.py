@@ -13,8 +13,8 @@ _S_PER_NS = 1e-9  # [s/ns]
 class Setpoint:
     """Angles q rad and rates w rad/s at ``begin_ns``, rates ``reached`` at the end of a period; each (n,).
 
-    Rates change linearly in the period and stay after it; at an age beyond ``longest_ns``, unless it is
-    None, the joints stop.
+    Rates change linearly in the period and stay after it; beyond an age of ``longest_ns``, unless that is
+    None, the joints stand still.
     """
 
     begin_ns: int

@@ -357,6 +357,10 @@ class RunBody {
   addDeputy(size) {
     const mesh = this.solid(new THREE.BoxGeometry(...size), { role: "deputy", arm: -1 });
     this.bodies[this.body("deputy")].add(mesh);
+    const measured = this.bodies[this.body("deputy/measured")];
+    if (!measured) return; // a run without sensors
+    measured.add(this.solid(new THREE.BoxGeometry(...size), { role: "measured", arm: -1 }));
+    this.targetGroup.add(measured);
   }
 
   addArm(arm, index) {
@@ -386,11 +390,12 @@ class RunBody {
     this.startLines = outline;
   }
 
-  /** Apply the colours of a theme; a ghost is translucent and casts no shadow. */
-  paint(theme, ghost) {
+  /** Apply the colours of a theme; a ghost, as what is only measured, is translucent and casts no shadow. */
+  paint(theme, isGhost) {
     const colours = COLOURS[theme];
     this.painted.forEach(({ role, arm, own, material, lines, mesh }) => {
-      const colour = { arm: colours.arms[arm % 4], target: colours.arms[arm % 4], deputy: colours.deputy }[role];
+      const ghost = isGhost || role === "measured";
+      const colour = { arm: colours.arms[arm % 4], target: colours.arms[arm % 4], deputy: colours.deputy, measured: colours.deputy }[role];
       material.color.set(role === "own" ? own : colour);
       material.emissive.set(role === "deputy" ? colour : 0x000000);
       material.emissiveIntensity = 0.25;
@@ -407,12 +412,12 @@ class RunBody {
     this.traces.forEach((trace, arm) => trace.colour(colours.arms[arm % 4]));
     this.basePath.colour(colours.start);
     this.startLines.color.set(colours.start);
-    this.startGroup.visible = !ghost;
+    this.startGroup.visible = !isGhost;
     this.nearest?.paint(colours);
     this.momentum?.paint(colours.momentum);
     this.planned?.paint(colours);
     [...this.traces, this.basePath].forEach((trace) => {
-      trace.past.material.linewidth = ghost ? TRACE_WIDTH * 0.6 : TRACE_WIDTH;
+      trace.past.material.linewidth = isGhost ? TRACE_WIDTH * 0.6 : TRACE_WIDTH;
     });
   }
 
