@@ -93,7 +93,9 @@ EFFECTS: Mapping[str, dict[str, Any]] = {
         }
     },
     "mounts: 1 mm, 2 mrad": {"model_error": {"mounts": {"position": 0.001, "angle": 0.002}}},
+    "panels that swing, 2 x 5 kg at 0.5 Hz": {},
 }
+SCENARIOS = {"panels that swing, 2 x 5 kg at 0.5 Hz": "panels"}  # of effects that are no conditions
 
 
 @dataclass(frozen=True)
@@ -112,13 +114,14 @@ class Effect:
         return max(self.distances) <= far * MM_PER_M and max(self.angles) <= askew * DEG_PER_RAD
 
 
-def effect_of(conditions: dict[str, Any], law: str) -> Effect:
-    """Return what comes of the smooth handover under a law and conditions, with rotors in any case."""
+def effect_of(name: str, law: str) -> Effect:
+    """Return what comes of the smooth handover under a law and an effect, with rotors in any case."""
+    conditions, scenario = EFFECTS[name], SCENARIOS.get(name, "smooth")
     values: dict[str, Any] = {"conditions.rotor_inertia": ROTOR, "law": law, "seed": _SEED, **_OPEN}
     values |= {f"conditions.{name}": value for name, value in conditions.items()}
     if "sensors" in conditions:
         values["source"] = "measured"
-    run = simulate(load_scenario("smooth", {"common.tick": TICK, **values}))
+    run = simulate(load_scenario(scenario, {"common.tick": TICK, **values}))
     events = run.grasp_events
     return Effect(
         tuple(event.position_error * MM_PER_M for event in events) or (nan,),
@@ -185,7 +188,7 @@ def measured(names: Iterable[str]) -> dict[str, dict[str, Effect]]:
     """Run the task under the effects of these names."""
     found: dict[str, dict[str, Effect]] = {}
     for name in names:
-        found[name] = {law: effect_of(EFFECTS[name], law) for law in LAWS}
+        found[name] = {law: effect_of(name, law) for law in LAWS}
         print(name, *(f"{law} {_cell(one)}" for law, one in found[name].items()), sep=" | ", flush=True)
     return found
 
