@@ -129,7 +129,7 @@ def test_a_star_tracker_has_its_noise_and_bias() -> None:
 def test_vision_is_late_by_whole_ticks() -> None:
     camera = _EXACT.make(setting())
     for tick in range(300):
-        deputy = partial(Pose, np.array([tick, 0.0, 1.0]), _DEPUTY.quaternion_xyzw)
+        deputy = Pose(np.array([tick, 0.0, 1.0]), _DEPUTY.quaternion_xyzw)
         seen = told([camera], tick, _NOWHERE, np.zeros(6), deputy)
         assert seen.deputy_in_world is not None
         assert seen.deputy_in_world.position[0] == max(0, (tick - 30) // 100 * 100)
@@ -163,17 +163,16 @@ def test_vision_is_relative_to_the_base_as_it_is_known() -> None:
 
 def test_as_many_measurements_of_vision_are_lost_as_is_declared() -> None:
     """And a lost one leaves the one before. A run begins with one, whatever becomes of it."""
+
+    def placed(pose: Pose) -> Pose:
+        return pose
+
     camera = replace(_EXACT, period=0.0, latency=0.0, dropped=0.3).make(setting())
     readings = list[Reading | None]()
     for tick in range(2000):
-        deputy = partial(Pose, np.array([tick, 0.0, 1.0]), _DEPUTY.quaternion_xyzw)
+        deputy = Pose(np.array([tick, 0.0, 1.0]), _DEPUTY.quaternion_xyzw)
         known = Known(np.array(_NOWHERE), np.zeros(6))
-        readings.append(
-            camera.measure(
-                Truth(tick, _NOWHERE, np.zeros(6), deputy),
-                known,
-            )
-        )
+        readings.append(camera.measure(Truth(tick, _NOWHERE, np.zeros(6), partial(placed, deputy)), known))
         latest = max((reading.tick for reading in readings if reading), default=0)
         assert known.deputy_in_world is not None and known.deputy_in_world.position[0] == latest
     assert readings.count(None) / 2000 == pytest.approx(0.3, abs=4 * sqrt(0.3 * 0.7 / 2000))
@@ -231,6 +230,18 @@ def test_sensors_alone_change_nothing() -> None:
         assert getattr(measured, name).tobytes() != getattr(sensed, name).tobytes(), name
     assert measured.base_pose[:, :3].tobytes() == sensed.base_pose[:, :3].tobytes()
     assert measured.base_twist[:, :3].tobytes() == sensed.base_twist[:, :3].tobytes()
+
+
+def test_compiled_ticks_leave_sensors_out_where_nobody_listens() -> None:
+    """The run is that without sensors, bit for bit; who listens is given what they tell, by Python."""
+    compiled = {"common.dynamics": "compiled", "common.duration": 0.04}
+    bare, unheard, heard = (
+        simulate(load_scenario("colliding", {**compiled, **more}))
+        for more in ({}, SENSORS, {"source": "measured", **SENSORS})
+    )
+    assert unheard.measured is None and heard.measured is not None
+    assert compare_runs(bare, unheard) == ()
+    assert compare_runs(bare, heard)
 
 
 def test_a_law_of_ones_own_is_given_what_is_measured() -> None:
