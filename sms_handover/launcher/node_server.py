@@ -24,7 +24,7 @@ from importlib import import_module
 from pathlib import Path
 
 from sms_handover.errors import GraphError
-from sms_handover.graph.topics import CONTAINER, NODES, graph_topics
+from sms_handover.graph.topics import CONTAINER, NODES, SENSOR_TYPES, graph_topics
 from sms_handover.launcher.timeouts import ActiveTime
 from sms_handover.ros.process.launcher_process import launcher_environment
 
@@ -160,7 +160,7 @@ def serve(channel: socket.socket) -> int:
     )  # of forking beside threads: those of LTTng, which rest
     mains = {node: import_module(f"{NODE_MODULES}.{node}").main for node in (*NODES, CONTAINER)}
     message_class = import_module("sms_handover.ros.message_types").message_class
-    for topic in graph_topics((), clearance=True):
+    for topic in graph_topics((), clearance=True, sensors=SENSOR_TYPES):
         message_class(topic.type).__class__.__import_type_support__()
     import_module("sms_handover.messages.message_types").MessageTypes()  # the definitions of rosbags
     gc.freeze()

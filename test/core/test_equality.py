@@ -15,16 +15,17 @@ from sms_handover.bag.info import read_info
 from sms_handover.bag.run.reader import read_run
 from sms_handover.graph.events import RunEvent, Severity
 from sms_handover.launcher.recorded_scenario import scenario_in
+from sms_handover.plan_report import PlannedPaths, PlanReport, PlanStatus
 from sms_handover.run_data import RunData
 from sms_handover.simulation.simulate import simulate
-from sms_handover.types import GraspStatus, PlanReport, PlanStatus
+from sms_handover.types import GraspStatus
 
 from .bag_messages import made_up_run
 
 OLD = Path(__file__).parent.parent / "data" / "first_edition" / "nmpc"
 ARRAYS = [item.name for item in fields(RunData) if isinstance(getattr(made_up_run(3), item.name), np.ndarray)]
 PER_ARM = ("target_pose", "tool_pose")
-TEXTS = ("joint_names", "arms", "phases", "grasp_events", "run_events", "plans")
+TEXTS = ("joint_names", "arms", "phases", "grasp_events", "run_events", "plans", "planned_paths")
 
 
 @pytest.fixture
@@ -96,6 +97,12 @@ def test_a_plan_is_the_same_however_long_it_took(run: RunData) -> None:
     assert compare_runs(mine, replace(run, plans=(slow,))) == ()
     (difference,) = compare_runs(mine, replace(run, plans=(other,)))
     assert difference.field == "plans"
+
+
+def test_one_bit_in_a_planned_path_is_a_difference(run: RunData) -> None:
+    one, other = (PlannedPaths(0, {"arm_a": np.full((2, 3), x)}) for x in (0.1, np.nextafter(0.1, 1.0)))
+    (difference,) = compare_runs(replace(run, planned_paths=(one,)), replace(run, planned_paths=(other,)))
+    assert difference.field == "planned_paths"
 
 
 @pytest.mark.parametrize("name", PER_ARM)
