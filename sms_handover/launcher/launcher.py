@@ -112,9 +112,7 @@ def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outc
         driver = LifecycleDriver(node, plan.own_nodes)
         if plan.server is not None:
             plan.server.wait_until_ready(interrupts.heed)
-        started = arguments_of(plan)
-        for name in sorted(started, key=lambda name: name != RECORDER):  # which takes longest to configure
-            arguments = started[name]
+        for name, arguments in arguments_of(plan).items():
             if name not in plan.external:
                 processes.start(name, arguments.line)
             elif plan.controller:
