@@ -1,7 +1,11 @@
-"""Plan report: what came of one solve of a predictive law."""
+"""Plan report: what came of one solve of a predictive law, and where the tools go by its plan."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from types import MappingProxyType
+
+from sms_handover.types import Array, read_only
 
 
 class PlanStatus(Enum):
@@ -36,3 +40,18 @@ class PlanReport:
     plan_age: float
     late_plans: int = 0
     reused_plans: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedPaths:
+    """Where the tools go by the plan in use, as seen by the solve for the state at ``stamp_ns``.
+
+    ``tool_in_world`` has per arm the positions (K, 3) m of its tool at the instants of the horizon.
+    """
+
+    stamp_ns: int
+    tool_in_world: Mapping[str, Array]
+
+    def __post_init__(self) -> None:
+        paths = {arm: read_only(path) for arm, path in self.tool_in_world.items()}
+        object.__setattr__(self, "tool_in_world", MappingProxyType(paths))

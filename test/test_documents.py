@@ -138,8 +138,7 @@ def check_ros2(words: list[str]) -> None:
         require([word.partition(":=")[0] for word in words[3:] if ":=" in word], known, "launch argument")
     elif words[0] == "topic":
         known = [
-            "/" + topic.name.lstrip("/")
-            for topic in graph_topics(ARMS, clearance=True, wrenches=True, sensors=SENSOR_TYPES)
+            "/" + topic.name.lstrip("/") for topic in graph_topics(ARMS, clearance=True, sensors=SENSOR_TYPES)
         ]
         require([word for word in words[2:] if word.startswith("/")], known, "topic")
     elif words[:2] == ["service", "call"]:

@@ -1,7 +1,7 @@
 """Equality of two runs, bit for bit."""
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from sms_handover.graph.events import MESSAGE_REFUSED
 from sms_handover.graph.topics import TRAJECTORY
 from sms_handover.run_data import Array, MeasuredRows, RunData
+from sms_handover.types import GraspEvent
 
 _PER_TICK = (
     "tick_ns",
@@ -21,6 +22,7 @@ _PER_TICK = (
     "base_twist",
 )
 _UNTIMED: Mapping[str, Any] = dict.fromkeys(("linearization_time", "program_time", "total_time"), 0.0)
+_NUMBERS = (float, tuple[float, ...])  # the fields of a grasp event that can be unknown
 _PER_JOINT = (
     *("joint_position", "joint_velocity", "joint_effort", "joint_command"),
     *("reference_position", "reference_velocity"),
@@ -75,7 +77,7 @@ def before(run: RunData, end_ns: int) -> RunData:
             values[item.name] = value[ticks if item.name in _PER_TICK else periods]
         elif isinstance(value, Mapping):
             values[item.name] = {arm: rows[periods] for arm, rows in value.items()}
-        elif item.name in ("joint_names", "arms"):
+        elif item.name in ("joint_names", "arms", "panel_names"):
             values[item.name] = value
         elif isinstance(value, MeasuredRows):
             cut = {name: ticks if name in _PER_TICK else periods for name in _MEASURED_ROWS}
@@ -85,6 +87,34 @@ def before(run: RunData, end_ns: int) -> RunData:
         else:
             values[item.name] = tuple(entry for entry in value if entry.stamp_ns < end_ns)
     return RunData(**values)
+
+
+def as_far_as_recorded(recorded: RunData, again: RunData) -> tuple[RunData, tuple[str, ...]]:
+    """Return a run computed again without what the recording of it has no number of, and what that is.
+
+    An older version recorded less: nothing can be said of what is NaN throughout in its recording alone.
+    """
+    values: dict[str, Any] = {}
+    missing = []
+    for item in fields(RunData):
+        theirs, ours = getattr(recorded, item.name), getattr(again, item.name)
+        if isinstance(theirs, np.ndarray) and theirs.shape == ours.shape and _lacks([theirs], [ours]):
+            values[item.name] = theirs
+            missing.append(item.name)
+    events, lacking = recorded.grasp_events, {}
+    for item in fields(GraspEvent):
+        theirs, ours = ([getattr(e, item.name) for e in run.grasp_events] for run in (recorded, again))
+        if events and item.type in _NUMBERS and _lacks(theirs, ours):
+            lacking[item.name] = theirs[0]
+            missing.append(f"grasp_events.{item.name}")
+    values["grasp_events"] = tuple(replace(event, **lacking) for event in again.grasp_events)
+    return replace(again, **values), tuple(missing)
+
+
+def _lacks(theirs: Sequence[Any], ours: Sequence[Any]) -> bool:
+    """Whether there are numbers of ours, and none of theirs."""
+    empty, known = (not any(np.any(~np.isnan(value)) for value in values) for values in (theirs, ours))
+    return empty and not known
 
 
 def _differences(a: RunData, b: RunData) -> Iterator[Difference]:
@@ -135,6 +165,12 @@ def _compared(run: RunData, name: str) -> Any:
         return tuple(event for event in own if event.kind != MESSAGE_REFUSED)
     if name == "plans":
         return tuple(replace(plan, **_UNTIMED) for plan in run.plans)
+    if name == "planned_paths":
+        # as numbers, whose repr has all digits
+        return tuple(
+            (paths.stamp_ns, {arm: path.tolist() for arm, path in paths.tool_in_world.items()})
+            for paths in run.planned_paths
+        )
     return getattr(run, name)
 
 

@@ -19,6 +19,7 @@ from sms_handover.graph.events import graver_in_words
 from sms_handover.graph.topics import CONTROLLER, NODES, RECORDER
 from sms_handover.launcher.domain import reservation
 from sms_handover.launcher.launcher import LaunchPlan, launch
+from sms_handover.launcher.node_server import NodeServer
 from sms_handover.launcher.run_folder import BAG, LOGS, locked_logs
 from sms_handover.launcher.wake_ups import measure_wake_ups
 from sms_handover.ros.launching.composition import listed, placed
@@ -140,7 +141,7 @@ def command(options: Namespace) -> int:
         if options.without_controller:
             print(_how_to_join(held.domain), flush=True)
         if options.real_time:
-            print(_forecast(scenario, composed=options.compose), flush=True)
+            print(_forecast(scenario, plan.server, composed=options.compose), flush=True)
         outcome = launch(plan)
     progress = outcome.progress
     print(outcome.recorder_said, end="")
@@ -155,8 +156,10 @@ def command(options: Namespace) -> int:
     return task_code(progress.events, progress.run_events, failed=progress.failed)
 
 
-def _forecast(scenario: Scenario, *, composed: bool) -> str:
+def _forecast(scenario: Scenario, server: NodeServer | None, *, composed: bool) -> str:
     """Return in one line how well this machine will keep real time."""
+    if server is not None:
+        server.wait_until_ready()  # what it imports would be taken for the noise of the machine
     exact_timers()
     common = scenario.parameters.common
     wake_ups = measure_wake_ups(common.tick)

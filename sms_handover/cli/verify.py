@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
-from sms_handover.analysis.equality import before, compare_runs
+from sms_handover.analysis.equality import as_far_as_recorded, before, compare_runs
 from sms_handover.bag.info import read_info
 from sms_handover.bag.run.reader import read_run
 from sms_handover.cli.exit_codes import EXIT_FAILED, EXIT_OK, EXIT_UNSUPPORTED
@@ -105,7 +105,7 @@ def _by_itself(bag: Path, domain_id: int | None) -> int:
     """Run a bag again, print what differs, and return the exit code.
 
     A run that was reset or ended early is compared up to its last state, without the command that would
-    have answered it.
+    have answered it; one of an older version without what that did not record.
     """
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -113,11 +113,14 @@ def _by_itself(bag: Path, domain_id: int | None) -> int:
             scenario = scenario_in(read_info(bag), Path(folder))
         except BagError as error:
             raise ConfigurationError(str(error)) from error  # exit code 2: what was given cannot be used
-        again = simulate(scenario)
+        again = simulate(scenario, base_wrenches=recorded.base_wrenches)
     ended_early = recorded.tick_ns.size < again.tick_ns.size
     if ended_early:
         end_ns = int(recorded.tick_ns[-1])
         recorded, again = before(recorded, end_ns), before(again, end_ns)
+    again, missing = as_far_as_recorded(recorded, again)
+    if missing:
+        print(f"not recorded, as by an older version, so not compared: {', '.join(missing)}")
     differences = compare_runs(recorded, again)
     for difference in differences:
         print(difference)

@@ -11,8 +11,8 @@ from sms_handover.compiled.c_function import NativeFunction
 from sms_handover.compiled.library import dynamics_library
 from sms_handover.compiled.names import TICKS
 from sms_handover.compiled.tree import PER_BODY, body_tree, inertial_parameters, tools_of
+from sms_handover.control.compensation import CompensatedTorque
 from sms_handover.control.controller import JointController
-from sms_handover.control.disturbance_observer import ObservedTorque
 from sms_handover.control.nmpc import NmpcLaw
 from sms_handover.control.pid import PidLaw
 from sms_handover.control.protocol import Controller
@@ -39,13 +39,13 @@ class CompiledTicks:
     def fits(plant: FreeFloatingPlant, controller: Controller, known: RobotModel) -> bool:
         """Whether a controller is one of our joint laws, with a robot that has its joints where they are.
 
-        A law that observes disturbances is left to Python.
+        A law that compensates for what its model does not know is left to Python.
         """
         if not isinstance(controller, JointController) or type(controller.law) not in _LAWS:
             return False
         law = controller.law
-        observes = isinstance(law, NmpcLaw) and isinstance(law.efforts, ObservedTorque)
-        return not observes and dynamics_library(known) == dynamics_library(plant.robot)
+        compensates = isinstance(law, NmpcLaw) and isinstance(law.efforts, CompensatedTorque)
+        return not compensates and dynamics_library(known) == dynamics_library(plant.robot)
 
     def __init__(
         self, plant: FreeFloatingPlant, controller: Controller, known: RobotModel, scheme: str, tick_ns: int

@@ -8,7 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from sms_handover.errors import ControllerError
-from sms_handover.plan_report import PlanReport
+from sms_handover.plan_report import PlannedPaths, PlanReport
 from sms_handover.types import (
     Array,
     GraspEvent,
@@ -81,6 +81,14 @@ class Planning(Protocol):
         """Return the report of the solve since the last call, None if there was none."""
 
 
+@runtime_checkable
+class Showing(Protocol):
+    """What a controller has besides that shows where its plans lead the tools."""
+
+    def take_paths(self) -> PlannedPaths | None:
+        """Return the paths that are new since the last call, None if there are none."""
+
+
 class RemoteSolver(Protocol):
     """What a planning law gets in real time: a process that solves its problems, one after the other."""
 
@@ -120,9 +128,14 @@ class Preview(Protocol):
         """Return to the start of a run."""
 
     def update(
-        self, phase: TaskPhase, reference: JointReference, tool_in_world: Mapping[str, Pose], q: Array
+        self,
+        phase: TaskPhase,
+        reference: JointReference,
+        tool_in_world: Mapping[str, Pose],
+        q: Array,
+        v: Array,
     ) -> None:
-        """Take the guidance of now, at a configuration (7 + n,)."""
+        """Take the guidance of now, at a configuration (7 + n,) and a velocity (6 + n,)."""
 
     def grasped(self, event: GraspEvent) -> None:
         """Learn what came of a grasp command, between two updates."""

@@ -110,7 +110,8 @@ def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outc
             NodeProcesses(plan.log_folder, graph_environment(plan), plan.inherited, plan.server)
         )
         driver = LifecycleDriver(node, plan.own_nodes)
-        _wait_for_server(plan.server, interrupts)
+        if plan.server is not None:
+            plan.server.wait_until_ready(interrupts.heed)
         started = arguments_of(plan)
         for name in sorted(started, key=lambda name: name != RECORDER):  # which takes longest to configure
             arguments = started[name]
@@ -121,17 +122,6 @@ def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outc
                 processes.start(name, (*arguments.line, *named), plan.controller)
         display = stack.enter_context(Display(end_ns))
         return _Run(plan, monitor, driver, executor, processes, display, interrupts, memory).to_the_end()
-
-
-def _wait_for_server(server: NodeServer | None, interrupts: Interrupts) -> None:
-    """Wait until nodes can be started; raises GraphError after a while, KeyboardInterrupt on a signal."""
-    time = ActiveTime()
-    while server is not None and not server.is_ready(_START_POLL_S):
-        time.update()
-        if interrupts.asked:
-            raise KeyboardInterrupt
-        if time.seconds > _START_TIMEOUT_S:
-            raise GraphError(f"the node server has not imported its modules within {_START_TIMEOUT_S:g} s")
 
 
 @contextmanager

@@ -18,13 +18,14 @@ import socket
 import subprocess
 import sys
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 
 from sms_handover.errors import GraphError
 from sms_handover.graph.topics import CONTAINER, NODES, SENSOR_TYPES, graph_topics
+from sms_handover.launcher.timeouts import ActiveTime
 from sms_handover.ros.process.launcher_process import launcher_environment
 
 MODULE = "sms_handover.launcher.node_server"
@@ -36,6 +37,7 @@ _LARGEST = 2**20  # [byte] of a request
 _MOST_DESCRIPTORS = 64
 _READY = b"ready"  # what the server sends once it can fork
 _IMPORT_TIMEOUT_S = 60.0  # [s] of wall time for that
+_POLL_S = 0.02  # [s] between two looks meanwhile at what else there is
 _ANSWER_TIMEOUT_S = 20.0  # [s] of wall time for a fork, a millisecond's work
 _ARGUMENTS_AT = 46  # field of /proc/PID/stat behind the name in which the address of the arguments stands
 
@@ -82,8 +84,7 @@ class NodeServer:
         """
         if self._channel is None:
             return None
-        if not self.is_ready(_IMPORT_TIMEOUT_S):
-            raise GraphError(f"the node server has not imported its modules within {_IMPORT_TIMEOUT_S:g} s")
+        self.wait_until_ready()
         request = {"node": node, "arguments": list(arguments), "environment": dict(environment)}
         try:
             socket.send_fds(self._channel, [json.dumps(request).encode()], descriptors)
@@ -95,18 +96,24 @@ class NodeServer:
             return None
         return ForkedProcess(int(answer)) if answer else None
 
-    def is_ready(self, timeout_s: float) -> bool:
-        """Return whether the server can fork, or has ended, within a time: :meth:`start` answers at once."""
-        if (
-            self._channel is not None
-            and not self._ready
-            and select.select([self._channel], [], [], timeout_s)[0]
-        ):
-            self._channel.settimeout(_ANSWER_TIMEOUT_S)
-            with suppress(OSError):  # it has ended, which is noticed by the first request
-                self._channel.recv(_LARGEST)
-            self._ready = True
-        return self._ready or self._channel is None
+    def wait_until_ready(self, meanwhile: Callable[[], None] = lambda: None) -> None:
+        """Wait until the server has imported what it forks, or has ended: :meth:`start` then answers at once.
+
+        Calls ``meanwhile`` again and again; raises GraphError after a minute.
+        """
+        time = ActiveTime()
+        while self._channel is not None and not self._ready:
+            if select.select([self._channel], [], [], _POLL_S)[0]:
+                self._channel.settimeout(_ANSWER_TIMEOUT_S)
+                with suppress(OSError):  # it has ended, which is noticed by the first request
+                    self._channel.recv(_LARGEST)
+                self._ready = True
+            time.update()
+            if time.seconds > _IMPORT_TIMEOUT_S:
+                raise GraphError(
+                    f"the node server has not imported its modules within {_IMPORT_TIMEOUT_S:g} s"
+                )
+            meanwhile()
 
 
 SERVED_ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}  # what counts while modules load

@@ -3,10 +3,13 @@
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from sms_handover.graph.events import RunEvent, Severity
 from sms_handover.graph.message_constants import member_of
-from sms_handover.plan_report import PlanReport, PlanStatus
+from sms_handover.plan_report import PlannedPaths, PlanReport, PlanStatus
 from sms_handover.types import (
+    BaseWrench,
     Collision,
     GraspAction,
     GraspCommand,
@@ -27,6 +30,13 @@ def pose_values(message: Any) -> tuple[float, ...]:
 def vector_values(message: Any) -> tuple[float, ...]:
     """Return the components of a Vector3Stamped."""
     return message.vector.x, message.vector.y, message.vector.z
+
+
+def base_wrench(message: Any) -> BaseWrench:
+    """Return the wrench of a WrenchStamped."""
+    force, torque = message.wrench.force, message.wrench.torque
+    parts = [(float(part.x), float(part.y), float(part.z)) for part in (force, torque)]
+    return BaseWrench(header_ns(message), message.header.frame_id, *parts)
 
 
 def energy_values(message: Any) -> tuple[float, ...]:
@@ -100,7 +110,7 @@ def grasp_event(message: Any) -> GraspEvent:
 
 
 def _components(vector: Any) -> tuple[float, float, float]:
-    """Return the components of a Vector3."""
+    """Return the components of a Vector3 or a Point."""
     return vector.x, vector.y, vector.z
 
 
@@ -132,6 +142,16 @@ def plan_report(message: Any) -> PlanReport:
         late_plans=int(message.late_plans),
         reused_plans=int(message.reused_plans),
     )
+
+
+def planned_paths(message: Any) -> PlannedPaths:
+    """Return the value of a MarkerArray with a line per arm; raises KeyError unless it has any."""
+    if not message.markers:
+        raise KeyError("a line per arm")
+    lines = {
+        marker.ns: np.array([_components(point) for point in marker.points]) for marker in message.markers
+    }
+    return PlannedPaths(header_ns(message.markers[0]), lines)
 
 
 def run_event(message: Any) -> RunEvent:

@@ -12,7 +12,7 @@ from sms_handover.configuration.scenario_file import LAW
 from sms_handover.control.law import Need
 from sms_handover.control.parameters import ControllerParameters, parameters_with
 from sms_handover.control.plan_events import PlanEvents
-from sms_handover.control.protocol import Carrying, Controller, Planning, Remote, inner_of
+from sms_handover.control.protocol import Carrying, Controller, Planning, Remote, Showing, inner_of
 from sms_handover.control.registry import law_named
 from sms_handover.frames import BASE, WORLD
 from sms_handover.graph.topics import (
@@ -21,10 +21,12 @@ from sms_handover.graph.topics import (
     JOINT_COMMAND,
     JOINT_REFERENCE,
     MPC_STATUS,
+    PLANNED_PATHS,
     TASK_PHASE,
     state_topics,
 )
 from sms_handover.nodes.parts.guidance_parts import GuidanceParts
+from sms_handover.nodes.parts.marker import path_markers
 from sms_handover.nodes.parts.watchdogs import ReferenceWatchdog
 from sms_handover.ros.codecs.convert import plan_message
 from sms_handover.ros.codecs.events import read_grasp_event
@@ -243,10 +245,12 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
     def prepare(self) -> None:
         """Set up the law; raises UnstableLoopError if its gains cannot work at this tick."""
         self._plans = self.endpoints.publisher(MPC_STATUS)
+        self._lines = self.endpoints.publisher(PLANNED_PATHS)
         super().prepare()
         inner = inner_of(self._controller)
         self._solves = inner if isinstance(inner, Planning) else None
         self._remote = inner if isinstance(inner, Remote) else None
+        self._shows = inner if isinstance(inner, Showing) else None
         self._plan_events = PlanEvents()
         self._watchdog = ReferenceWatchdog(longest_reference_ns(self.common, self.parameters))
 
@@ -296,6 +300,9 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
             self._plans.publish(plan_message(report))
             trouble = self._remote.trouble if self._remote else ""
             self.events.publish_all(self._plan_events.of(report, trouble))
+        paths = self._shows.take_paths() if self._shows else None
+        if paths:
+            self._lines.publish(path_markers(paths))
         if not self._lockstep:
             event = self._watchdog.poll(self._parts.reference_ns, stamp)
             if event is not None:

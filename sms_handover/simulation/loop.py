@@ -1,6 +1,6 @@
 """The loop as an object: plant, trajectory, inverse kinematics and controller of a scenario, tick by tick."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -15,6 +15,7 @@ from sms_handover.control.protocol import (
     Controller,
     Guidance,
     Planning,
+    Showing,
     inner_of,
 )
 from sms_handover.control.registry import law_named
@@ -22,7 +23,8 @@ from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import CONTROLLER
 from sms_handover.model.conserved import ConservedQuantities
-from sms_handover.plan_report import PlanReport
+from sms_handover.plan_report import PlannedPaths, PlanReport
+from sms_handover.plant.arm_part import PanelState
 from sms_handover.plant.external_wrenches import ExternalAccount
 from sms_handover.plant.sensed_plant import KnownState, SensedPlant, known_of
 from sms_handover.simulation.parameters import COMPILED
@@ -39,6 +41,7 @@ from sms_handover.simulation.wiring import (
 )
 from sms_handover.types import (
     Array,
+    BaseWrench,
     DeputyState,
     GraspEvent,
     IkStatus,
@@ -54,9 +57,9 @@ from sms_handover.types import (
 class Period:
     """What is worked out once per reference period, at the instant at which it begins.
 
-    Tool poses and targets are in ``world``; since the start the joint efforts have done ``work`` J, wrenches
-    from outside ``external_work`` J, and ``lost`` J have become heat;
-    ``external_impulse`` is None where no such wrenches act; ``ik_status`` is None where no tool had
+    Tool poses and targets are in ``world``; since the start the joint efforts have done ``work`` J,
+    wrenches from outside ``external_work`` J, and ``lost`` J have become heat; ``external_impulse`` is None
+    where no such wrenches act, ``panels`` where none is on a hinge; ``ik_status`` is None where no tool had
     a target. ``events`` has what came of grasp commands, ``decisions`` what was decided about the task.
     ``clearance`` is None unless it is measured online, ``measured`` without sensors.
     """
@@ -71,6 +74,7 @@ class Period:
     external_work: float
     lost: float
     external_impulse: ExternalAccount | None
+    panels: PanelState | None
     ik_status: IkStatus | None
     events: tuple[GraspEvent, ...]
     decisions: tuple[RunEvent, ...]
@@ -129,6 +133,7 @@ class Ticks:
     guidance: Guidance
     period: Period | None
     plan: PlanReport | None = None
+    paths: PlannedPaths | None = None
 
     @property
     def phases(self) -> tuple[TaskPhase, ...]:
@@ -157,11 +162,17 @@ class Loop:
     a retry or failure of the task; it is ``finished`` once the last state has been answered.
     """
 
-    def __init__(self, scenario: Scenario | None = None, controller: Controller | None = None) -> None:
+    def __init__(
+        self,
+        scenario: Scenario | None = None,
+        controller: Controller | None = None,
+        base_wrenches: Sequence[BaseWrench] = (),
+    ) -> None:
         """Make the loop of a scenario, by default the shipped one; ``controller`` replaces that of its law.
 
-        Raises ConfigurationError where the scenario cannot be run, and where its controller is external and
-        none is given.
+        ``base_wrenches`` act over the ticks of their stamps. Raises ConfigurationError where the scenario
+        cannot be run, and where its controller is external and none is given, and MessageError on wrenches of
+        one tick or an unknown frame.
         """
         self.scenario = scenario or load_scenario()
         parameters, truth = self.scenario.parameters, self.scenario.truth
@@ -171,6 +182,8 @@ class Loop:
         if self._common.dynamics == COMPILED and not self._common.uses_measurements:
             conditions = replace(conditions, sensors={})  # C does not measure, and nobody would listen
         self._plant = make_plant(truth.robot, truth.schedule, self._common, parameters.plant, conditions)
+        for wrench in base_wrenches:
+            self._plant.push(wrench)
         self._generator = make_generator(robot, schedule, self._common, parameters.trajectory)
         self._find_joints = make_ik(robot, self._common, parameters.ik)
         measured = self._common.measures_clearance
@@ -190,6 +203,7 @@ class Loop:
             self._aims = Need.TOOL_TARGETS in law_named(self.law).needs
             self._controller = make_controller(robot, schedule, self._common, parameters.controller)
         self._solves = self.controller if isinstance(self.controller, Planning) else None
+        self._shows = self.controller if isinstance(self.controller, Showing) else None
         self._plan_events = PlanEvents()
         self._runner = make_runner(self._plant, self._controller, robot, self._common, parameters.plant)
         self._quiet: QuietRunner | None = None
@@ -230,6 +244,11 @@ class Loop:
         return self._plant.deputy
 
     @property
+    def base_wrenches(self) -> tuple[BaseWrench, ...]:
+        """The wrenches that others have asked for and that have acted so far."""
+        return tuple(w for w in self._plant.base_wrenches if w.stamp_ns < self._plant.stamp_ns)
+
+    @property
     def controller(self) -> Controller:
         """What answers the states, without the check of its efforts."""
         return inner_of(self._controller)
@@ -260,7 +279,8 @@ class Loop:
         told = self._plan_events.of(report) if report else ()
         if told:
             excesses = {**excesses, 0: excesses.get(0, ()) + told}
-        return Ticks(rows, excesses, self._guidance, period, report)
+        paths = self._shows.take_paths() if self._shows else None
+        return Ticks(rows, excesses, self._guidance, period, report, paths)
 
     def _run(self, ticks: int, left: int) -> tuple[TickRows, Mapping[int, tuple[RunEvent, ...]]]:
         """Carry out some ticks, with ``left`` still to be integrated; return them with their excesses."""
@@ -372,6 +392,7 @@ class Loop:
             plant.external_work,
             plant.losses,
             plant.external_impulse,
+            plant.panels,
             status,
             events,
             decisions,

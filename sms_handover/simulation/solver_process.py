@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from io import BytesIO
 from multiprocessing.connection import Connection
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any
 
 from sms_handover.control.law import LawSetup
 from sms_handover.errors import ConfigurationError, SmsHandoverError
@@ -41,7 +41,9 @@ class SolverSetup:
 class _Pickler(pickle.Pickler):
     """Pickles read-only mappings too."""
 
-    dispatch_table: ClassVar[Any] = {MappingProxyType: lambda mapping: (_read_only_mapping, (dict(mapping),))}
+    def __init__(self, stream: BytesIO) -> None:
+        super().__init__(stream, pickle.HIGHEST_PROTOCOL)
+        self.dispatch_table = {MappingProxyType: lambda mapping: (_read_only_mapping, (dict(mapping),))}
 
 
 def _read_only_mapping(values: dict[Any, Any]) -> MappingProxyType[Any, Any]:
@@ -52,7 +54,7 @@ def _read_only_mapping(values: dict[Any, Any]) -> MappingProxyType[Any, Any]:
 def packed(value: Any) -> bytes:
     """Return a value as bytes for the other process."""
     stream = BytesIO()
-    _Pickler(stream, pickle.HIGHEST_PROTOCOL).dump(value)
+    _Pickler(stream).dump(value)
     return stream.getvalue()
 
 

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,15 @@ from sms_handover.clearance.monitor import ClearanceMonitor
 from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
 from sms_handover.compiled.inverse_kinematics import CompiledIk
 from sms_handover.compiled.kinematics import CompiledKinematics
+from sms_handover.compiled.linearisation import CompiledDerivatives
 from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.compiled.tool_motion import CompiledToolMotion
 from sms_handover.conditions.conditions import IDEAL, Conditions
 from sms_handover.conditions.sensors.suite import SensorSuite
+from sms_handover.control.compensation import CompensatedTorque, Compensation
 from sms_handover.control.computed_torque import ComputedTorque, TrackingEfforts
-from sms_handover.control.disturbance_observer import ObservedTorque
+from sms_handover.control.friction_feed_forward import FrictionFeedForward
+from sms_handover.control.integral_action import IntegralAction
 from sms_handover.control.law import Law, LawSetup, Need
 from sms_handover.control.parameters import ControllerParameters, gains_of
 from sms_handover.control.protocol import CheckedController, Controller
@@ -25,13 +29,15 @@ from sms_handover.control.stability import check_stability
 from sms_handover.errors import ConfigurationError, ScheduleError
 from sms_handover.ik.levenberg_marquardt import FindJoints, find_joints
 from sms_handover.ik.parameters import IkParameters
+from sms_handover.model.poses import se3_of
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics, pinocchio_dynamics
 from sms_handover.plant.effects import PlantEffects
-from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
+from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.plant.integrators import TABLEAUS, Tableau
 from sms_handover.plant.joint_limits import ENFORCE
 from sms_handover.plant.parameters import PlantParameters
+from sms_handover.plant.plant_state import InitialState
 from sms_handover.plant.sensed_plant import SensedPlant
 from sms_handover.simulation.near_pairs import NearPairs
 from sms_handover.simulation.parameters import COMPILED, MEASURED, TRUE, CommonParameters
@@ -92,7 +98,14 @@ def make_dynamics(dynamics: str, tableau: Tableau, h: float) -> MakeDynamics:
     """Return what makes the dynamics of the plant, by Pinocchio or compiled."""
     if dynamics != COMPILED:
         return pinocchio_dynamics(tableau, h)
-    return lambda robot: PlantDynamics(CompiledStepper(robot, tableau, h), CompiledKinematics(robot))
+    by_pinocchio = pinocchio_dynamics(tableau, h)
+
+    def make(robot: RobotModel) -> PlantDynamics:
+        if robot.springs:  # C knows of no springs
+            return by_pinocchio(robot)
+        return PlantDynamics(CompiledStepper(robot, tableau, h), CompiledKinematics(robot))
+
+    return make
 
 
 def make_generator(
@@ -150,8 +163,12 @@ def make_controller(
     """
     law, gains = law_named(parameters.law), gains_by_phase(schedule, parameters)
     start = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
-    check_stability(law, robot, gains, ns_to_seconds(common.tick_ns), start)  # nothing is carried there
-    computed_torque = _computed_torque(law, common, parameters)
+    compensation = _compensation(law, common, parameters)
+    checked = law
+    if law.linearised and compensation.integral:
+        checked = replace(law, linearised=compensation.integral.linearised(law.linearised))
+    check_stability(checked, robot, gains, ns_to_seconds(common.tick_ns), start)  # nothing is carried there
+    computed_torque = _computed_torque(common, compensation)
     longest_ns = longest_reference_ns(common, parameters)
     preview = TargetPreview(robot, schedule) if Need.PREVIEW in law.needs else None
     distances = NearPairs(make_clearance(robot, schedule)) if Need.CLEARANCE in law.needs else None
@@ -165,6 +182,7 @@ def make_controller(
         reference_ns=common.reference_ns,
         preview=preview,
         distances=distances,
+        compiled_derivatives=CompiledDerivatives,
         start_solver=SolverProcess if in_real_time else None,
     )
     controller = law.make(setup)
@@ -172,23 +190,36 @@ def make_controller(
 
 
 def _computed_torque(
-    law: Law[Any], common: CommonParameters, parameters: ControllerParameters
+    common: CommonParameters, compensation: Compensation
 ) -> Callable[[RobotModel], TrackingEfforts]:
-    """Return what makes the computed torque of a robot; raises ConfigurationError."""
+    """Return what makes the computed torque of a robot."""
     make = CompiledComputedTorque if common.dynamics == COMPILED else ComputedTorque
-    bandwidth, dt = parameters.disturbance_bandwidth, ns_to_seconds(common.tick_ns)
-    if not bandwidth:
+    if not compensation.any:
         return make
+    return lambda robot: CompensatedTorque(robot, make(robot), compensation)
+
+
+def _compensation(law: Law[Any], common: CommonParameters, parameters: ControllerParameters) -> Compensation:
+    """Return what a law compensates with; raises ConfigurationError where it cannot."""
+    dt, bandwidth = ns_to_seconds(common.tick_ns), parameters.disturbance_bandwidth
     if Need.PAYLOAD not in law.needs:
-        raise ConfigurationError(
-            f"disturbance_bandwidth is {bandwidth:g} 1/s, must be 0 under control law {law.name!r}, "
-            "which has no model of the dynamics"
-        )
+        for name in ("disturbance_bandwidth", "integral_time", "friction_viscous", "friction_coulomb"):
+            value = getattr(parameters, name)
+            if value:
+                raise ConfigurationError(
+                    f"{name} is {value:g}, must be 0 under control law {law.name!r}, "
+                    "which has no model of the dynamics"
+                )
     if bandwidth * dt > 1.0:
         raise ConfigurationError(
             f"disturbance_bandwidth is {bandwidth:g} 1/s, must be <= {1.0 / dt:g} 1/s at a tick of {dt:g} s"
         )
-    return lambda robot: ObservedTorque(robot, make(robot), bandwidth, dt)
+    integral = IntegralAction(parameters.integral_time, dt) if parameters.integral_time else None
+    friction = FrictionFeedForward(
+        parameters.friction_viscous, parameters.friction_coulomb, parameters.friction_speed
+    )
+    has_friction = bool(friction.viscous or friction.coulomb)
+    return Compensation(dt, integral, friction if has_friction else None, bandwidth or None)
 
 
 def make_runner(
@@ -208,8 +239,9 @@ def make_runner(
     has_all = parameters.joint_limits != ENFORCE and plant.is_ideal
     if not has_all or not CompiledTicks.fits(plant, controller, known):
         _LOG.warning(
-            "ticks are carried out by Python: C has only laws nmpc and pid without an observer, joints that "
-            "are alike in truth and model, limits that are not enforced, and ideal conditions"
+            "ticks are carried out by Python: C has only laws nmpc and pid without compensation, joints that "
+            "are alike in truth and model, limits that are not enforced, panels that are locked, and ideal "
+            "conditions"
         )
         return by_python
     return CompiledTicks(plant, controller, known, parameters.integrator, common.tick_ns)
@@ -221,10 +253,19 @@ def longest_reference_ns(common: CommonParameters, parameters: ControllerParamet
 
 
 def _check_deputy_twist(schedule: Schedule, h: float) -> None:
-    """Raise ScheduleError where a deputy turns too far in one tick of ``h`` s for its integration."""
-    rate = float(np.linalg.norm(schedule.deputy.twist_in_world.angular))
+    """Raise ScheduleError where a deputy may turn too far in one tick of ``h`` s for its integration.
+
+    A body that tumbles freely turns at most with |L| / I_min, with I_min its least moment of inertia.
+    """
+    deputy = schedule.deputy
+    rate = float(np.linalg.norm(deputy.twist_in_world.angular))
+    if deputy.inertia is not None:
+        moments = np.array(deputy.inertia.inertia)
+        turn = se3_of(deputy.deputy_in_world).rotation.T @ deputy.twist_in_world.angular
+        rate = max(rate, float(np.linalg.norm(moments @ turn) / np.linalg.eigvalsh(moments)[0]))
     if rate * h > _MOST_TURN:
         raise ScheduleError(
-            f"deputy.twist_in_world turns it at {rate:g} rad/s, must be at most {_MOST_TURN / h:g} rad/s, "
-            f"{_MOST_TURN:g} rad in a tick of {h:g} s; use a shorter tick or a slower deputy"
+            f"deputy.twist_in_world lets it turn at up to {rate:g} rad/s, must be at most "
+            f"{_MOST_TURN / h:g} rad/s, {_MOST_TURN:g} rad in a tick of {h:g} s; use a shorter tick or a "
+            "slower deputy"
         )

@@ -293,7 +293,8 @@ def test_after_a_phase_led_by_joints_a_preview_begins_where_they_end() -> None:
     for arm, led in phase.targets.items():
         assert isinstance(led, JointTarget)
         ends[robot.arm_joints[arm]] = led.position
-    preview.update(TaskPhase(0, index, phase.name), JointReference(0, joints, still), robot.tools_at(q), q)
+    reference, v = JointReference(0, joints, still), np.zeros(robot.pin.nv)
+    preview.update(TaskPhase(0, index, phase.name), reference, robot.tools_at(q), q, v)
     (target,) = preview.ahead([phase.end_ns - phase.start_ns])
     expected_tool = robot.tools_at(np.concatenate([q[:BASE_NQ], ends]))["arm_b"]
     np.testing.assert_allclose(target.tool_in_world["arm_b"].position, expected_tool.position, atol=1e-9)

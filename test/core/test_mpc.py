@@ -14,20 +14,24 @@ from sms_handover.control.mpc.controller import MpcController, MpcState
 from sms_handover.control.mpc.distance_rows import DistanceModel
 from sms_handover.control.mpc.horizon import Horizon
 from sms_handover.control.mpc.momentum import BaseStart, base_start
+from sms_handover.control.mpc.patience import Patience
 from sms_handover.control.mpc.placement import placements
 from sms_handover.control.mpc.plan import Plan
+from sms_handover.control.mpc.plan_queue import PlanQueue
 from sms_handover.control.mpc.planner import Planner, PlanStart
 from sms_handover.control.mpc.prediction import Prediction, PredictionModel
-from sms_handover.control.mpc.quadratic_program import solve
+from sms_handover.control.mpc.quadratic_program import Solution, solve
 from sms_handover.control.mpc.sensitivity import Sensitivity
 from sms_handover.control.mpc.tool_errors import ToolErrorModel
-from sms_handover.errors import ConfigurationError, ControllerError, MissingDependencyError
+from sms_handover.errors import ConfigurationError, ControllerError, MissingDependencyError, NoPlanError
 from sms_handover.graph.events import PLAN_FAILED
 from sms_handover.model.conserved import conserved_quantities
+from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.model.reduced import reduced_inverse_dynamics
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
-from sms_handover.plan_report import PlanReport, PlanStatus
+from sms_handover.plan_report import PlannedPaths, PlanReport, PlanStatus
 from sms_handover.run_data import RunData
+from sms_handover.scene.planned_lines import planned_lines
 from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.near_pairs import NearPairs
 from sms_handover.simulation.scenario import Scenario, load_scenario
@@ -35,7 +39,18 @@ from sms_handover.simulation.simulate import simulate
 from sms_handover.simulation.snapshot import Snapshot, plain, structured
 from sms_handover.simulation.wiring import gains_by_phase, initial_joints, make_clearance
 from sms_handover.trajectory.preview import TargetPreview
-from sms_handover.types import Array, Pose, PreviewedTargets, Twist
+from sms_handover.types import (
+    Array,
+    GraspAction,
+    GraspCommand,
+    GraspEvent,
+    GraspStatus,
+    JointReference,
+    Pose,
+    PreviewedTargets,
+    TaskPhase,
+    Twist,
+)
 
 from .conftest import Draw
 
@@ -311,9 +326,33 @@ def test_rows_that_contradict_each_other_are_named(draw: Draw) -> None:
     )
     assert hard.status is PlanStatus.INFEASIBLE and hard.largest_slack_row == "hard 0"
     assert hard.change.size == 0
+    endless = solve(np.eye(3), np.zeros(3), [upper, lower], 1)
+    assert endless.status is PlanStatus.ITERATION_LIMIT
+    assert endless.largest_slack_row == "soft 0" and endless.largest_slack == pytest.approx(2.0)
     for wrong in (-np.eye(3), np.full((3, 3), np.nan)):
         with pytest.raises(ControllerError, match="expected a convex and finite program"):
             solve(wrong, np.zeros(3), [upper], 300)
+
+
+def test_patience_names_the_limit_that_keeps_the_arms_from_their_task() -> None:
+    """Unless plans have lasted for a horizon in between, and once the plan that brakes is over."""
+    row, nothing = "distance arm_a_gripper - arm_b_gripper", np.zeros(0)
+    stuck = Solution(PlanStatus.ITERATION_LIMIT, nothing, 300, (), 0.05, row, float("nan"))
+    patience, queue = Patience(20_000_000), PlanQueue()
+    queue.offer(Plan(1, 0, np.zeros(1), np.zeros(1), np.zeros((2, 1)), np.full(2, 0.1)))
+    for _ in range(2):
+        patience.brakes(stuck)
+    for _ in range(80):
+        patience.solved(1.6)
+    for count in range(3):
+        assert not patience.is_over, count
+        patience.brakes(stuck)
+    assert patience.is_over
+    assert not patience.is_at_rest(700_000_000, queue) and patience.is_at_rest(701_000_000, queue)
+    told = str(patience.error(720_000_000, 0.0, ""))
+    assert f"at 0.72 s: {row} exceeds its limit by 0.05 m, relax it" in told
+    told = str(patience.error(720_000_000, 0.1, "base rate about z"))
+    assert "at 0.72 s: base rate about z exceeds its limit by 0.1 rad/s" in told
 
 
 def test_without_its_solver_the_law_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -384,6 +423,26 @@ def test_a_plan_begins_where_the_robot_will_be() -> None:
     np.testing.assert_allclose(coming.w, state.joint_velocity, rtol=0.0, atol=1e-3)
 
 
+def test_planned_paths_are_those_that_the_tools_then_take() -> None:
+    """Of every fifth plan: it begins where the tools are one period later, and they go on along it."""
+    run, arm = simulate(scenario_of("smooth", 1.2)), "arm_a"
+    assert [paths.stamp_ns for paths in run.planned_paths] == run.reference_ns[::5].tolist()
+    paths = run.planned_paths[8]
+    horizon = Horizon.growing(1.6, 10, 0.02)  # as shipped
+    stamps, taken = paths.stamp_ns + 20_000_000 + 1e9 * horizon.times[:4], run.tool_pose[arm][:, :3].T
+    then = np.array([np.interp(stamps, run.reference_ns, row) for row in taken]).T
+    np.testing.assert_allclose(paths.tool_in_world[arm][0], then[0], rtol=0.0, atol=1e-8)
+    np.testing.assert_allclose(paths.tool_in_world[arm][:4], then, rtol=0.0, atol=1e-5)
+    assert np.linalg.norm(then[3] - then[0]) > 5e-4
+    lines = planned_lines(run.planned_paths, ("arm_b", arm))
+    assert lines is not None and lines.points.shape == (len(run.planned_paths), 2, 11, 3)
+    assert lines.points[3, 1].tobytes() == run.planned_paths[3].tool_in_world[arm].tobytes()
+    shorter = PlannedPaths(0, {arm: np.eye(3)[:2]})
+    padded = planned_lines([shorter, *run.planned_paths[:1]], (arm, "arm_c"))
+    assert padded is not None and np.isnan(padded.points[:, 1]).all()
+    assert (padded.points[0, 0, 1:] == np.eye(3)[1]).all()
+
+
 def test_targets_are_those_of_the_instants_of_the_plan(monkeypatch: pytest.MonkeyPatch) -> None:
     """The plan begins a period after the state; its first target is that after its first interval."""
     loop, asked = Loop(scenario_of("smooth", 1.0)), list[int]()
@@ -416,23 +475,31 @@ def test_a_plan_is_followed_from_node_to_node(draw: Draw) -> None:
 
 
 def test_solves_that_fail_are_carried_by_the_plan_before_then_the_arms_brake() -> None:
-    """At the limit of iterations the old plan is used and counted; after five in a row the arms brake."""
+    """At the limit of iterations the old plan is used and counted; after five in a row the arms brake.
+
+    Once they are at rest and there still is no plan the run ends and says why.
+    """
     loop = Loop(scenario_of("paper", 4.0))
     for _ in range(30):
         loop.advance_period()
     before = loop.snapshot()
     failing = Loop(scenario_of("paper", 4.0, program_iterations=1, joint_rate_limit=0.05, failed_plans=5))
     failing.restore(before)
-    reports, rates, events = list[PlanReport](), list[float](), list[str]()
     failing.advance_period()
     snapshot = failing.snapshot()
     failing.restore(before)
-    while not failing.finished and failing.state.stamp_ns < 2_000_000_000:
-        ticks = failing.advance_period()
-        assert ticks.plan is not None
-        reports.append(ticks.plan)
-        rates.append(float(np.abs(ticks.rows.v[-1, BASE_NV:]).max()))
-        events += [event.kind for told in ticks.excesses.values() for event in told]
+    reports, rates, events = list[PlanReport](), list[float](), list[str]()
+
+    def go_on() -> None:
+        while not failing.finished:
+            ticks = failing.advance_period()
+            reports.extend([ticks.plan] if ticks.plan else [])
+            rates.append(float(np.abs(ticks.rows.v[-1, BASE_NV:]).max()))
+            events.extend(event.kind for told in ticks.excesses.values() for event in told)
+
+    with pytest.raises(NoPlanError, match=r"at rest at .* s: its programs end after 1 iterations"):
+        go_on()
+    assert len(reports) == 15  # three times five solves
     statuses = [report.status for report in reports]
     assert statuses[:4] == [PlanStatus.ITERATION_LIMIT] * 4 and statuses[4] is PlanStatus.BRAKING
     assert [report.reused_plans for report in reports[:5]] == [1, 2, 3, 4, 5]
@@ -472,7 +539,7 @@ def test_the_preview_is_what_the_generator_will_say(law: str) -> None:
         state, period = loop.state, loop.advance_period().period
         assert period is not None
         now_ns, targets = period.phase.stamp_ns, period.targets_in_world
-        preview.update(period.phase, period.reference, targets, state.q)
+        preview.update(period.phase, period.reference, targets, state.q, state.v)
         for event in period.events:
             preview.grasped(event)
         if now_ns % 500_000_000 == 0:
@@ -492,3 +559,40 @@ def test_the_preview_is_what_the_generator_will_say(law: str) -> None:
                 off = np.abs(told.joint_position[part] - period.reference.position[part]).max()
                 assert off < 2e-3, (now_ns, arm)
     assert compared > duration
+
+
+def test_targets_on_a_held_deputy_turn_with_the_robot(draw: Draw) -> None:
+    """The whole turns and drifts as one body, with the joints at rest: a second ahead to rounding."""
+    scenario = load_scenario("tumbling")
+    robot, schedule = scenario.model.robot, scenario.model.schedule
+    preview, q, v = TargetPreview(robot, schedule), draw.q(), np.zeros(20)
+    names = [phase.name for phase in schedule.phases]
+    index, frames = names.index("meet"), schedule.deputy.grasp_frames
+    now_ns = schedule.phases[index].end_ns - 1_500_000_000  # the motion is over
+    v[:BASE_NV] = [0.01, -0.02, 0.005, 0.03, 0.05, -0.04]  # m/s, rad/s
+    reference = JointReference(now_ns, q[BASE_NQ:], np.zeros(14))
+
+    def goal_at(q: Array) -> pin.SE3:
+        deputy = se3_of(robot.tools_at(q)["arm_a"]) * se3_of(frames["end_a"]).inverse()
+        return deputy * se3_of(frames["end_b"])
+
+    def update(stamp_ns: int, phase: int) -> None:
+        given = {"arm_b": pose_of(goal_at(q))} if phase == index else robot.tools_at(q)
+        preview.update(TaskPhase(stamp_ns, phase, names[phase]), reference, given, q, v)
+
+    update(0, 0)
+    command = GraspCommand(GraspAction.GRASP, "arm_a", "end_a")
+    preview.grasped(GraspEvent(0, command, GraspStatus.SUCCEEDED, 0.0, 0.0, 0.0, ""))
+    update(schedule.phases[index].start_ns, index)
+    update(now_ns, index)
+    later = np.array(q)
+    base = robot.integrate_base(Pose(q[:3], q[3:BASE_NQ]), v[:BASE_NV], 1.0)
+    later[:BASE_NQ] = np.concatenate([base.position, base.quaternion_xyzw])
+    before, then, after = preview.ahead([now_ns + stamp * 1_000_000 for stamp in (999, 1000, 1001)])
+    goal, expected = se3_of(then.tool_in_world["arm_b"]), goal_at(later)
+    np.testing.assert_allclose(pin.log6(goal.inverse() * expected).vector, 0.0, atol=1e-9)
+    first, last = (se3_of(item.tool_in_world["arm_b"]) for item in (before, after))
+    twist = then.tool_twist_in_world["arm_b"]
+    np.testing.assert_allclose(twist.linear, (last.translation - first.translation) / 0.002, atol=1e-7)
+    turned = pin.log3(last.rotation @ first.rotation.T) / 0.002
+    np.testing.assert_allclose(twist.angular, turned, atol=1e-7)

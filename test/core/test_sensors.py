@@ -1,5 +1,6 @@
 """Sensors against closed forms and known statistics, and what is done with what they tell."""
 
+from base64 import b64decode
 from collections.abc import Sequence
 from dataclasses import replace
 from math import exp, radians, sqrt
@@ -9,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from sms_handover.analysis.equality import before, compare_runs
 from sms_handover.conditions.random_streams import RandomStreams
 from sms_handover.conditions.sensors.encoders import EncoderValues
 from sms_handover.conditions.sensors.gyro import GyroValues
@@ -16,8 +18,12 @@ from sms_handover.conditions.sensors.sensor import Known, Reading, Sensor, Setti
 from sms_handover.conditions.sensors.star_tracker import StarTrackerValues
 from sms_handover.conditions.sensors.vision import VisionValues
 from sms_handover.errors import ConfigurationError
+from sms_handover.export.run_tables import run_tables
 from sms_handover.model.poses import pose_distance
+from sms_handover.report.plots import plot_groups
 from sms_handover.run_data import RunData
+from sms_handover.scene.document import scene_document
+from sms_handover.scene.scene import make_scene
 from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
@@ -28,6 +34,7 @@ _EPS = float(np.finfo(float).eps)
 _NOWHERE = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])  # a base at the origin of world
 _DEPUTY = Pose(np.array([1.2, 0.0, 0.5]), np.array([0.0, 0.0, 0.0, 1.0]))  # 1.3 m away
 _EXACT = VisionValues(0.0, 0.0, np.zeros(3), np.zeros(3), 0.1, 0.03, 0.0, np.zeros(3))
+MEASURED = ("joint_position", "joint_velocity", "base_pose", "base_twist", "deputy_pose")
 _RATE = np.array([0.1, -0.2, 0.3])  # [rad/s]
 SENSORS: dict[str, Any] = {
     "conditions.sensors.encoders": {"step": 3e-5, "bandwidth": 100.0},
@@ -210,12 +217,11 @@ def handover(source: str, sensors: dict[str, Any], **more: Any) -> RunData:
 def test_sensors_alone_change_nothing() -> None:
     """They tell, but with the source truth nobody listens; all that is measured by nobody is the truth."""
     bare, sensed = handover("truth", {}), handover("truth", SENSORS)
-    told_as_well = ("joint_position", "joint_velocity", "base_pose", "base_twist", "deputy_pose")
-    for name in ("joint_command", *told_as_well):
+    for name in ("joint_command", *MEASURED):
         assert getattr(bare, name).tobytes() == getattr(sensed, name).tobytes(), name
     measured = sensed.measured
     assert bare.measured is None and measured is not None
-    for name in told_as_well:
+    for name in MEASURED:
         assert getattr(measured, name).tobytes() != getattr(sensed, name).tobytes(), name
     assert measured.base_pose[:, :3].tobytes() == sensed.base_pose[:, :3].tobytes()
     assert measured.base_twist[:, :3].tobytes() == sensed.base_twist[:, :3].tobytes()
@@ -255,6 +261,47 @@ def test_the_trajectory_goes_by_what_is_measured() -> None:
     held = [name.startswith("arm_b") for name in plain.joint_names]
     more = (read.reference_position - plain.reference_position)[-1][held]
     assert more == pytest.approx([1e-3] * 7, abs=1e-6)
+
+
+def test_report_scene_and_tables_have_truth_and_measurement() -> None:
+    run = handover("measured", SENSORS)
+    measured = run.measured
+    assert measured is not None
+    groups = {group.title: group for group in plot_groups([run])}
+    plots = {plot.key: plot for plot in groups["Measurements"].plots}
+    assert all(plot.lines for plot in plots.values()) and len(plots) == 8
+    seen = next(line for line in plots["vision_position_error"].lines if line.series == 1)
+    expected = 1e3 * (measured.deputy_pose - run.deputy_pose)[:, 1]  # [mm]
+    assert np.array_equal(seen.values, expected)
+    turn = plots["star_tracker_error"].lines[0]
+    assert 0.0 < np.abs(turn.values).max() < np.degrees(6e-4)  # of 0.1 mrad
+    assert "Measurements" not in [group.title for group in plot_groups([handover("truth", {})])]
+
+    scenario = load_scenario("colliding")
+    scene = make_scene(run, scenario.truth.robot.urdf, scenario.truth.schedule.deputy.size)
+    document = scene_document("a", scene)
+    bodies, packed = document["bodies"], document["poses"]
+    assert isinstance(bodies, list) and bodies[-1] == "deputy/measured" and isinstance(packed, str)
+    poses = np.frombuffer(b64decode(packed), "<f4").reshape(len(scene.stamp_ns), len(bodies), 7)
+    periods = np.searchsorted(run.reference_ns, scene.stamp_ns)
+    assert np.array_equal(poses[:, -1], measured.deputy_pose[periods].astype("<f4"))
+
+    ticks, references, *_ = run_tables(run, lambda stamps: np.ones(len(stamps), dtype=bool))
+    names = [column.name for column in ticks.columns]
+    velocity = ticks.values[names.index("arm_a_joint_2.measured_velocity")]
+    assert np.array_equal(velocity, measured.joint_velocity[:, 1])
+    assert "deputy.measured.position.x" in [column.name for column in references.columns]
+
+
+def test_a_comparison_of_runs_tells_where_measurements_differ() -> None:
+    """It says so, cuts them with the run, and leaves them out where one run has none."""
+    run, other = (handover("truth", SENSORS, seed=seed) for seed in (1, 2))
+    fields = {difference.field for difference in compare_runs(run, other)}
+    assert fields == {f"measured.{name}" for name in MEASURED[2:]}  # encoders draw nothing
+    assert compare_runs(run, handover("truth", {})) == ()
+    shorter = before(run, 50 * MS)
+    assert shorter.measured is not None
+    assert (len(shorter.measured.base_pose), len(shorter.measured.deputy_pose)) == (50, 3)
 
 
 @pytest.mark.parametrize(

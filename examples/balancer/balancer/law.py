@@ -115,7 +115,7 @@ class Balancer:
     def _solve(self, stamp_ns: int, q: sms.Array, v: sms.Array, guidance: sms.Guidance) -> None:
         """Find the rates for the end of the reference period that begins now."""
         begun = perf_counter()
-        self._preview.update(guidance.phase, guidance.reference, guidance.tool_in_world, q)
+        self._preview.update(guidance.phase, guidance.reference, guidance.tool_in_world, q, v)
         period_ns, gains = self._setup.reference_ns, self._setup.gains[guidance.phase.index]
         (target,) = self._preview.ahead([stamp_ns + period_ns])
         assert self._setpoint is not None

@@ -138,6 +138,13 @@ class DaskWorkers:
 
     def run(self, tasks: Iterable[Task]) -> Iterator[Sequence[Done]]:
         """Yield finished chunks as they come; raises SmsHandoverError where workers or scheduler fail."""
+        try:
+            yield from self._chunks(tasks)
+        except (OSError, distributed.CancelledError) as error:  # after as long as it takes to reach one
+            raise SmsHandoverError(f"the scheduler was lost: {_in_words(error)}; {_GOES_ON}") from error
+
+    def _chunks(self, tasks: Iterable[Task]) -> Iterator[Sequence[Done]]:
+        """Hand out chunks and yield what came of each; raises what Dask raises."""
         left, self._chunk_size, number = iter(tasks), 1, 0
         running = distributed.as_completed()
         waiting = 0

@@ -20,6 +20,7 @@ KEY_METRICS = (
     *("control_effort", "peak_torque", "rate_share", "time_beyond_position_limit"),
 )
 TESTED = ("grasp_error", "base_turn", "control_effort")
+_MS_PER_S = 1000.0  # [ms/s]
 _SHARES = ((0.05, "5 %"), (0.5, "median"), (0.95, "95 %"))
 
 
@@ -44,6 +45,8 @@ def _scenario(campaign: Campaign, name: str, columns: Mapping[Group, CaseColumns
         for share, words in _SHARES:
             rows.append(Row(f"  {words}", tuple(_percentile(one, metric, share) for one in found)))
     rows.append(Row("CPU time of a case, mean [s]", tuple(map(_cpu, found))))
+    if any(one is not None and not np.isnan(one.solve).all() for one in found):
+        rows.append(Row("solve time of a plan, median [ms]", tuple(map(_solve, found))))
     return Section(f"Scenario {name}", tuple(rows))
 
 
@@ -71,6 +74,10 @@ def _numeric(one: CaseColumns | None) -> str:
 
 def _cpu(one: CaseColumns | None) -> str:
     return MISSING if one is None or not one.cpu.size else number(float(one.cpu.mean()))
+
+
+def _solve(one: CaseColumns | None) -> str:
+    return MISSING if one is None else number(_MS_PER_S * percentile(one.solve, 0.5).value)
 
 
 def _percentile(one: CaseColumns | None, metric: str, share: float) -> str:

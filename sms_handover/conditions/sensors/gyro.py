@@ -7,7 +7,6 @@ import numpy as np
 
 from sms_handover.conditions.sensors.sensor import EMPTY, Known, Memory, Reading, Setting, Truth, in_ticks
 from sms_handover.types import BASE_NV, Array, freeze
-from sms_handover.units import ns_to_seconds
 
 GYRO = "gyro"
 _STREAM = "sensors.gyro"
@@ -47,7 +46,8 @@ class Gyro:
     def __init__(self, values: GyroValues, setting: Setting) -> None:
         self._bias = values.bias
         self._every = max(1, in_ticks(values.period, setting.tick_ns, "gyro.period"))
-        self._sigma = values.noise_density / sqrt(self._every * ns_to_seconds(setting.tick_ns))  # rad/s
+        self._period = self._every * setting.tick_s
+        self._sigma = values.noise_density / sqrt(self._period)  # rad/s
         self._variance = np.full(_AXES, self._sigma**2)
         self._noise = setting.streams.noise(_STREAM, _AXES)
         self.reset()
@@ -61,8 +61,9 @@ class Gyro:
         reading = None
         if truth.tick % self._every == 0:
             rate = truth.v[3:BASE_NV] + self._bias + self._sigma * self._noise.normal(truth.tick)
+            before = self.memory.held
+            known.turned = self._period * before if before.size else np.zeros(_AXES)
             self.memory = Memory(rate)
             reading = Reading(GYRO, truth.tick, rate, self._variance)
         known.v[3:BASE_NV] = self.memory.held
-        known.has_rate = True
         return reading

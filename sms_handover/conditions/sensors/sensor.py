@@ -26,14 +26,14 @@ class Truth:
 class Known:
     """What is known at the same tick: the truth at first, in whose place each sensor puts what it tells.
 
-    ``deputy_in_world`` stays None unless a sensor sees the deputy; ``has_rate`` says whether the angular
-    velocity of the base is measured.
+    ``deputy_in_world`` stays None unless a sensor sees the deputy; ``turned`` (3,) rad is how far a gyro has
+    measured the base to turn since its reading before, None in a tick without a reading.
     """
 
     q: Array
     v: Array
     deputy_in_world: Pose | None = None
-    has_rate: bool = False
+    turned: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,17 +3,16 @@
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from sms_handover.conditions.sensors.delay_line import DelayLine
 from sms_handover.conditions.sensors.sensor import Known, Memory, Reading, Setting, Truth, in_ticks
 from sms_handover.conditions.sensors.turns import IDENTITY, by, numbers_of, quaternion_of
-from sms_handover.types import BASE_NQ, BASE_NV, Array, freeze
+from sms_handover.types import BASE_NQ, Array, freeze
 
 STAR_TRACKER = "star_tracker"
 _STREAM = "sensors.star_tracker"
 _AXES = 3
-_TURNED, _RATE = slice(0, 4), slice(4, 7)  # in the numbers held
+_TURNED, _ORIENTATION_NOW = slice(0, 4), slice(4, 8)  # in the numbers held
 _ORIENTATION, _TURNED_THEN = slice(0, 4), slice(4, 8)  # in those of a sample
 
 
@@ -49,43 +48,46 @@ class StarTrackerValues:
 class StarTracker:
     """Orientations Q exp(s n + b); n is standard normal, drawn for each.
 
-    Known is the latest one, turned on since then by the gyro: Q exp(w(j) h) ... exp(w(k-1) h), with its
-    readings w held over each tick [Markley2014]; without a gyro it is held.
+    Known is the latest one, turned on by the gyro since then: Q exp(w(1) T) exp(w(2) T) ..., with readings w
+    each held for its period T [Markley2014]; without a gyro it is held.
     """
 
     def __init__(self, values: StarTrackerValues, setting: Setting) -> None:
-        self._values, self._h = values, setting.tick_s
+        self._values = values
         self._line = values.line(setting.tick_ns)
-        self._variance = np.concatenate([np.zeros(3), np.full(_AXES, values.noise**2)])
+        self._variance = np.concatenate([np.zeros(_AXES), np.full(_AXES, values.noise**2)])
         self._noise = setting.streams.noise(_STREAM, _AXES)
         self.reset()
 
     def reset(self) -> None:
         """Go back to the start of a run."""
-        self.memory = Memory(np.array([*IDENTITY, 0.0, 0.0, 0.0]))
+        self.memory = Memory(np.array([*IDENTITY, *IDENTITY]))
 
     def measure(self, truth: Truth, known: Known) -> Reading | None:
         """Put what is known of the orientation in the place of the true one."""
-        tick, line, held = truth.tick, self._line, self.memory.held
-        turned = quaternion_of(held[_TURNED]) * by(self._h * held[_RATE])
-        rate = known.v[3:BASE_NV] if known.has_rate else np.zeros(_AXES)
-        held = np.concatenate([numbers_of(turned), rate])
-        memory = Memory(held, self.memory.waiting, self.memory.latest)
+        tick, line, turned = truth.tick, self._line, self.memory.held[_TURNED]
+        if known.turned is not None:
+            turned = numbers_of(quaternion_of(turned) * by(known.turned))
+        memory = self.memory
         if line.measures(tick):
             error = self._values.noise * self._noise.normal(tick) + self._values.bias
             seen = numbers_of(quaternion_of(truth.q[3:BASE_NQ]) * by(error))
-            memory = line.put(memory, tick, np.concatenate([seen, held[_TURNED]]))
-        self.memory, came = line.arriving(memory, tick)
-        known.q[3:BASE_NQ] = self._orientation(turned)
+            memory = line.put(memory, tick, np.concatenate([seen, turned]))
+        memory, came = line.arriving(memory, tick)
+        if came or known.turned is not None or tick == 0:
+            memory = Memory(np.concatenate([turned, _since(memory, turned)]), memory.waiting, memory.latest)
+        self.memory = memory
+        known.q[3:BASE_NQ] = memory.held[_ORIENTATION_NOW]
         if came is None:
             return None
         pose = np.concatenate([truth.q[:3], came.values[_ORIENTATION]])
         return Reading(STAR_TRACKER, came.tick, pose, self._variance)
 
-    def _orientation(self, turned: pin.Quaternion) -> Array:
-        """Return the latest orientation, turned on by what the gyro has measured since it was."""
-        if self.memory.latest is None:
-            raise AssertionError("a star tracker measures in the first tick")
-        values = self.memory.latest.values
-        since = quaternion_of(values[_TURNED_THEN]).conjugate() * turned
-        return numbers_of(quaternion_of(values[_ORIENTATION]) * since)
+
+def _since(memory: Memory, turned: Array) -> Array:
+    """Return the latest orientation (4,), turned on by what a gyro has measured since it was."""
+    if memory.latest is None:
+        raise AssertionError("a star tracker measures in the first tick")
+    values = memory.latest.values
+    since = quaternion_of(values[_TURNED_THEN]).conjugate() * quaternion_of(turned)
+    return numbers_of(quaternion_of(values[_ORIENTATION]) * since)

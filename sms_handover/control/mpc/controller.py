@@ -12,12 +12,13 @@ from time import perf_counter
 import numpy as np
 import pinocchio as pin
 
-from sms_handover.control.disturbance_observer import memory_of, restore_memory
+from sms_handover.control.compensation import continued, memory_of, restore_memory
 from sms_handover.control.law import LawSetup
 from sms_handover.control.mpc.braking import braking_plan
 from sms_handover.control.mpc.horizon import Horizon
 from sms_handover.control.mpc.momentum import base_start, base_velocity
 from sms_handover.control.mpc.parameters import MpcGains
+from sms_handover.control.mpc.patience import Patience, PatienceState
 from sms_handover.control.mpc.plan import Plan
 from sms_handover.control.mpc.plan_problem import PlanProblem
 from sms_handover.control.mpc.plan_queue import PlanQueue
@@ -28,7 +29,7 @@ from sms_handover.control.mpc.quadratic_program import require_daqp
 from sms_handover.control.protocol import Guidance
 from sms_handover.errors import ConfigurationError
 from sms_handover.model.known_payload import EMPTY_HANDS, Grip, KnownPayload
-from sms_handover.plan_report import PlanReport, PlanStatus
+from sms_handover.plan_report import PlannedPaths, PlanReport, PlanStatus
 from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, PreviewState, frozen, read_only
 from sms_handover.units import ns_to_seconds, seconds_to_ns
 
@@ -37,8 +38,9 @@ from sms_handover.units import ns_to_seconds, seconds_to_ns
 class MpcState:
     """Everything that later efforts depend on: plans, counts, the preview, and the initial attitude (3, 3).
 
-    ``coming`` takes the place of ``plan`` when it begins; ``failures`` counts solves in a row without a plan;
-    ``news`` are grasps that count from the next state on, ``observed`` is the memory of the computed torque.
+    ``coming`` takes the place of ``plan`` when it begins; ``failures`` counts solves in a row without a plan,
+    ``patience`` has what comes of that;
+    ``news`` are grasps that count from the next state on, ``observed`` is the memory of the compensation.
     """
 
     phase_index: int
@@ -47,6 +49,7 @@ class MpcState:
     solves: int
     failures: int
     reused: int
+    patience: PatienceState
     initial_rotation: Array
     preview: PreviewState | None
     grip: Grip
@@ -65,9 +68,13 @@ class MpcController:
                 "control law 'mpc' needs a preview of targets and the distances of bodies"
             )
         self._gains, self._preview, self._make_efforts = setup.gains, setup.preview, setup.computed_torque
-        self._solver = PlanSolver(setup.robot, setup.deputy, setup.gains, setup.distances)
+        self._solver = PlanSolver(
+            setup.robot, setup.deputy, setup.gains, setup.distances, setup.compiled_derivatives
+        )
         self._period_ns, self._queue = setup.reference_ns, PlanQueue()
+        self._patience = Patience(setup.reference_ns)
         self._horizons: dict[MpcGains, Horizon] = {}
+        self._efforts = self._make_efforts(setup.robot)
         self._payload = KnownPayload(setup.robot, setup.deputy)
         self._rest = read_only(np.zeros(setup.robot.n_joints))  # N m
         period = ns_to_seconds(setup.reference_ns)
@@ -87,11 +94,14 @@ class MpcController:
         self._phase_index = 0
         self._queue.restore(None, None, 0)
         self._solves = self._failures = 0
+        self._patience.reset()
         self._initial_rotation: Array = np.zeros((3, 3))
         self._guidance: Guidance | None = None
         self._news: tuple[GraspEvent, ...] = ()
         self._hold(EMPTY_HANDS)
+        restore_memory(self._efforts, np.zeros(0))
         self._report: PlanReport | None = None
+        self._paths: PlannedPaths | None = None
 
     def guide(self, guidance: Guidance) -> None:
         """Plan for these targets at the next state."""
@@ -99,13 +109,19 @@ class MpcController:
         self._phase_index = guidance.phase.index
 
     def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
-        """Return the efforts (n,) N m for a state, read-only; zero until first guidance has come."""
+        """Return the efforts (n,) N m for a state, read-only; zero until first guidance has come.
+
+        Raises NoPlanError when the arms are at rest where there is no plan again and again.
+        """
         if self._news:
             self._heed_news(stamp_ns)
         self._queue.advance(stamp_ns)
         if self._guidance is not None:
             guidance, self._guidance = self._guidance, None
-            self._replan(stamp_ns, q, v, guidance)
+            if self._patience.is_over:
+                self._give_up(stamp_ns, q, v, guidance)
+            else:
+                self._replan(stamp_ns, q, v, guidance)
         plan = self._queue.plan
         if plan is None:
             return self._rest
@@ -123,6 +139,11 @@ class MpcController:
         report, self._report = self._report, None
         return report
 
+    def take_paths(self) -> PlannedPaths | None:
+        """Return the paths of the tools that are new since the last call, None if there are none."""
+        paths, self._paths = self._paths, None
+        return paths
+
     @property
     def plan(self) -> Plan | None:
         """The plan in use."""
@@ -138,6 +159,7 @@ class MpcController:
             self._solves,
             self._failures,
             self._queue.reused,
+            self._patience.state,
             read_only(self._initial_rotation),
             self._preview.state,
             self._payload.grip,
@@ -150,6 +172,7 @@ class MpcController:
         self.reset()
         self._queue.restore(state.plan, state.coming, state.reused)
         self._phase_index, self._solves, self._failures = state.phase_index, state.solves, state.failures
+        self._patience.restore(state.patience)
         self._initial_rotation = state.initial_rotation
         self._preview.restore(state.preview)
         self._news = state.news
@@ -169,7 +192,7 @@ class MpcController:
         """Go on with the dynamics of the robot with what an arm holds."""
         self._payload.hold(grip)
         self._robot = self._payload.robot
-        self._efforts = self._make_efforts(self._robot)
+        self._efforts = continued(self._make_efforts(self._robot), self._efforts)
         self._prediction = PredictionModel(self._robot)
 
     def _replan(self, stamp_ns: int, q: Array, v: Array, guidance: Guidance) -> None:
@@ -181,11 +204,18 @@ class MpcController:
         status = self._use(step, problem)
         self._report = self._reported(problem, status, step, perf_counter() - begun)
 
+    def _give_up(self, stamp_ns: int, q: Array, v: Array, guidance: Guidance) -> None:
+        """Raise NoPlanError once the arms are at rest, with the limit that they exceed even there."""
+        if self._patience.is_at_rest(stamp_ns, self._queue):
+            self._look_ahead(stamp_ns, q, v, guidance)
+            excess, row = self._solver.exceeded(self._problem(stamp_ns, q, v))
+            raise self._patience.error(stamp_ns, excess, row)
+
     def _look_ahead(self, stamp_ns: int, q: Array, v: Array, guidance: Guidance) -> None:
         """Take guidance; the first plan of a run is to rest where the joints are."""
         if self._queue.plan is None:
             self._initial_rotation = np.array(pin.Quaternion(q[3:BASE_NQ]).normalized().matrix())
-        self._preview.update(guidance.phase, guidance.reference, guidance.tool_in_world, q)
+        self._preview.update(guidance.phase, guidance.reference, guidance.tool_in_world, q, v)
         if self._queue.plan is None:
             self._queue.offer(self._braking(self._here(q, v), 0, stamp_ns))
 
@@ -217,12 +247,15 @@ class MpcController:
         status, most = step.solution.status, self._gains[problem.phase_index].failed_plans
         if status is PlanStatus.SOLVED:
             self._failures = 0
+            self._patience.solved(self._gains[problem.phase_index].plan_horizon)
             self._queue.offer(problem.plan(step))
             return status
         self._failures += 1
         self._queue.reused += 1
         if self._failures < most:
             return status
+        if self._failures % most == 0:
+            self._patience.brakes(step.solution)
         if self._failures == most:
             self._queue.offer(self._braking(problem.start, problem.number, problem.begin_ns))
         return PlanStatus.BRAKING
@@ -252,9 +285,11 @@ class MpcController:
         return PlanStart(joints, rates, replace(base, rotation=rotation, centre_of_mass=centre))
 
     def _reported(self, problem: PlanProblem, status: PlanStatus, step: Step, total: float) -> PlanReport:
-        """Return the report of a solve that took so many seconds in all."""
+        """Return the report of a solve that took so many seconds in all, and show its paths."""
         solution, plan = step.solution, self._queue.plan
         assert plan is not None
+        if step.paths:
+            self._paths = PlannedPaths(problem.stamp_ns, step.paths)
         return PlanReport(
             problem.stamp_ns,
             problem.number,

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from sms_handover.configuration.parameters import parameter
+from sms_handover.control.mpc.derivatives import LINEARISATIONS
 
 
 @dataclass(frozen=True)
@@ -74,13 +75,19 @@ class MpcGains:
     plan_velocity_gain: float = parameter(
         "mpc: feedback of joint rate about the plan", unit="1/s", minimum=0.0
     )
+    linearisation: str = parameter(
+        "mpc: derivatives of the dynamics; pinocchio: its analytic ones; compiled: the same as C code, made "
+        "once for this robot: faster, needs CasADi and a C compiler",
+        choices=LINEARISATIONS,
+    )
     program_iterations: int = parameter(
         "mpc: most iterations of the quadratic program; a solve that needs more gives no plan",
         minimum=1,
         maximum=100_000,
     )
     failed_plans: int = parameter(
-        "mpc: solves in a row without a plan after which the arms brake to rest and planning begins anew",
+        "mpc: solves in a row without a plan, in real time reference periods, after which the arms brake to "
+        "rest and planning begins anew",
         minimum=1,
         maximum=10_000,
     )

@@ -7,6 +7,8 @@ from sms_handover.control.mpc.planner import PlanStart, Step
 from sms_handover.model.known_payload import Grip
 from sms_handover.types import Array, PreviewedTargets, freeze
 
+_SHOWN_EVERY = 5  # [-] plans: ten times a second with shipped parameters, which viewers keep up with
+
 
 @dataclass(frozen=True, eq=False)
 class PlanProblem:
@@ -29,6 +31,11 @@ class PlanProblem:
 
     def __post_init__(self) -> None:
         freeze(self, "initial_rotation", "accelerations", "intervals")
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether the paths of the tools are asked for too."""
+        return self.number % _SHOWN_EVERY == 1
 
     def plan(self, step: Step) -> Plan:
         """Return the plan that a step gives whose program has been solved."""
