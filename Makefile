@@ -22,7 +22,7 @@ MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evi
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover figures report simulate test verify measure bench docs acceptance screenshots faults lowest cycles fuzz hostile soak reference clearance geometries crocoddyl masses effects scenarios engines evidence campaign lint install colcon clean
+.PHONY: help handover figures report simulate test verify measure bench docs acceptance screenshots faults lowest cycles fuzz hostile soak reference clearance geometries crocoddyl masses effects scenarios engines evidence campaign balancer lint install colcon clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -104,6 +104,12 @@ effects: install  ## run the smooth handover under each effect of conditions alo
 
 acceptance: install  ## run every scenario, nominal seeds and shares of friction under laws with a model, write docs/control.md
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m docs.acceptance
+
+balancer: $(VENV)/.test  ## measure base turn against tool error and clearance under examples/balancer, write docs/balancer.md
+	rm -rf build/balancer
+	$(PIP) --no-deps --target build/balancer ./examples/balancer
+	rm -rf examples/balancer/build examples/balancer/*.egg-info
+	PYTHONPATH=build/balancer OPENBLAS_NUM_THREADS=1 $(BIN)/python -m docs.balancer
 
 masses: install  ## hand over deputies of 1 to 24 kg, known to the law or not, write docs/deputy_with_mass.md
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m docs.masses

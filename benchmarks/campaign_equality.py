@@ -45,7 +45,7 @@ SEED = 500
 SCENARIO, LAWS, CONDITIONS = "smooth", ("nmpc", "pid"), "nominal"
 DRAWS: Mapping[str, Any] = {
     "truth.robot.base.mass": {"normal": {"mean": 240.0, "std": 12.0}},  # kg
-    "truth.deputy.in_world.xyz[0]": {"normal": {"mean": 1.05, "std": 0.002}},  # m
+    "truth.deputy.in_world.xyz[0]": {"normal": {"mean": 1.23, "std": 0.002}},  # m
     "conditions.friction.coulomb": {"uniform": {"low": 0.001, "high": 0.0025}},  # N m
     "conditions.torque.gain": {"normal": {"mean": 0.0, "std": 0.01}},  # of the torque constant
     "conditions.command.delay": {"choice": {"values": [0.001, 0.002]}},  # s

@@ -33,7 +33,7 @@ class Case:
 
     scenario: str
     weight: float
-    clearance: float
+    keep_apart: float
 
     @property
     def name(self) -> str:
@@ -62,7 +62,7 @@ class Outcome:
 WEIGHTS = tuple(Case(SHIPPED, weight, 0.02) for weight in (0.0, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7))
 ROOM = (
     *(Case(EARLIER, weight, 0.0) for weight in (0.0, 1e3, 1e5, 1e6, 1e7)),
-    *(Case(EARLIER, 1e7, clearance) for clearance in (0.05, 0.1, 0.15)),
+    *(Case(EARLIER, 1e7, apart) for apart in (0.05, 0.1, 0.15)),
 )
 
 
@@ -74,7 +74,7 @@ def outcome_of(case: Case) -> Outcome:
             "common": {"duration": SECONDS, "tick": TICK, "on_touch": "report"},
             "trajectory.time_law": "quintic",
             "law": "balancer",
-            "controller": {"base_turn_weight": case.weight, "clearance": case.clearance},
+            "controller": {"base_turn_weight": case.weight, "keep_apart": case.keep_apart},
         },
     )
     run, robot = simulate(scenario), scenario.truth.robot
@@ -97,7 +97,7 @@ def section(found: Mapping[Case, Outcome]) -> str:
     figures = ("Turn [deg]", "Turn rate [deg/s]", "Tool [mm]", "Grasp [mm]", "Rate of B [rad/s]", "B [mm]")
     weights = [(case.name, *_cells(found[case])) for case in WEIGHTS]
     room = [
-        (case.name, f"{case.clearance * MM_PER_M:.0f}", *_cells(found[case]), _bodies(found[case].active))
+        (case.name, f"{case.keep_apart * MM_PER_M:.0f}", *_cells(found[case]), _bodies(found[case].active))
         for case in ROOM
     ]
     held, best = (min(found[case].turn for case in WEIGHTS if test(case)) for test in (_holds, _balances))
@@ -109,7 +109,7 @@ rate of arm B, and the last column how near arm B came to anything else.
 
 ![Base turn against tool error, and against clearance](images/balancer.svg)
 
-Scenario `{SHIPPED}`, `clearance` of 20 mm. With the idle arm held the base turns by {held:.2f} degrees, with
+Scenario `{SHIPPED}`, `keep_apart` of 20 mm. With the idle arm held the base turns by {held:.2f} degrees, with
 the balancer by down to {best:.3f}:
 
 {table(("Arm B", *figures), weights)}
@@ -117,7 +117,7 @@ the balancer by down to {best:.3f}:
 Scenario `{EARLIER}` with smooth targets, the geometry in which an earlier prototype was measured; the
 gripper of A keeps 1 mm from the deputy, where the grasp frame is on its face, hence the error at the grasp:
 
-{table(("Arm B", "Clearance", *figures, "B is kept from"), room)}
+{table(("Arm B", "Apart [mm]", *figures, "B is kept from"), room)}
 """
 
 
@@ -159,11 +159,11 @@ def draw(found: Mapping[Case, Outcome], file: Path) -> None:
     left.set_xlabel("largest turn of the base [deg]")
     left.set_ylabel("largest tool error [mm]")
     left.set_title(f"{SHIPPED}, by weight")
-    free = [case for case in ROOM if case.clearance == 0.0]
+    free = [case for case in ROOM if case.keep_apart == 0.0]
     kept = [case for case in ROOM if case.weight == max(case.weight for case in ROOM)]
     for cases, label, color in (
-        (free, "by weight, clearance 0", "#0072b2"),
-        (kept, "by clearance", "#d55e00"),
+        (free, "by weight, keep_apart 0", "#0072b2"),
+        (kept, "by keep_apart, 0 to 0.15 m", "#d55e00"),
     ):
         ordered = sorted(cases, key=lambda case: found[case].turn)
         turns, least = ([getattr(found[case], name) for case in ordered] for name in ("turn", "least"))

@@ -6,6 +6,9 @@ MOTION, CONSERVED = "sms_motion", "sms_conserved"
 TICKS, WORK_SIZE = "sms_ticks", "sms_work_size"  # the loop, and the numbers that it needs room for
 
 
+LINEARISATION = "sms_linearisation"
+
+
 def rest_name(scheme: str) -> str:
     """Return the name of the function that steps by a scheme after its first stage has been prepared."""
     return f"sms_rest_{scheme}"

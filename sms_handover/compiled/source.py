@@ -39,7 +39,7 @@ def dynamics_source(bodies: Sequence[Body], tools: Sequence[Tool], schemes: Mapp
         _computed_torque(bodies),
         _computed_torque(bodies, by),
         *(_loaded_torque(bodies, arm, tool.body) for arm, tool in enumerate(tools)),
-        *kinematics_functions(tools, angles, v, *_with_parameters(bodies)),
+        *kinematics_functions(tools, angles, v, *with_parameters(bodies)),
     ]
     generator = ca.CodeGenerator("dynamics", {"with_header": False})
     for function in functions:
@@ -62,14 +62,18 @@ def dynamics_source(bodies: Sequence[Body], tools: Sequence[Tool], schemes: Mapp
     }
     lines = [f"#define {name} {value}" for name, value in definitions.items()]
     native = [(_NATIVE / f"{name}.c").read_text(encoding="ascii") for name in _NATIVE_FILES]
-    own = (_NATIVE / "sine_cosine.c").read_text(encoding="ascii")
-    return "\n".join((own, generator.dump(), *lines, *native))
+    return "\n".join((own_sine_cosine(), generator.dump(), *lines, *native))
+
+
+def own_sine_cosine() -> str:
+    """Return the C code of sine and cosine that all generated code uses."""
+    return (_NATIVE / "sine_cosine.c").read_text(encoding="ascii")
 
 
 def _acceleration(bodies: Sequence[Body]) -> Acceleration:
     """Return the functions for v' by the mass matrix, and by articulated bodies for later stages."""
     turn, v, force = _symbols(bodies)
-    parameters, known = _with_parameters(bodies)
+    parameters, known = with_parameters(bodies)
     robot = RigidBodies(known, *turn, v)
     factors, bias = robot.inertia_factors(), robot.bias()
     numbers = _kept(bias, factors)
@@ -98,7 +102,7 @@ def _computed_torque(bodies: Sequence[Body], by: Acceleration | None = None) -> 
     With ``by`` the numbers that its first stage keeps are a second result.
     """
     turn, v, _ = _symbols(bodies)
-    parameters, known = _with_parameters(bodies)
+    parameters, known = with_parameters(bodies)
     joints = len(bodies) - 1
     wanted = ca.SX.sym("wanted", joints)
     robot = RigidBodies(known, *turn, v)
@@ -118,7 +122,7 @@ def _loaded_torque(bodies: Sequence[Body], arm: int, last: int) -> Any:
     and the numbers that the first stage keeps by the truth.
     """
     turn, v, _ = _symbols(bodies)
-    parameters, known = _with_parameters(bodies)
+    parameters, known = with_parameters(bodies)
     joints = len(bodies) - 1
     wanted = ca.SX.sym("wanted", joints)
     own = [ca.SX.sym(name, PER_BODY) for name in ("in_truth", "in_model")]
@@ -145,7 +149,7 @@ def _by_feedback(name: str, inner: Any, joints: int, numbers: Sequence[int]) -> 
     return ca.Function(name, given, list(results) if inner.n_out() > 1 else [results])
 
 
-def _with_parameters(bodies: Sequence[Body]) -> tuple[Any, tuple[Body, ...]]:
+def with_parameters(bodies: Sequence[Body]) -> tuple[Any, tuple[Body, ...]]:
     """Return inertial parameters (11 N,), and the bodies that have them in place of numbers."""
     parameters = ca.SX.sym("parameters", PER_BODY * len(bodies))
     known = (

@@ -68,7 +68,9 @@ class MpcController:
                 "control law 'mpc' needs a preview of targets and the distances of bodies"
             )
         self._gains, self._preview, self._make_efforts = setup.gains, setup.preview, setup.computed_torque
-        self._solver = PlanSolver(setup.robot, setup.deputy, setup.gains, setup.distances)
+        self._solver = PlanSolver(
+            setup.robot, setup.deputy, setup.gains, setup.distances, setup.compiled_derivatives
+        )
         self._period_ns, self._queue = setup.reference_ns, PlanQueue()
         self._patience = Patience(setup.reference_ns)
         self._horizons: dict[MpcGains, Horizon] = {}
