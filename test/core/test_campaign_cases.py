@@ -100,6 +100,9 @@ def test_masses_are_read_back_from_what_the_plant_integrates() -> None:
     [
         ("conditions.friction.viscous", 0.1),
         ("conditions.command.delay", 0.004),
+        ("conditions.sensors.encoders.step", 3e-5),
+        ("conditions.sensors.gyro.bias[1]", 1e-5),
+        ("conditions.sensors.vision.latency", 0.2),
         ("conditions.model_error.base.mass", 0.02),
     ],
 )

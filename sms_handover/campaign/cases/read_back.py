@@ -178,10 +178,14 @@ def _of_conditions(world: World, steps: Sequence[str]) -> Any:
     """Return a value of the conditions; of one that every joint has, that of the first."""
     if steps[0] == "model_error":
         return getattr(getattr(world.model_error, steps[1]), steps[2])
-    if steps[0] not in ("friction", "torque", "command"):
+    if steps[0] == "sensors":
+        values, rest = world.conditions.sensors[steps[1]], steps[2:]
+    elif steps[0] in ("friction", "torque", "command"):
+        values, rest = getattr(world.conditions, steps[0]), steps[1:]
+    else:
         raise KeyError(steps[0])
-    value = getattr(getattr(world.conditions, steps[0]), steps[1])
-    return float(value[int(steps[2]) if len(steps) > 2 else 0]) if isinstance(value, np.ndarray) else value
+    value = getattr(values, rest[0])
+    return float(value[int(rest[1]) if len(rest) > 1 else 0]) if isinstance(value, np.ndarray) else value
 
 
 def _of_schedule(world: World, steps: Sequence[str]) -> Any:
