@@ -23,9 +23,7 @@ from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.wiring import gains_by_phase, initial_joints
 from sms_handover.types import Array, Pose, PreviewedTargets, Twist
 
-crocoddyl: Any = pytest.importorskip(
-    "crocoddyl", reason="make crocoddyl has it, beside its Pinocchio"
-)
+crocoddyl: Any = pytest.importorskip("crocoddyl", reason="make crocoddyl has it, beside its Pinocchio")
 
 _TWIST = np.array([0.004, -0.003, 0.002, 0.01, -0.02, 0.015])  # m/s, rad/s
 _ROUNDS = 30  # [-] of either solver; they converge in fewer
