@@ -1,5 +1,6 @@
 """Conditioned stepper: steps of the robot under friction and under wrenches from outside."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,6 +19,7 @@ from sms_handover.plant.integrators import Tableau
 from sms_handover.plant.joint_friction import JointFriction
 from sms_handover.plant.stepper import Stepper
 from sms_handover.types import Array, frozen
+from sms_handover.units import ns_to_seconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,12 +30,32 @@ class Resistance:
     wrenches: Sequence[WrenchModel]
 
 
-class ConditionedStepper:
+class ResistedStepper(ABC):
+    """Steps in which something acts beside the motors, and what came of the latest one."""
+
+    @abstractmethod
+    def begin(self, start_ns: int) -> None:
+        """Tell when the next step begins."""
+
+    @abstractmethod
+    def step(self, q: Array, v: Array, effort: Array) -> tuple[Array, Array]:
+        """Return q (7 + n,) and v (6 + n,) after a step under joint efforts (n,), as read-only arrays."""
+
+    @property
+    @abstractmethod
+    def lost(self) -> float:
+        """Energy in J that friction has taken in the latest step: -tau . dq, exact as tau is held."""
+
+    @abstractmethod
+    def given(self, before: ExternalAccount, companion: Companion | None = None) -> ExternalAccount:
+        """Return an account of what wrenches have given, after the latest step."""
+
+
+class ConditionedStepper(ResistedStepper):
     """Steps of ``h`` s by another stepper, with friction torques held over the step, and wrenches.
 
     Under wrenches the step is that of :class:`~sms_handover.plant.external_wrenches.WrenchStepper`. Of the
-    latest step it knows what friction has taken and what the wrenches have given. ``start_s`` is the time at
-    which the next step begins. Not thread-safe.
+    latest step it knows what friction has taken and what the wrenches have given. Not thread-safe.
     """
 
     def __init__(
@@ -42,9 +64,13 @@ class ConditionedStepper:
         self._robot, self._resistance, self._inner, self._h = robot, resistance, inner, h
         self._under_wrench = WrenchStepper(robot, tableau, h) if resistance.wrenches else None
         self._generalized = np.zeros(robot.pin.nv)
-        self.start_s = 0.0
+        self._start_s = 0.0
         self._start = self._end = (np.zeros(0), np.zeros(0))
         self._friction: Array | None = None
+
+    def begin(self, start_ns: int) -> None:
+        """Tell when the next step begins."""
+        self._start_s = ns_to_seconds(start_ns)
 
     def step(self, q: Array, v: Array, effort: Array) -> tuple[Array, Array]:
         """Return q (7 + n,) and v (6 + n,) after a step under joint efforts (n,), as read-only arrays."""
@@ -54,7 +80,7 @@ class ConditionedStepper:
         wrench = None
         if under_wrench:
             body = robot_as_body(robot, q, v)
-            wrench = sum_over(resistance.wrenches, self.start_s, self._h, body)
+            wrench = sum_over(resistance.wrenches, self._start_s, self._h, body)
             generalized[:3] = body.rotation.T @ wrench.force
             generalized[3:BASE_NV] = body.rotation.T @ wrench.torque
         total, self._friction = effort, None

@@ -8,7 +8,7 @@ from sms_handover.conditions.random_streams import RandomStreams
 from sms_handover.errors import ConfigurationError
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.command_path import CommandPath, CommandsOnTheWay
-from sms_handover.plant.conditioned_stepper import ConditionedStepper, Resistance
+from sms_handover.plant.conditioned_stepper import ConditionedStepper, Resistance, ResistedStepper
 from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics
 from sms_handover.plant.external_wrenches import NO_ACCOUNT, Companion, ExternalAccount
 from sms_handover.plant.integrators import Tableau
@@ -39,69 +39,70 @@ class PlantEffects:
         self._h = ns_to_seconds(tick_ns)
         self._delay = _in_ticks(conditions.command or CommandErrors(), tick_ns)
         friction = JointFriction(conditions.friction, self._h) if conditions.friction else None
-        self._resistance = Resistance(friction, tuple(conditions.wrenches.values()))
-        self._stepper: ConditionedStepper | None = None
-        self._path: CommandPath | None = None
-        self._motor: MotorTorque | None = None
+        self.resistance = Resistance(friction, tuple(conditions.wrenches.values()))
+        self._stepper: ResistedStepper | None = None
+        self.path: CommandPath | None = None
+        self.motor: MotorTorque | None = None
         self.external = NO_ACCOUNT
         self.seed(seed)
 
     @property
     def has_wrenches(self) -> bool:
         """Whether wrenches from outside act."""
-        return bool(self._resistance.wrenches)
+        return bool(self.resistance.wrenches)
 
     def reset(self) -> None:
         """Go back to the start of a run."""
-        if self._path:
-            self._path.reset()
+        if self.path:
+            self.path.reset()
         self.external = NO_ACCOUNT
 
     def seed(self, seed: int) -> None:
         """Let every random stream follow from a seed, from the start of a run on."""
         streams, conditions = RandomStreams(seed), self._conditions
         if conditions.command:
-            self._path = CommandPath(self._joints, self._delay, conditions.command.dropped, streams)
+            self.path = CommandPath(self._joints, self._delay, conditions.command.dropped, streams)
         if conditions.torque:
-            self._motor = MotorTorque(conditions.torque, self._h, streams)
+            self.motor = MotorTorque(conditions.torque, self._h, streams)
         self.reset()
 
     @property
     def state(self) -> EffectsState:
         """What the later motion depends on besides seed and tick."""
-        return EffectsState(self._path.state if self._path else None, self.external)
+        return EffectsState(self.path.state if self.path else None, self.external)
 
     def restore(self, state: EffectsState) -> None:
         """Go back to a former :attr:`state`; raises ConfigurationError if it is of other conditions."""
-        if (state.commands is None) != (self._path is None):
+        if (state.commands is None) != (self.path is None):
             raise ConfigurationError("the snapshot is of other conditions: its commands take another way")
-        if self._path and state.commands:
-            self._path.state = state.commands
+        if self.path and state.commands:
+            self.path.state = state.commands
         self.external = state.external
 
     def dynamics(self, inner: MakeDynamics, tableau: Tableau) -> MakeDynamics:
         """Return what makes dynamics with these effects out of others."""
-        resistance = self._resistance
+        resistance = self.resistance
         if not (resistance.friction or resistance.wrenches):
             return inner
 
         def make(robot: RobotModel) -> PlantDynamics:
             bare = inner(robot)
-            stepper = ConditionedStepper(robot, resistance, bare.stepper, tableau, self._h)
-            return PlantDynamics(stepper, bare.kinematics)
+            stepper = bare.resisted(resistance) if bare.resisted else None
+            ours = stepper or ConditionedStepper(robot, resistance, bare.stepper, tableau, self._h)
+            return PlantDynamics(ours, bare.kinematics)
 
         return make
 
     def torque(self, tick: int, command: Array) -> Array:
         """Return the torques (n,) N m of the motors in a tick in which a command is given."""
-        arrived = self._path.arriving(tick, command) if self._path else command
-        return self._motor.given(tick, arrived) if self._motor else arrived
+        arrived = self.path.arriving(tick, command) if self.path else command
+        return self.motor.given(tick, arrived) if self.motor else arrived
 
     def begins(self, tick: int, stepper: object) -> None:
         """Tell the stepper of the tick when it begins."""
-        self._stepper = stepper if isinstance(stepper, ConditionedStepper) else None
+        self._stepper = stepper if isinstance(stepper, ResistedStepper) else None
         if self._stepper:
-            self._stepper.start_s = ns_to_seconds(tick * self._tick_ns)
+            self._stepper.begin(tick * self._tick_ns)
 
     def settle(self, companion: Companion | None) -> float:
         """Book what wrenches have given in the tick, and return what friction has taken, in J.

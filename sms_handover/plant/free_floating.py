@@ -226,9 +226,14 @@ class FreeFloatingPlant:
         return self._effects.external.work if self._effects else 0.0
 
     @property
-    def is_ideal(self) -> bool:
-        """Whether the conditions are ideal: commands are the efforts, and nothing else acts."""
-        return self._effects is None
+    def enforces_limits(self) -> bool:
+        """Whether joints are kept within their limits."""
+        return self._enforces
+
+    @property
+    def effects(self) -> PlantEffects | None:
+        """The effects of conditions that are not ideal, which compiled ticks take over and give back."""
+        return self._effects
 
     @property
     def external_impulse(self) -> ExternalAccount | None:
@@ -323,7 +328,7 @@ class FreeFloatingPlant:
             q, v, effort, lost = self._enforced.step(before, self.v, effort)
             self._losses += lost
         if effects:
-            self._losses += effects.settle(self._companion)
+            self._losses += effects.settle(self.companion)
         for part in (effort * (q[BASE_NQ:] - before[BASE_NQ:])).tolist():
             self._work += part
         self.q, self.v, self.joint_effort = q, v, effort
@@ -332,13 +337,21 @@ class FreeFloatingPlant:
             self._deputy.drift(self._tick_s)
 
     def adopt(
-        self, steps: int, q: Array, v: Array, joint_effort: Array, work: float, saturated: Counts
+        self,
+        steps: int,
+        q: Array,
+        v: Array,
+        joint_effort: Array,
+        work: float,
+        losses: float,
+        saturated: Counts,
     ) -> None:
-        """Take over the state that ``steps`` ticks have led to elsewhere, with the work since the start.
+        """Take over what ``steps`` ticks have led to elsewhere, with work and losses since the start.
 
         The arrays are read-only; ``saturated`` (n,) has the ticks of each joint at its effort limit.
         """
         self.tick += steps
+        self._losses = losses
         self.q, self.v, self.joint_effort, self._work = q, v, joint_effort, work
         self._saturated_ticks += saturated
         if not self._deputy.holder:
@@ -366,7 +379,7 @@ class FreeFloatingPlant:
         return dynamics, EnforcedLimits(robot, dynamics.stepper, self._rated_speed, self._tick_s)
 
     @property
-    def _companion(self) -> Companion | None:
+    def companion(self) -> Companion | None:
         """The deputy where it floats and has mass."""
         deputy = self._deputy
         if not isinstance(deputy, RigidDeputy) or deputy.holder:

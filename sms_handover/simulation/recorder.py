@@ -17,6 +17,7 @@ from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, PlanReport, 
 _BY_PERIOD = (
     *("reference_position", "reference_velocity", "deputy_pose", "deputy_twist"),
     *("linear_momentum", "angular_momentum", "kinetic_energy", "work", "external_work", "lost"),
+    *("linear_impulse", "angular_impulse"),
 )
 _NONE = np.zeros(3)  # [N s], [N m s]
 _NOT_ASKED = -1  # in place of a status where inverse kinematics was not asked
@@ -115,8 +116,6 @@ class RunRecorder:
         for name in _BY_PERIOD:
             self._periods[name].append(getattr(rows, name))
         self._periods["reference_ns"].append(rows.stamp_ns)
-        for name in ("linear_impulse", "angular_impulse"):  # in C nothing acts from outside
-            self._periods[name].append(np.zeros((len(rows.stamp_ns), 3)))
         status = [CONSTANTS[status] if status else _NOT_ASKED for status in rows.ik_status]
         self._periods["ik_status"].append(np.array(status))
         for arm in self._arms:

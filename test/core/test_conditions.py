@@ -101,10 +101,10 @@ def test_one_effect_moves_no_draw_of_another() -> None:
         found["model_error.links"] = [link.inertia.com for arm in robot.arms for link in arm.links]
         found["model_error.mounts"] = [arm.mount.rpy for arm in robot.arms]
         effects = loop._plant._effects
-        if effects and effects._motor:
-            found["torque.noise_density"] = [effects._motor._noise.normal(k).tolist() for k in range(5)]
-        if effects and effects._path:
-            found["command.dropped"] = [effects._path._losses.uniform(k).tolist() for k in range(5)]
+        if effects and effects.motor:
+            found["torque.noise_density"] = [effects.motor._noise.normal(k).tolist() for k in range(5)]
+        if effects and effects.path:
+            found["command.dropped"] = [effects.path._losses.uniform(k).tolist() for k in range(5)]
         return found
 
     random = [name for name in EFFECTS if name.startswith(("model_error", "torque.n", "command.d"))]

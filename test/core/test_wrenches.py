@@ -37,7 +37,7 @@ def _moved(
     stepper = ConditionedStepper(robot, Resistance(None, models), inner, TABLEAUS["rk4"], tick)
     (q, v), account = start, NO_ACCOUNT
     for k in range(ticks):
-        stepper.start_s = k * tick
+        stepper.begin(round(k * tick * 1e9))
         q, v = stepper.step(q, v, np.zeros(robot.n_joints))
         account = stepper.given(account)
     return q, v, account
