@@ -21,7 +21,7 @@ MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evi
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover figures report simulate test verify measure bench docs screenshots faults lowest cycles fuzz hostile soak reference clearance geometries masses effects scenarios engines evidence lint install colcon clean
+.PHONY: help handover figures report simulate test verify measure bench docs screenshots faults lowest cycles fuzz hostile soak reference clearance geometries masses effects scenarios engines evidence campaign lint install colcon clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -63,7 +63,7 @@ faults: $(VENV)/.test  ## inject every fault, check what is promised for it, wri
 
 docs: $(VENV)/.docs  ## build the documentation as a site, every warning an error, and look at it in a browser
 	rm -rf build/docs docs/api
-	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -d build/docs/doctrees docs $(SITE)
+	$(BIN)/python -m sphinx --jobs auto --fail-on-warning --keep-going --quiet -d build/docs/doctrees docs $(SITE)
 	$(BIN)/python -m pytest test/site --site $(SITE)
 	@echo "The site begins at $(SITE)/index.html"
 
@@ -93,6 +93,9 @@ geometries: install  ## try random possible geometries of the handover under bot
 
 evidence: $(VENV)/.test  ## run the campaign of the control laws, about ten minutes, and write docs/laws.md
 	$(BIN)/python -m docs.evidence
+
+campaign: $(VENV)/.test  ## compare 1000 runs of a campaign bit for bit, however they are run or killed, write docs/campaigns.md
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.campaign_equality
 
 effects: install  ## run the smooth handover under each effect of conditions alone, write docs/conditions.md
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m docs.effects
@@ -163,9 +166,9 @@ $(VENV)/.verify: $(VENV)/.test
 	$(PIP) --editable '.[analysis,ros,test,verify]'
 	@touch $@
 
-$(VENV)-basilisk/.engines: $(METADATA)
+$(VENV)-basilisk/.engines: $(METADATA) .ci/basilisk.txt
 	$(PYTHON) -m venv $(VENV)-basilisk
-	$(VENV)-basilisk/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[basilisk,mpc,mujoco]' 'pytest>=8.4'
+	$(VENV)-basilisk/bin/python -m pip install --quiet --disable-pip-version-check --constraint .ci/basilisk.txt --editable '.[basilisk,mpc,mujoco]' 'pytest>=8.4'
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.test

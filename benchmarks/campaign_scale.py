@@ -1,18 +1,24 @@
 """How campaigns scale: rate, memory and bytes per case of the driver over tiny cases; overhead of workers.
 
-``python -m benchmarks.campaign_scale`` measures and writes docs/scale.md.
+``python -m benchmarks.campaign_scale`` measures and writes docs/scale.md; ``--largest 1000 --seconds 0.2
+--print`` is a quick look.
 """
 
 import json
+import logging
 import resource
 import subprocess
 import sys
 import tempfile
 import time
 from argparse import ArgumentParser
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
+
+import distributed
 
 from benchmarks.campaign_stub import row_text
 from benchmarks.machine import load_average, machine
@@ -20,7 +26,7 @@ from benchmarks.results import ROOT
 from docs.tables import table
 from sms_handover.campaign.cases.case_process import Done
 from sms_handover.campaign.cases.case_row import Beside, Task, row_of
-from sms_handover.campaign.definition.frozen import freeze
+from sms_handover.campaign.definition.frozen import Frozen, freeze
 from sms_handover.campaign.engine.dask_workers import DaskWorkers
 from sms_handover.campaign.engine.run import run_campaign
 from sms_handover.campaign.record.campaign_folder import open_campaign
@@ -30,10 +36,16 @@ from sms_handover.campaign.record.manifest import Shard
 
 PAGE = ROOT / "docs" / "scale.md"
 CASES = (100, 1000, 10_000, 100_000)
-WORKERS = (1, 2)
-_CASE_S = 0.5  # [s] that a stub takes for a case with workers
-_PER_WORKER = 16  # [-] cases for each of them
-_KB, _MB = 1e3, 1e6  # [byte]
+CHUNK = 50  # [-] cases that come together, as those of a cluster do where they are tiny
+ALONE = 1000  # [-] cases that come one by one
+WORKERS = (1, 2, 4, 8, 16, 32, 64)
+_PROCESSES = 2  # of workers; of more workers each is a thread of them, with a process of cases of its own
+_CASE_S = 3.0  # [s] that a stub sleeps for a case
+_PER_WORKER = 8  # [-] cases for each worker
+_GB, _MB, _MS = 1e9, 1e6, 1e3
+_H = 3600.0  # [s]
+_TASKS = (300.0, 700.0)  # [1/s] that the scheduler of Dask takes
+_TASK_S = 2.0  # [s] of work in one of them
 _FILE = """\
 name: scale
 seed: 1
@@ -43,128 +55,232 @@ laws: [nmpc]
 
 
 class Driver(NamedTuple):
-    """What so many tiny cases cost the driver: rows per second, peak memory MB, bytes per row."""
+    """What so many tiny cases cost the driver: rows per second, bytes per row, and peaks of memory in MB.
+
+    ``running`` is while all of them are run, ``resumed`` once a journal that has them all was opened again,
+    ``reading`` once its table was made of all rows.
+    """
 
     cases: int
     rate: float
-    memory: float
+    running: float
+    resumed: float
+    reading: float
     journal: float
     parquet: float
 
 
 class Stubs:
-    """Workers that have every row at once."""
+    """Workers that have every row at once, so many together."""
 
-    def run(self, tasks: Iterable[Task]) -> Iterator[Done]:
+    def __init__(self, together: int) -> None:
+        """Take how many rows come together."""
+        self._together = together
+
+    def run(self, tasks: Iterable[Task]) -> Iterator[Sequence[Done]]:
         """Yield made-up rows."""
-        for task in tasks:
-            yield Done(row_of(json.loads(row_text(*task))), Beside(0.0, 0.0, "stub"))
+        left = iter(tasks)
+        while chunk := list(islice(left, self._together)):
+            yield [Done(row_of(json.loads(row_text(*task))), Beside(0.0, 0.0, "stub")) for task in chunk]
 
     def close(self) -> None:
         """There is nothing to end."""
 
 
-def driver(cases: int) -> Driver:
+def frozen_in(folder: Path) -> Frozen:
+    """Return the campaign of the stubs, written to a folder."""
+    file = folder / "scale.yaml"
+    file.write_text(_FILE, encoding="utf-8")
+    return freeze(file)[0]
+
+
+def driver(cases: int, together: int) -> Driver:
     """Measure a campaign of so many tiny cases in this process."""
     with tempfile.TemporaryDirectory() as scratch:
-        file, folder = Path(scratch) / "scale.yaml", Path(scratch) / "out"
-        file.write_text(_FILE, encoding="utf-8")
-        frozen, _ = freeze(file)
+        folder, parquet = Path(scratch) / "out", Path(scratch) / "cases.parquet"
+        frozen = frozen_in(Path(scratch))
+        begin = time.perf_counter()
         with open_campaign(folder, frozen, cases, Shard()) as opened:
-            begin = time.perf_counter()
-            run_campaign(opened, Stubs, lambda tally: None)
-            rate = cases / (time.perf_counter() - begin)
-            memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / _MB
-            write_table(Path(scratch) / "cases.parquet", opened.entries())
-        sizes = [path.stat().st_size / cases for path in (folder / JOURNAL, Path(scratch) / "cases.parquet")]
-    return Driver(cases, rate, memory, *sizes)
+            run_campaign(opened, lambda: Stubs(together), lambda tally: None)
+        rate, running = cases / (time.perf_counter() - begin), peak_mb()
+        with open_campaign(folder, frozen, cases, Shard()) as opened:
+            run_campaign(opened, lambda: Stubs(together), lambda tally: None)  # nothing is left to do
+        resumed = peak_mb()
+        write_table(parquet, opened.entries())
+        sizes = [path.stat().st_size / cases for path in (folder / JOURNAL, parquet)]
+    return Driver(cases, rate, running, resumed, peak_mb(), *sizes)
 
 
-def overhead(workers: int) -> float:
-    """Return the wall time in s that a case takes beyond its own, with so many workers of a cluster here."""
-    stub = (sys.executable, "-m", "benchmarks.campaign_stub", str(_CASE_S))
-    cases = _PER_WORKER * workers
-    with tempfile.TemporaryDirectory() as scratch:
-        file = Path(scratch) / "scale.yaml"
-        file.write_text(_FILE, encoding="utf-8")
-        frozen, _ = freeze(file)
-        made = DaskWorkers(frozen, cases + workers, workers=workers, program=stub)
+def peak_mb() -> float:
+    """Return the largest resident memory that this process has had, in MB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / _MB
+
+
+@contextmanager
+def cluster(frozen: Frozen, cases: int, workers: int, seconds: float) -> Iterator[DaskWorkers]:
+    """Yield workers with stubs that sleep: a process each, or threads of a few where they are many."""
+    stub = (sys.executable, "-m", "benchmarks.campaign_stub", str(seconds))
+    if workers <= _PROCESSES:
+        made = DaskWorkers(frozen, cases, workers=workers, program=stub)
         try:
-            for _ in made.run(Task(case, "smooth", "nmpc") for case in range(workers)):  # processes start
-                pass
-            begin = time.perf_counter()
-            for _ in made.run(Task(case, "smooth", "nmpc") for case in range(cases)):
-                pass
-            return (time.perf_counter() - begin) / _PER_WORKER - _CASE_S
+            yield made
+        finally:
+            made.close()
+        return
+    with distributed.LocalCluster(  # type: ignore[no-untyped-call]
+        n_workers=_PROCESSES,
+        threads_per_worker=workers // _PROCESSES,
+        host="127.0.0.1",
+        dashboard_address=None,
+        memory_limit=None,
+        silence_logs=logging.CRITICAL,
+    ) as there:
+        made = DaskWorkers(frozen, cases, scheduler=there.scheduler_address, program=stub)
+        try:
+            yield made
         finally:
             made.close()
 
 
-def page(drivers: Iterable[Driver], overheads: Iterable[tuple[int, float]]) -> str:
+def overhead(workers: int, seconds: float) -> float:
+    """Return the wall time in s that a case takes beyond its own, with so many workers."""
+    cases = _PER_WORKER * workers
+    tasks = [Task(case, "smooth", "nmpc") for case in range(cases)]
+    with (
+        tempfile.TemporaryDirectory() as scratch,
+        cluster(frozen_in(Path(scratch)), cases, workers, seconds) as made,
+    ):
+        for _ in made.run(tasks[: 2 * workers]):  # until the processes have started
+            pass
+        begin = time.perf_counter()
+        for _ in made.run(tasks):
+            pass
+        return (time.perf_counter() - begin) / _PER_WORKER - seconds
+
+
+def page(
+    drivers: Sequence[Driver], alone: Driver, overheads: Sequence[tuple[int, float]], seconds: float
+) -> str:
     """Return the text of the page."""
-    measured = list(drivers)
     rows = [
-        (f"{one.cases:,}", f"{one.rate:.0f}", f"{one.memory:.0f}", f"{one.journal:.0f}", f"{one.parquet:.0f}")
-        for one in measured
+        (f"{one.cases:,}", *(f"{number:.0f}" for number in one[1:5]), *(f"{size:.0f}" for size in one[5:]))
+        for one in drivers
     ]
     added = [
-        (str(workers), f"{1e3 * more:.0f}", *(f"{case / (case + more):.3f}" for case in (_CASE_S, 3.0)))
+        (str(workers), f"{_MS * more:.0f}", f"{seconds / (seconds + more):.3f}")
         for workers, more in overheads
     ]
-    last = measured[-1]
-    million = 1e6 * last.journal / _MB
+    first, last = drivers[-2], drivers[-1]
+    per_row = (last.reading - first.reading) * _MB / (last.cases - first.cases)
+    again = (last.resumed - first.resumed) * _MB / (last.cases - first.cases)
+    paper = [
+        (
+            f"{cases:.0e}".replace("e+0", "e"),
+            f"{cases * seconds / _H:,.0f}",
+            f"{cases * last.journal / _GB:.1f}",
+            f"{cases / last.rate / _H:.1f}",
+            f"{cases * again / _GB:.1f}",
+            f"{cases * per_row / _GB:.1f}",
+        )
+        for cases in (1e5, 1e6, 1e7)
+    ]
     load = f"Load: {load_average():.0f} processes wanted to run; more than there are cores make all slower"
     lines = "\n".join(f"- {line}" for line in (*machine(), load))
-    minutes, hours, pace = 1e6 / last.rate / 60.0, 3e6 / 64.0 / 3600.0, 64.0 / 3.0
+    memory = ["Running [MB]", "Opened again [MB]", "All rows read [MB]"]
+    head = ["Cases", "Rows per second", *memory, "Journal [byte per row]", "Parquet [byte per row]"]
+    paper_head = [
+        "Cases",
+        "Core hours",
+        "Journal [GB]",
+        "Hours of driver",
+        "Opened again [GB]",
+        "All read [GB]",
+    ]
+    few, many = (f"{rate * _TASK_S:.0f}" for rate in _TASKS)
+    flat = last.running / next(one for one in drivers if one.cases >= CASES[1]).running
+    cores, most = f"{last.rate * seconds:,.0f}", WORKERS[-1]
     return f"""\
 # Scale of campaigns
 
 This page is written by `python -m benchmarks.campaign_scale`. Nothing is simulated in it: stubs answer at
-once, so that what is measured is the driver of a [campaign](campaigns.md), and then after {_CASE_S:g} s, so
+once, so that what is measured is the driver of a [campaign](campaigns.md), and then after {seconds:g} s, so
 that it is the workers.
 
 {lines}
 
 ## The driver
 
-Each row is on disk (`fsync`) before it counts. Memory is the peak of a process for each size.
+A row is on disk (`fsync`) before it counts; rows that come together wait for the disk once, here
+{CHUNK} of them. One by one there are {alone.rate:.0f} rows per second, as many as the disk takes. Memory is
+the peak of a process of its own for each size: while all cases run, once the same command has opened the
+finished journal again, and once all rows are read for the table.
 
-{table(["Cases", "Rows per second", "Memory [MB]", "Journal [byte per row]", "Parquet [byte per row]"], rows)}
+{table(head, rows)}
+
+From {CASES[1]:,} to {last.cases:,} cases the memory of a driver that runs them changes by a factor
+of {flat:.2f}.
 
 ## Workers
 
-Wall time that a case takes beyond its own, in a cluster of processes on this machine, its start not counted.
+Wall time that a case of {seconds:g} s takes beyond its own, in one run of {_PER_WORKER} cases for each
+worker, start not counted; efficiency is the share of the wall time in which a worker has a case. Up to
+{_PROCESSES} workers are a process each, more are threads of {_PROCESSES} processes, each with a process of
+cases of its own, {most} at last; the stubs sleep, so that there are no cores to be short of.
 
-{table(["Workers", "Overhead per case [ms]", f"Efficiency at {_CASE_S:g} s", "Efficiency at 3 s"], added)}
+{table(["Workers", "Overhead per case [ms]", "Efficiency"], added)}
 
 ## On paper, beyond what was measured
 
-- 1e6 cases: a journal of {million:.0f} MB, {minutes:.0f} min of driver time for the rows alone. Cases of 3 s
-  on 64 cores take {hours:.0f} h and bring {pace:.0f} rows a second.
-- What breaks first is not the driver of a run but what reads all rows at once: `campaign status`, the table
-  and the page hold them in memory, some kB each, so that 1e7 rows want a machine with tens of GB.
-- Beyond one machine the scheduler of Dask takes some hundred tasks a second; a task is a chunk of cases.
-- Not measured: more than {max(WORKERS)} workers, more than one machine.
+Linear in the last two rows of the driver's table; cases of {seconds:g} s.
+
+{table(paper_head, paper)}
+
+What breaks first, in this order:
+
+1. What reads all rows at once: table, page, `compare` and `campaign status`. The run goes on without them,
+   and shards are tables of their own; analyse those of 1e7 cases with pyarrow, by columns.
+2. Dask's scheduler, at {_TASKS[0]:g} to {_TASKS[1]:g} tasks a second. A task is a chunk of {_TASK_S:g} s of
+   cases, so that {few} to {many} cores are busy; with more, shards.
+3. The driver's pace of {last.rate:.0f} rows per second: cases of {seconds:g} s on {cores} cores.
+
+Not measured: workers on more than one machine.
 """
+
+
+def measured(cases: int, together: int) -> Driver:
+    """Return what a driver of so many cases costs, measured in a process of its own."""
+    sizes = ["--driver", str(cases), "--together", str(together)]
+    command = [sys.executable, "-m", "benchmarks.campaign_scale", *sizes]
+    done = subprocess.run(command, check=True, capture_output=True, text=True, cwd=ROOT)
+    found = Driver(*json.loads(done.stdout))
+    print(found, file=sys.stderr, flush=True)
+    return found
 
 
 def main() -> None:
     """Measure and write the page; with ``--driver N`` measure one size and print it, for the page."""
-    parser = ArgumentParser(description=__doc__)
+    parser = ArgumentParser(prog="python -m benchmarks.campaign_scale", description=__doc__)
     parser.add_argument("--driver", type=int, default=0, metavar="N", help="measure N cases only")
+    parser.add_argument("--together", type=int, default=CHUNK, metavar="N", help="rows that come together")
     parser.add_argument("--largest", type=int, default=CASES[-1], metavar="N", help="up to so many cases")
+    parser.add_argument("--workers", type=int, default=WORKERS[-1], metavar="N", help="up to so many")
+    parser.add_argument("--seconds", type=float, default=_CASE_S, metavar="S", help="that a case takes")
+    parser.add_argument("--print", action="store_true", help="print the page, do not write it")
     options = parser.parse_args()
     if options.driver:
-        print(json.dumps(driver(options.driver)))
+        print(json.dumps(driver(options.driver, options.together)))
         return
-    found = []
-    for cases in (cases for cases in CASES if cases <= options.largest):
-        command = [sys.executable, "-m", "benchmarks.campaign_scale", "--driver", str(cases)]
-        done = subprocess.run(command, check=True, capture_output=True, text=True, cwd=ROOT)
-        found.append(Driver(*json.loads(done.stdout)))
-        print(found[-1], flush=True)
-    overheads = [(workers, overhead(workers)) for workers in WORKERS]
-    PAGE.write_text(page(found, overheads), encoding="utf-8")
+    drivers = [measured(cases, CHUNK) for cases in CASES if cases <= options.largest]
+    alone = measured(min(ALONE, options.largest), 1)
+    overheads = []
+    for workers in (workers for workers in WORKERS if workers <= options.workers):
+        overheads.append((workers, overhead(workers, options.seconds)))
+        print(*overheads[-1], file=sys.stderr, flush=True)
+    text = page(drivers, alone, overheads, options.seconds)
+    if options.print:
+        print(text)
+    else:
+        PAGE.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

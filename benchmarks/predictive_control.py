@@ -14,8 +14,8 @@ import numpy as np
 from benchmarks.machine import versions
 from benchmarks.results import Result, Table, publish, row
 from benchmarks.timing import interleaved
+from sms_handover.control.mpc.controller import MpcController
 from sms_handover.control.mpc.distance_rows import DistanceModel
-from sms_handover.control.mpc.law import MpcController
 from sms_handover.control.mpc.momentum import base_start
 from sms_handover.control.mpc.parameters import MpcGains
 from sms_handover.control.mpc.placement import placements
@@ -68,7 +68,7 @@ class Contest:
         for _ in range(STATES):
             state, period = loop.state, loop.advance_period().period
             assert period is not None and inner.plan is not None
-            preview.update(period.phase, period.reference, period.targets_in_world, state.q)
+            preview.update(period.phase, period.reference, period.targets_in_world, state.q, state.v)
             start = PlanStart(state.q[BASE_NQ:], state.v[BASE_NV:], base_start(robot, state.q, state.v))
             times = self.planner.horizon.times[1:].tolist()
             targets = preview.ahead([state.stamp_ns + seconds_to_ns(time) for time in times])

@@ -38,6 +38,14 @@ _GEO = {"radius": 4.2164e7, "radial": [1, 0, 0], "normal": [0, 0, 1]}
 _MISFIRE = {"force": [1, 0, 0], "point": [0, 0.5, 0], "start": 10.0, "duration": 0.05}
 _PRESSURE = {"force": [-2.7e-5, 0, 0], "torque": [0, 0, 0], "point": [0, 0.01, 0]}
 _DRAG = {"force": [0, -6.6e-4, 0], "torque": [0, 0, 0], "point": [0.1, 0, 0]}
+_ENCODERS = {"step": 2.4e-5, "bandwidth": 100.0}
+_GYRO = {"noise_density": 2.9e-5, "bias": [2.8e-6, 2.8e-6, 2.8e-6]}
+_STAR_TRACKER = {"noise": 1.2e-4, "period": 0.1, "latency": 0.1}
+_VISION = {"position_noise": 0.002, "angle_noise": 0.0087, "period": 0.1, "latency": 0.1, "dropped": 0.01}
+_POOR_VISION = {
+    **{"position_noise": 0.005, "angle_noise": 0.0175, "position_bias": [0.0, 0.002, 0.0]},
+    **{"period": 0.1, "latency": 0.2, "dropped": 0.1},
+}
 
 
 def _friction(share: float) -> dict[str, Any]:
@@ -72,6 +80,18 @@ EFFECTS: Mapping[str, dict[str, Any]] = {
     "links: mass 2 %, 5 mm, inertia 10 %": {
         "model_error": {"links": {"mass": 0.02, "com": 0.005, "inertia": 0.1}}
     },
+    "encoders: 18 bit, rates within 100 1/s": {"sensors": {"encoders": _ENCODERS}},
+    "encoders: zeros off by 0.5 mrad": {"sensors": {"encoders": {"offset": 5e-4, "bandwidth": 100.0}}},
+    "gyro: 0.1 deg/sqrt(h), 1 deg/h": {"sensors": {"gyro": _GYRO}},
+    "star tracker: 25 arcsec, 10 Hz, 0.1 s late": {"sensors": {"star_tracker": _STAR_TRACKER}},
+    "vision: 2 mm/m, 0.5 deg/m, 10 Hz, 0.1 s late": {"sensors": {"vision": _VISION}},
+    "vision: 5 mm/m, 1 deg/m, 2 mm off, 0.2 s late": {"sensors": {"vision": _POOR_VISION}},
+    "all sensors of 'nominal'": {
+        "sensors": {
+            "encoders": {**_ENCODERS, "offset": 1e-4},
+            **{"gyro": _GYRO, "star_tracker": _STAR_TRACKER, "vision": _VISION},
+        }
+    },
     "mounts: 1 mm, 2 mrad": {"model_error": {"mounts": {"position": 0.001, "angle": 0.002}}},
 }
 
@@ -96,6 +116,8 @@ def effect_of(conditions: dict[str, Any], law: str) -> Effect:
     """Return what comes of the smooth handover under a law and conditions, with rotors in any case."""
     values: dict[str, Any] = {"conditions.rotor_inertia": ROTOR, "law": law, "seed": _SEED, **_OPEN}
     values |= {f"conditions.{name}": value for name, value in conditions.items()}
+    if "sensors" in conditions:
+        values["source"] = "measured"
     run = simulate(load_scenario("smooth", {"common.tick": TICK, **values}))
     events = run.grasp_events
     return Effect(
@@ -113,7 +135,7 @@ def section(found: Mapping[str, Mapping[str, Effect]]) -> str:
 This section is written by `make effects`. The smooth handover with rotors of {ROTOR:g} kg m^2, a tick of
 {TICK * MS_PER_S:g} ms, seed {_SEED}, and one effect alone. Distances are those of tool and grasp frame at the
 grasp and at the transfer, the angle is the larger one of both, the base its largest turn. Tolerances are
-opened, so that each effect is followed to the end; **bold** is where a grasp would have missed (10 mm, 2
+opened, so that each effect is followed to the end, and sensors are what the loop goes by; **bold** is where a grasp would have missed (10 mm, 2
 degrees). Sorted by the larger distance under the better law.
 
 ![The effects, ranked](images/effects.svg)

@@ -4,6 +4,8 @@ import argparse
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from docs.tables import plain, table
 from sms_handover.analysis.layout import number
 from sms_handover.campaign.definition.frozen import campaign_path, freeze
@@ -18,19 +20,24 @@ from sms_handover.campaign.statistics.proportion import proportion
 from sms_handover.campaign.statistics.tables import TESTED
 from sms_handover.campaign.statistics.worst_cases import failures_by_cause
 from sms_handover.terminal.progress import Progress
+from sms_handover.types import Array
 from sms_handover.units import DEG_PER_RAD, MM_PER_M
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE, FOLDER = ROOT / "docs" / "laws.md", ROOT / "build" / "evidence" / "laws"
+_MS_PER_S = 1000.0  # [ms/s]
 _FIGURES = {  # metric: its title, and the factor from its unit
     "grasp_error": ("grasp error [mm]", MM_PER_M),
     "grasp_angle": ("grasp angle [deg]", DEG_PER_RAD),
     "clearance": ("clearance beyond what is allowed [mm]", MM_PER_M),
     "base_turn": ("base turn [deg]", DEG_PER_RAD),
     "control_effort": ("effort [(N m)² s]", 1.0),
+    "peak_torque": ("largest torque [N m]", 1.0),
     "rate_share": ("largest share of a rate limit", 1.0),
     "time_beyond_position_limit": ("time beyond position limits [s]", 1.0),
 }
+_RANKED = ("grasp_error", "clearance", "base_turn", "control_effort")  # in the table of all laws
+_LIMITS = ("saturated_ticks", "time_above_rate_limit", "time_beyond_position_limit")
 _LARGE, _SMALL = (0.5, 0.95), (0.5, 0.05)  # shares of figures that are bad where large, or where small
 _MOST_CAUSES = 10
 
@@ -59,21 +66,32 @@ def page(folder: CampaignFolder) -> str:
         if causes
         else "No case failed.\n"
     )
-    scenarios, laws = len(campaign.scenarios), len(campaign.laws)
+    head = ["Scenario", "Law", "Success", *(_FIGURES[metric][0] for metric in _RANKED)]
+    laws, seconds = ", ".join(campaign.laws), campaign.values["common.duration"]
     return f"""\
 # Ranking of the control laws
 
 This page is written by `make evidence` from the shipped campaign
-[`laws`](../config/campaigns/laws.yaml): {folder.cases} cases, each in {scenarios} scenarios under {laws} laws
-with the same draws, {len(entries)} runs. `sms-handover campaign run laws` and `sms-handover report runs/laws`
-make the same with plots; [campaigns.md](campaigns.md) tells how to read it. A law of your own enters by its
-name in `laws` of a copy of the file.
+[`laws`](../config/campaigns/laws.yaml): {folder.cases} cases, each in
+{len(campaign.scenarios)} scenarios under {laws} with the same draws, {len(entries)} runs, of each the
+first {seconds:g} s, which have both grasps. `sms-handover campaign run laws` makes the same with plots,
+`python -m docs.evidence --cases 50` this page of more cases; [campaigns.md](campaigns.md) tells how to
+read it, and how a [law of your own](campaigns.md#a-law-of-your-own) enters by one line.
 
 The plant has the drawn mass properties, the laws have those of the scenario, with a deputy of
-{campaign.values["deputy.mass"]} kg. A case is a success if `{campaign.success.text}`: every grasp made, and
-no bodies in each other.
+{campaign.values["deputy.mass"]} kg. `smooth` and `paper` are at ideal [conditions](conditions.md), the
+others at nominal ones: friction, errors and noise of torques, a delay, wrenches, and a true robot that
+differs further. A case is a success if `{campaign.success.text}`: no grasp missed, no bodies in each other.
 
 {table(["Drawn for the plant", "Distribution"], draws)}
+
+## All laws
+
+By success, then by grasp error. Success has Wilson's 95 % interval, the rest are medians, all with
+intervals below. Beyond limits are cases in which any torque was clipped or any joint was faster, or
+further, than it may; the solve time is the wall time of a plan, which only laws that plan have.
+
+{table([*head, "Beyond limits", "Solve time [ms]", "CPU of a run [s]"], _ranking(folder, columns))}
 
 {_outcomes(folder, columns)}
 ## Paired tests
@@ -90,6 +108,33 @@ claims hold over random possible geometries is on [its own page](geometries.md).
 """
 
 
+def _ranking(folder: CampaignFolder, columns: Mapping[Group, CaseColumns]) -> list[tuple[str, ...]]:
+    """Return a row for each law in each scenario, the better law first."""
+    rows = []
+    for scenario in folder.campaign.scenarios:
+        laws = [law for law in folder.campaign.laws if (scenario, law) in columns]
+        laws.sort(key=lambda law: _rank(columns[scenario, law]))
+        for law in laws:
+            one = columns[scenario, law]
+            figures = (_median(one.metrics.get(metric), _FIGURES[metric][1]) for metric in _RANKED)
+            beyond = np.any([one.metrics[name] > 0.0 for name in _LIMITS if name in one.metrics], axis=0)
+            success = str(proportion(int(one.succeeded.sum()), len(one.case)))
+            costs = (_median(one.solve, _MS_PER_S), number(float(one.cpu.mean())))
+            rows.append((scenario, law, success, *figures, f"{np.sum(beyond)} of {len(one.case)}", *costs))
+    return rows
+
+
+def _rank(one: CaseColumns) -> tuple[float, float]:
+    """Return by what laws are sorted, the better the smaller."""
+    errors = one.metrics.get("grasp_error", np.array([np.inf]))
+    return -float(one.succeeded.mean()), float(np.nan_to_num(percentile(errors, 0.5).value, nan=np.inf))
+
+
+def _median(values: Array | None, factor: float) -> str:
+    """Return the median of what is known, a dash where nothing is."""
+    return number(np.nan if values is None else factor * percentile(values, 0.5).value)
+
+
 def _outcomes(folder: CampaignFolder, columns: Mapping[Group, CaseColumns]) -> str:
     """Return the tables of each scenario."""
     parts = []
@@ -101,6 +146,7 @@ def _outcomes(folder: CampaignFolder, columns: Mapping[Group, CaseColumns]) -> s
             for share in _SMALL if metric == "clearance" else _LARGE:
                 label = f"{title}, {'median' if share == 0.5 else f'{100 * share:g} %'}"
                 rows.append((label, *(_percentile(one, metric, share, factor) for _, one in laws)))
+        rows.append(("solve time [ms], median", *(_known(one.solve, 0.5, _MS_PER_S) for _, one in laws)))
         rows.append(("CPU time of a run [s], mean", *(number(float(one.cpu.mean())) for _, one in laws)))
         head = ["Figure", *(law for law, _ in laws)]
         parts.append(
@@ -111,27 +157,35 @@ def _outcomes(folder: CampaignFolder, columns: Mapping[Group, CaseColumns]) -> s
 
 
 def _percentile(one: CaseColumns, metric: str, share: float, factor: float) -> str:
-    """Return a percentile with its bootstrap interval."""
-    if metric not in one.metrics:
-        return "-"
-    found = percentile(factor * one.metrics[metric], share)
+    """Return a percentile of a metric with its bootstrap interval."""
+    return _known(one.metrics[metric], share, factor) if metric in one.metrics else "-"
+
+
+def _known(values: Array, share: float, factor: float) -> str:
+    """Return a percentile of the cases that have a value, its interval, and their number if it is less."""
+    found = percentile(factor * values, share)
     interval = "" if found.low != found.low else f" [{number(found.low)}, {number(found.high)}]"
-    return number(found.value) + interval
+    fewer = f", {found.known} cases" if 0 < found.known < len(values) else ""
+    return number(found.value) + interval + fewer
 
 
 def main() -> None:
     """Run what the campaign lacks, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-j", "--jobs", type=int, default=2, metavar="N", help="cases at the same time")
-    jobs = parser.parse_args().jobs
+    parser.add_argument(
+        "--cases", type=int, metavar="N", help="in place of those of the file; more are added"
+    )
+    options = parser.parse_args()
     frozen, cases = freeze(campaign_path("laws"))
+    cases = options.cases or cases
     with open_campaign(FOLDER, frozen, cases, Shard()) as folder, Progress() as progress:
 
         def show(tally: Tally) -> None:
             if progress.due:
                 progress.show(f"{tally.done} of {tally.total}", share=tally.done / tally.total)
 
-        run_campaign(folder, lambda: workers_for(frozen, cases, jobs=jobs), show)
+        run_campaign(folder, lambda: workers_for(frozen, folder.cases, jobs=options.jobs), show)
     PAGE.write_text(page(CampaignFolder(FOLDER)), encoding="utf-8")
 
 

@@ -8,7 +8,7 @@ from docs.messages import messages_page
 from docs.schemas import schemas
 from docs.tables import WRITTEN_BY, table
 from sms_handover.graph.services import SERVICES
-from sms_handover.graph.topics import CONTROLLER, NODES, RECORDER, graph_topics
+from sms_handover.graph.topics import CONTROLLER, NODES, RECORDER, SENSOR_TYPES, graph_topics
 from sms_handover.ros.reference.interfaces import (
     ANY_ARM,
     COMMON_GROUP,
@@ -58,7 +58,7 @@ def topics_page() -> str:
             _nodes(node for node in subscribers_of(topic) if node != RECORDER),
             contents_of(topic),
         )
-        for topic in graph_topics([ANY_ARM], clearance=True, wrenches=True)
+        for topic in graph_topics([ANY_ARM], clearance=True, wrenches=True, sensors=SENSOR_TYPES)
     ]
     services = [
         (f"`{s.relative_name}`", f"`{s.type}`", f"`{s.server}`", _nodes(s.clients), s.does) for s in SERVICES

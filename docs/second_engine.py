@@ -12,6 +12,21 @@ from sms_handover.engines.verdict import Verdict, verdict_of
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
 
+QUANTITIES = {
+    "joints": "rad",
+    "base position": "m",
+    "base attitude": "rad",
+    "tool position": "m",
+    "tool attitude": "rad",
+    "linear momentum": "kg m/s",
+    "angular momentum": "kg m^2/s",
+    "deputy position": "m",
+    "deputy attitude": "rad",
+    "impulse": "N s",
+    "impulsive moment": "N m s",
+}
+HEAD = ("Scenario", "Engine", *(f"{quantity} [{unit}]" for quantity, unit in QUANTITIES.items()))
+_HEAD_LINES = 2
 PAGE = Path(__file__).resolve().parent / "second_engine.md"
 
 
@@ -27,18 +42,25 @@ def verdicts(scenarios: Sequence[str], engines: Sequence[Engine]) -> dict[str, l
     return found
 
 
-def measured(found: dict[str, list[Verdict]], engines: Sequence[Engine]) -> str:
-    """Return the table: a row per scenario and engine, the largest difference with its bound in each cell."""
-    every = [verdict for each in found.values() for verdict in each if not verdict.unsupported]
-    quantities = list(dict.fromkeys((each.quantity, each.unit) for v in every for each in v.differences))
-    rows = []
+def measured(found: dict[str, list[Verdict]], engines: Sequence[Engine], earlier: str) -> str:
+    """Return the table: a row per scenario and engine, the largest difference with its bound in each cell.
+
+    Scenarios that were not run keep the rows that they have in an ``earlier`` page.
+    """
+    rows = {
+        name: [row for row in earlier.splitlines() if row.startswith(f"| `{name}` |")]
+        for name in scenario_names()
+    }
     for name, each in found.items():
+        lines = []
         for engine, verdict in zip(engines, each, strict=True):
-            cells = [f"{d.largest:.1e} (≤ {d.bound:.0e})" for d in verdict.differences]
-            words = [f"not supported: {verdict.unsupported}"] if verdict.unsupported else cells
-            rows.append((f"`{name}`", engine.title, *words, *[""] * (len(quantities) - len(words))))
-    head = ("Scenario", "Engine", *(f"{quantity} [{unit}]" for quantity, unit in quantities))
-    return table(head, rows)
+            cells = {d.quantity: f"{d.largest:.1e} (≤ {d.bound:.0e})" for d in verdict.differences}
+            words = [cells.get(quantity, "") for quantity in QUANTITIES]
+            if verdict.unsupported:
+                words[0] = f"not supported: {verdict.unsupported}"
+            lines.append((f"`{name}`", engine.title, *words))
+        rows[name] = table(HEAD, lines).splitlines()[_HEAD_LINES:]
+    return "\n".join([table(HEAD, ()), *(row for each in rows.values() for row in each)])
 
 
 def page(rows: str) -> str:
@@ -92,7 +114,7 @@ The bounds are stated per scenario (`sms_handover/engines/bounds.py`). A run in 
 those of `massive` unless its scenario has its own, another scenario that is not shipped those of `paper`.
 They notice what they are for: 0.1 % more mass of any one link is beyond those of `smooth` within two seconds
 (`test/verification/test_second_engine.py`). Largest differences over a whole run, under the law of the
-scenario, written by `make engines`:
+scenario, written by `make engines` (`make engines SCENARIOS=tight` writes the rows of one anew):
 
 {rows}
 
@@ -105,15 +127,16 @@ scenario, written by `make engines`:
 
 
 def main() -> int:
-    """Replay shipped scenarios in every engine; write the page if they are all of them."""
+    """Replay shipped scenarios in every engine, and write the page; other scenarios keep their rows."""
     parser = ArgumentParser(description=main.__doc__)
     parser.add_argument("names", nargs="*", metavar="SCENARIO", help="default: all that are shipped")
     parser.add_argument("--with", dest="engines", nargs="+", choices=tuple(ENGINES), default=tuple(ENGINES))
     options = parser.parse_args()
     engines = [load_engine(name) for name in options.engines]
     found = verdicts(options.names or scenario_names(), engines)
-    if not options.names and options.engines == tuple(ENGINES):
-        PAGE.write_text(page(measured(found, engines)), encoding="utf-8")
+    if options.engines == tuple(ENGINES):
+        rows = measured(found, engines, PAGE.read_text(encoding="utf-8"))
+        PAGE.write_text(page(rows), encoding="utf-8")
     return 0 if all(v.agrees or v.unsupported for each in found.values() for v in each) else 1
 
 

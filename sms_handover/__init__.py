@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from sms_handover.bag.run.reader import read_run as read_run
     from sms_handover.configuration.parameters import parameter as parameter
     from sms_handover.control.controller import JointController as JointController
+    from sms_handover.control.distance_gradients import DistanceGradients as DistanceGradients
     from sms_handover.control.law import JointLaw as JointLaw
     from sms_handover.control.law import Law as Law
     from sms_handover.control.law import LawSetup as LawSetup
@@ -43,15 +44,20 @@ if TYPE_CHECKING:
     from sms_handover.errors import SmsHandoverError as SmsHandoverError
     from sms_handover.export.data_frames import data_frames as data_frames
     from sms_handover.external.controller import run_controller as run_controller
+    from sms_handover.model.conserved import conserved_quantities as conserved_quantities
+    from sms_handover.model.known_payload import KnownPayload as KnownPayload
     from sms_handover.model.poses import pose_distance as pose_distance
     from sms_handover.model.poses import pose_of as pose_of
     from sms_handover.model.poses import se3_of as se3_of
     from sms_handover.model.reduced import base_twist_per_joint_rate as base_twist_per_joint_rate
+    from sms_handover.model.reduced import drift_of_momentum as drift_of_momentum
     from sms_handover.model.reduced import generalized_jacobian as generalized_jacobian
     from sms_handover.model.reduced import reduced_dynamics as reduced_dynamics
     from sms_handover.model.reduced import reduced_inverse_dynamics as reduced_inverse_dynamics
     from sms_handover.model.reduced import tool_jacobian as tool_jacobian
     from sms_handover.model.robot_model import RobotModel as RobotModel
+    from sms_handover.plan_report import PlanReport as PlanReport
+    from sms_handover.plan_report import PlanStatus as PlanStatus
     from sms_handover.report.recorded_run import RecordedRun as RecordedRun
     from sms_handover.report.recorded_run import compare_recorded as compare_recorded
     from sms_handover.report.recorded_run import read_recorded as read_recorded
@@ -68,9 +74,11 @@ if TYPE_CHECKING:
     from sms_handover.types import BASE_NQ as BASE_NQ
     from sms_handover.types import BASE_NV as BASE_NV
     from sms_handover.types import Array as Array
+    from sms_handover.types import GraspEvent as GraspEvent
     from sms_handover.types import GraspStatus as GraspStatus
     from sms_handover.types import JointReference as JointReference
     from sms_handover.types import Pose as Pose
+    from sms_handover.types import PreviewedTargets as PreviewedTargets
     from sms_handover.types import TaskPhase as TaskPhase
 else:  # hidden from type checkers, to whom a name that is not in the list is an error
 

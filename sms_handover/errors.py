@@ -51,7 +51,7 @@ class CollisionError(ConfigurationError):
 
 
 class ControllerError(SmsHandoverError):
-    """A controller from outside the package returned invalid efforts."""
+    """A controller returned invalid efforts, or cannot go on."""
 
 
 class BagError(SmsHandoverError):

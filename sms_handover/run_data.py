@@ -8,10 +8,29 @@ import numpy as np
 import numpy.typing as npt
 
 from sms_handover.graph.events import RunEvent
-from sms_handover.types import GraspEvent, PlanReport, TaskPhase
+from sms_handover.plan_report import PlannedPaths, PlanReport
+from sms_handover.types import GraspEvent, TaskPhase
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredRows:
+    """What sensors have told of a run, and the truth of what none measures; shapes and frames as in RunData.
+
+    There are rows per tick but for ``deputy_pose``, which has one per reference period.
+    """
+
+    joint_position: Array
+    joint_velocity: Array
+    base_pose: Array
+    base_twist: Array
+    deputy_pose: Array
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            getattr(self, item.name).setflags(write=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +50,8 @@ class RunData:
     ``linear_impulse`` (M, 3) N s and ``angular_impulse`` (M, 3) N m s are what those have added to the
     momenta, 0 where there were none; ``ik_status`` (M,) the number of the IkStatus message, -1 where none was
     asked. Bags of older versions have no deputy twist (NaN), and their work is less what joint stops have
-    taken. ``plans`` has the reports of a predictive law, one per solve.
+    taken. ``plans`` has the reports of a predictive law, one per solve; ``measured`` is None
+    where no sensor was simulated.
     """
 
     joint_names: tuple[str, ...]
@@ -63,6 +83,8 @@ class RunData:
     grasp_events: tuple[GraspEvent, ...]
     run_events: tuple[RunEvent, ...] = ()
     plans: tuple[PlanReport, ...] = ()
+    planned_paths: tuple[PlannedPaths, ...] = ()
+    measured: MeasuredRows | None = None
 
     def __post_init__(self) -> None:
         for item in fields(self):

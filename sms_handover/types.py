@@ -143,7 +143,8 @@ class JointCommand:
 class TickRows:
     """Ticks as arrays, a row each: stamps (k,) ns, q (k, 7 + n), v (k, 6 + n), and efforts (k, n) N m.
 
-    ``joint_effort`` acted up to the state, ``effort`` answers it.
+    ``joint_effort`` acted up to the state, ``effort`` answers it. With sensors ``measured`` (k, 13 + 2 n) has
+    q and v as they are known.
     """
 
     stamp_ns: npt.NDArray[np.int64]
@@ -151,6 +152,7 @@ class TickRows:
     v: Array
     joint_effort: Array
     effort: Array
+    measured: Array | None = None
 
     def __len__(self) -> int:
         return len(self.stamp_ns)
@@ -395,37 +397,3 @@ class PreviewState:
         freeze(self, "joints_at_start")
         for name in ("tools_at_start", "corrections"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
-
-
-class PlanStatus(Enum):
-    """What came of one solve of a predictive law; the value is what a user reads."""
-
-    SOLVED = "solved"
-    ITERATION_LIMIT = "stopped at the limit of iterations"
-    INFEASIBLE = "no plan keeps the hard limits"
-    BRAKING = "too many solves in a row gave no plan: the arms brake to rest"
-
-
-@dataclass(frozen=True)
-class PlanReport:
-    """One solve of a predictive law for the state at ``stamp_ns``.
-
-    ``plan`` is the number of the solve, ``active`` the rows of constraints that bind. ``largest_slack`` is by
-    how much the worst soft limit is exceeded, in the unit of ``largest_slack_row``. Times in s are of the
-    wall clock, ``plan_age`` is simulation time since the plan in use began; counts are since the start.
-    """
-
-    stamp_ns: int
-    plan: int
-    status: PlanStatus
-    iterations: int
-    active: tuple[str, ...]
-    largest_slack: float
-    largest_slack_row: str
-    kkt_residual: float
-    linearization_time: float
-    program_time: float
-    total_time: float
-    plan_age: float
-    late_plans: int = 0
-    reused_plans: int = 0

@@ -22,7 +22,7 @@ from sms_handover.control.parameters import parameters_with
 from sms_handover.control.registry import law_named
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.services import SERVICES
-from sms_handover.graph.topics import CONTROLLER, graph_topics
+from sms_handover.graph.topics import CONTROLLER, SENSOR_TYPES, graph_topics
 from sms_handover.ros.launching.launch_arguments import ARGUMENTS
 from sms_handover.ros.reference.interfaces import COMMON_GROUP, OWN_GROUPS, groups_of
 from sms_handover.simulation.scenario import load_scenario
@@ -137,7 +137,10 @@ def check_ros2(words: list[str]) -> None:
         known = [*ARGUMENTS, *re.findall(r'DeclareLaunchArgument\(\s*"(\w+)"', source)]
         require([word.partition(":=")[0] for word in words[3:] if ":=" in word], known, "launch argument")
     elif words[0] == "topic":
-        known = ["/" + topic.name.lstrip("/") for topic in graph_topics(ARMS, clearance=True, wrenches=True)]
+        known = [
+            "/" + topic.name.lstrip("/")
+            for topic in graph_topics(ARMS, clearance=True, wrenches=True, sensors=SENSOR_TYPES)
+        ]
         require([word for word in words[2:] if word.startswith("/")], known, "topic")
     elif words[:2] == ["service", "call"]:
         require(

@@ -7,8 +7,8 @@ from types import MappingProxyType
 
 import numpy as np
 
+from sms_handover.plan_report import PlanStatus
 from sms_handover.run_data import RunData
-from sms_handover.types import PlanStatus
 
 _TAIL = 99.0  # [%] percentile of the solve times that is reported
 

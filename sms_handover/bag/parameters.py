@@ -17,7 +17,7 @@ class RecorderParameters:
     folder: str = parameter("new folder for the bag; empty: handover_<date>_<time> in the current folder")
     record_all: bool = parameter("record topics beyond those of the graph too")
     niceness: int = parameter(
-        "niceness of the recorder, as in nice(1), so that the loop comes first",
+        "niceness of the recorder, as in nice(1), so that the loop comes first; in real time at most 3",
         minimum=0,
         maximum=19,
     )

@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 from mcap.records import Schema as McapSchema
@@ -126,7 +126,7 @@ class BagWriter:
             raise BagError(f"topic {name!r} is recorded into {self.folder} already")
         schema = self.types.schema(type_name)
         profiles = [profile.to_rosbag2() for profile in qos]
-        metadata = {"offered_qos_profiles": qos_text(profiles), "topic_type_hash": schema.type_hash}
+        metadata = {"offered_qos_profiles": _offered(tuple(qos)), "topic_type_hash": schema.type_hash}
         content = McapSchema(id=0, name=type_name, encoding="ros2msg", data=schema.text.encode())
         self._open(name, Source(name, "cdr", content, metadata), profiles)
 
@@ -305,6 +305,12 @@ def _create(folder: Path) -> int:
         raise BagError(f"cannot create {folder}: its parent folder does not exist") from None
     except OSError as error:
         raise BagError(f"cannot create the recording {folder}: {error.strerror}") from error
+
+
+@cache
+def _offered(qos: tuple[Qos, ...]) -> str:
+    """Return what a channel says of profiles: YAML takes milliseconds, and most topics have the same."""
+    return qos_text([profile.to_rosbag2() for profile in qos])
 
 
 def _span(file: BagFile) -> FileSpan:

@@ -1,10 +1,11 @@
 """The main program of the command line ``sms-handover``."""
 
+import gc
 import os
 import sys
 from argparse import ArgumentParser
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from importlib import import_module
 
 from sms_handover.cli.exit_codes import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_USAGE
@@ -58,6 +59,9 @@ def _run(call: Call) -> int:
     drop_current_folder(sys.path)
     draw_to_files()
     with ExitStack() as stack:
+        imports = stack.enter_context(ExitStack())
+        if call.module not in sys.modules:
+            imports.enter_context(_without_collections())
         server = None
         if call.verb in _WITH_ROS:
             _prepare_ros(call)
@@ -65,6 +69,7 @@ def _run(call: Call) -> int:
                 server = stack.enter_context(NodeServer())  # it imports at the same time as this process
             _import_ros()
         module = import_module(call.module)
+        imports.close()
         parser = ArgumentParser(prog=f"{PROGRAM} {call.verb}")
         module.add_parser(parser)
         parser.set_defaults(node_server=server)
@@ -75,6 +80,17 @@ def _run(call: Call) -> int:
         code = int(module.command(options))
         sys.stdout.flush()
         return code
+
+
+@contextmanager
+def _without_collections() -> Iterator[None]:
+    """Import without garbage collections: nearly all stays, and visiting it takes a fifth of the time."""
+    gc.disable()
+    try:
+        yield
+        gc.freeze()
+    finally:
+        gc.enable()
 
 
 def _prepare_ros(call: Call) -> None:

@@ -6,7 +6,7 @@ import shutil
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager
 from datetime import datetime
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from sms_handover.graph.events import graver_in_words
 from sms_handover.graph.topics import CONTROLLER, NODES, RECORDER
 from sms_handover.launcher.domain import reservation
 from sms_handover.launcher.launcher import LaunchPlan, launch
+from sms_handover.launcher.node_server import NodeServer
 from sms_handover.launcher.run_folder import BAG, LOGS, locked_logs
 from sms_handover.launcher.wake_ups import measure_wake_ups
 from sms_handover.ros.launching.composition import listed, placed
@@ -112,12 +113,13 @@ def command(options: Namespace) -> int:
     external = (CONTROLLER,) if own or options.without_controller else ()
     scenario = scenario_of(options, mode, recorded=not options.no_record, external=external)
     check_scenario(scenario)
-    check_collisions(scenario, options)
-    with (
-        reservation(options.domain_id, shared=bool(elsewhere)) as held,
-        _earlier_run_aside(options.output) if _replaces(options) else nullcontext(),
-        _output_folder(options, scenario) as (output, lock),
-    ):
+    _check_output(options)
+    with ExitStack() as stack:
+        held = stack.enter_context(reservation(options.domain_id, shared=bool(elsewhere)))
+        check_collisions(scenario, options)  # takes seconds: what can be told at once has been told
+        if _replaces(options):
+            stack.enter_context(_earlier_run_aside(options.output))
+        output, lock = stack.enter_context(_output_folder(options, scenario))
         plan = LaunchPlan(
             scenario=scenario,
             parameter_files=tuple(path.resolve() for path in options.params_file),
@@ -139,7 +141,7 @@ def command(options: Namespace) -> int:
         if options.without_controller:
             print(_how_to_join(held.domain), flush=True)
         if options.real_time:
-            print(_forecast(scenario, composed=options.compose), flush=True)
+            print(_forecast(scenario, plan.server, composed=options.compose), flush=True)
         outcome = launch(plan)
     progress = outcome.progress
     print(outcome.recorder_said, end="")
@@ -154,8 +156,10 @@ def command(options: Namespace) -> int:
     return task_code(progress.events, progress.run_events, failed=progress.failed)
 
 
-def _forecast(scenario: Scenario, *, composed: bool) -> str:
+def _forecast(scenario: Scenario, server: NodeServer | None, *, composed: bool) -> str:
     """Return in one line how well this machine will keep real time."""
+    if server is not None:
+        server.wait_until_ready()  # what it imports would be taken for the noise of the machine
     exact_timers()
     common = scenario.parameters.common
     wake_ups = measure_wake_ups(common.tick)
@@ -191,6 +195,24 @@ def _replaces(options: Namespace) -> bool:
     return bool(options.overwrite and options.output and (options.output / LOGS).is_dir())
 
 
+def _check_output(options: Namespace) -> None:
+    """Raise ConfigurationError if the output folder will not be free or cannot be made."""
+    wanted: Path | None = options.output
+    if wanted is None or _replaces(options):
+        return
+    if wanted.exists():
+        raise _taken(wanted)
+    above = next(parent for parent in wanted.absolute().parents if parent.exists())
+    if not above.is_dir():
+        raise ConfigurationError(f"output folder {wanted} cannot be made: {above} is a file")
+
+
+def _taken(folder: Path) -> ConfigurationError:
+    return ConfigurationError(
+        f"output folder {folder} exists; choose another, or --overwrite one that a run has made"
+    )
+
+
 @contextmanager
 def _output_folder(options: Namespace, scenario: Scenario) -> Iterator[tuple[Path, int]]:
     """Make the output folder, and yield its full path and the file descriptor that locks it.
@@ -206,9 +228,7 @@ def _output_folder(options: Namespace, scenario: Scenario) -> Iterator[tuple[Pat
         folder = next(name for name in names if _makes(name))
         (folder / LOGS).mkdir()
     except StopIteration:
-        raise ConfigurationError(
-            f"output folder {wanted} exists; choose another, or --overwrite one that a run has made"
-        ) from None
+        raise _taken(wanted) from None
     except OSError as error:
         raise ConfigurationError(f"output folder {wanted} cannot be made: {error.strerror}") from error
     with locked_logs(folder) as lock:

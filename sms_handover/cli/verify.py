@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
-from sms_handover.analysis.equality import before, compare_runs
+from sms_handover.analysis.equality import as_far_as_recorded, before, compare_runs
 from sms_handover.bag.info import read_info
 from sms_handover.bag.run.reader import read_run
 from sms_handover.cli.exit_codes import EXIT_FAILED, EXIT_OK, EXIT_UNSUPPORTED
@@ -105,7 +105,7 @@ def _by_itself(bag: Path, domain_id: int | None) -> int:
     """Run a bag again, print what differs, and return the exit code.
 
     A run that was reset or ended early is compared up to its last state, without the command that would
-    have answered it.
+    have answered it; one of an older version without what that did not record.
     """
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -118,6 +118,9 @@ def _by_itself(bag: Path, domain_id: int | None) -> int:
     if ended_early:
         end_ns = int(recorded.tick_ns[-1])
         recorded, again = before(recorded, end_ns), before(again, end_ns)
+    again, missing = as_far_as_recorded(recorded, again)
+    if missing:
+        print(f"not recorded, as by an older version, so not compared: {', '.join(missing)}")
     differences = compare_runs(recorded, again)
     for difference in differences:
         print(difference)

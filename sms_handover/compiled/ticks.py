@@ -13,14 +13,15 @@ from sms_handover.compiled.library import dynamics_library
 from sms_handover.compiled.names import COMPUTED_TORQUE, OBSERVE, TICKS
 from sms_handover.compiled.tree import PER_BODY, body_tree, inertial_parameters, tools_of
 from sms_handover.compiled.wrench_table import WrenchTable
+from sms_handover.control.compensation import CompensatedTorque
 from sms_handover.control.controller import JointController
-from sms_handover.control.disturbance_observer import ObservedTorque
 from sms_handover.control.nmpc import NmpcLaw
 from sms_handover.control.pid import PidLaw
 from sms_handover.control.protocol import Controller
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.plant.integrators import TABLEAUS
+from sms_handover.plant.sensed_plant import SensedPlant
 from sms_handover.types import Array, TickRows, frozen
 from sms_handover.units import ns_to_seconds
 
@@ -50,8 +51,10 @@ class CompiledTicks:
         """Return what C does not have of plant, controller and robot as it is known, '' for nothing."""
         if not isinstance(controller, JointController) or type(controller.law) not in _LAWS:
             return "a law other than nmpc and pid"
-        if isinstance(controller.law, NmpcLaw) and isinstance(controller.law.efforts, ObservedTorque):
-            return "an observer of disturbances"
+        if isinstance(controller.law, NmpcLaw) and isinstance(controller.law.efforts, CompensatedTorque):
+            return "a law that compensates for what its model does not know"
+        if isinstance(plant, SensedPlant):
+            return "sensors"
         if plant.enforces_limits:
             return "enforced joint limits"
         if plant.effects and not WrenchTable.knows(plant.effects.resistance.wrenches):

@@ -12,6 +12,9 @@ from sms_handover.conditions.constant_wrench import ConstantWrench
 from sms_handover.conditions.joint_values import CommandErrors, FrictionValues, TorqueErrors
 from sms_handover.conditions.model_error import BodySpread, ModelError, MountSpread
 from sms_handover.conditions.orbit import GravityGradient, Orbit, RelativeOrbit
+from sms_handover.conditions.per_joint import per_joint
+from sms_handover.conditions.sensors.registry import sensors_of
+from sms_handover.conditions.sensors.sensor import SensorValues
 from sms_handover.conditions.thruster_misfire import ThrusterMisfire
 from sms_handover.conditions.wrench import WrenchModel
 from sms_handover.conditions.wrench_history import WrenchHistory
@@ -20,7 +23,6 @@ from sms_handover.configuration.conditions_fields import AXES, CONDITIONS_FIELDS
 from sms_handover.configuration.sections import Section
 from sms_handover.configuration.yaml_reader import Mapping as YamlMapping
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.types import Array
 
 _STRIBECK_SPEED = 0.01  # [rad/s] where none is given; without stiction it has no effect
 _ROW = 7  # [-] time, force, torque
@@ -37,14 +39,21 @@ class Conditions:
     torque: TorqueErrors | None = None
     command: CommandErrors | None = None
     wrenches: Mapping[str, WrenchModel] = field(default_factory=dict)
+    sensors: Mapping[str, SensorValues] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "wrenches", MappingProxyType(dict(self.wrenches)))
+        for name in ("wrenches", "sensors"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    @property
+    def acts(self) -> bool:
+        """Whether something acts in the plant that an ideal one has not."""
+        return bool(self.friction or self.torque or self.command or self.wrenches)
 
     @property
     def ideal(self) -> bool:
-        """Whether nothing acts in the plant that an ideal one has not."""
-        return not (self.friction or self.torque or self.command or self.wrenches)
+        """Whether the plant is an ideal one, of which nothing is measured."""
+        return not (self.acts or self.sensors)
 
 
 IDEAL = Conditions()
@@ -62,6 +71,7 @@ def conditions_of(content: YamlMapping, robot: RobotModel) -> Conditions:
         _torque(root, robot.n_joints),
         _command(root),
         _wrenches(root.section("wrenches")) if "wrenches" in root else {},
+        sensors_of(root.section("sensors"), robot.n_joints) if "sensors" in root else {},
     )
     _require_rotors(root, conditions, robot)
     return IDEAL if conditions.ideal else conditions
@@ -117,15 +127,6 @@ def _command(root: Section) -> CommandErrors | None:
     delay, dropped = _numbers(root, "command", "delay", "dropped")
     errors = CommandErrors(delay, dropped)
     return errors if errors.any else None
-
-
-def per_joint(section: Section, key: str, joints: int, missing: float = 0.0) -> Array:
-    """Return the value of every joint (n,): one number for all, or a list with one for each."""
-    if key not in section:
-        return np.full(joints, missing)
-    if isinstance(section.value(key), list):
-        return np.array(section.vector(key, joints))
-    return np.full(joints, section.word(key))
 
 
 def _wrenches(section: Section) -> dict[str, WrenchModel]:

@@ -9,6 +9,7 @@ from sms_handover.configuration.field_specification import (
     text,
     vector,
 )
+from sms_handover.configuration.sensor_fields import SENSOR_FIELDS
 
 WRENCH_KINDS = ("constant", "thruster_misfire", "history", "gravity_gradient", "relative_orbit")
 BODY, WORLD = "body", "world"
@@ -148,5 +149,6 @@ CONDITIONS_FIELDS = MappingSpec(
         "command": _COMMAND,
         "wrenches": NamedSpec("wrenches on the base by name", _WRENCH),
         "model_error": _MODEL_ERROR,
+        "sensors": SENSOR_FIELDS,
     },
 )

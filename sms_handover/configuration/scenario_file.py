@@ -17,10 +17,10 @@ from sms_handover.errors import ConfigurationError, UnknownNameError
 from sms_handover.graph.topics import CONTROLLER, LOOP_NODES
 
 COMMON = "common"  # section of what every node shares
-EXTENDS, DESCRIPTION, LAW, SEED = "extends", "description", "law", "seed"
+EXTENDS, DESCRIPTION, LAW, SEED, SOURCE = "extends", "description", "law", "seed", "source"
 _SUFFIX = ".yaml"
 _SECTIONS = (COMMON, *LOOP_NODES)
-SHORT = {LAW: CONTROLLER, SEED: COMMON}  # paths that stand for a parameter of the same name
+SHORT = {LAW: CONTROLLER, SEED: COMMON, SOURCE: COMMON}  # paths that stand for a parameter of the same name
 KEYS = (EXTENDS, DESCRIPTION, ROBOT, SCHEDULE, DEPUTY, CONDITIONS, *SHORT, *ROLES, *_SECTIONS)
 
 

@@ -3,23 +3,20 @@
 import numpy as np
 import pinocchio as pin
 
-from sms_handover.control.computed_torque import TrackingEfforts
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import BASE_NV, Array, read_only
 
 
-class ObservedTorque:
-    """Computed torque less the disturbance that is observed [DeLuca2005].
+class DisturbanceObserver:
+    """Estimates the disturbance d of p' = C^T v + (0, u) + d, with p = H v [DeLuca2005].
 
-    With p = H v the momentum obeys p' = C^T v + (0, u) + d. The estimate r = K (p - z), with
-    z' = C^T v + (0, u) + r, is d behind a first-order lag: r' = K (d - r). Of d a wrench f_b on the base acts
-    on the joints through the base, so u is less r_m - H_bm^T H_b^-1 r_b. Efforts are taken to act as far as
-    joints can give them. It has to be called once each tick; not thread-safe.
+    The estimate r = K (p - z), with z' = C^T v + (0, u) + r, is d behind a first-order lag: r' = K (d - r).
+    It has to be asked once each tick, and told the efforts of the tick; not thread-safe.
     """
 
-    def __init__(self, robot: RobotModel, efforts: TrackingEfforts, bandwidth: float, dt: float) -> None:
+    def __init__(self, robot: RobotModel, bandwidth: float, dt: float) -> None:
         """Observe a robot whose efforts change every ``dt`` s, with a bandwidth K in 1/s."""
-        self._robot, self._efforts, self._data = robot, efforts, robot.pin.createData()
+        self._robot, self._data = robot, robot.pin.createData()
         self._bandwidth, self._dt = bandwidth, dt
         self.restore(np.zeros(0))
 
@@ -30,9 +27,7 @@ class ObservedTorque:
 
     @property
     def memory(self) -> Array:
-        """What later estimates depend on, as one array; empty before the first call."""
-        if not self._begun:
-            return np.zeros(0)
+        """What later estimates depend on, (3 (6 + n),)."""
         return read_only(np.concatenate([self._integral, self._flow, self._estimate]))
 
     def restore(self, memory: Array) -> None:
@@ -44,30 +39,29 @@ class ObservedTorque:
         self._flow: Array = parts[1]
         self._estimate: Array = parts[2]
 
-    def __call__(self, q: Array, v: Array, desired: Array, feedback: Array) -> Array:
-        """Return the joint efforts (n,) N m, not limited."""
-        model, data = self._robot.pin, self._data
-        inertia = np.array(pin.crba(model, data, q, pin.Convention.LOCAL))
+    def begin_with(self, estimate: Array) -> None:
+        """Begin with an estimate (6 + n,): what acts stays while the momentum jumps, as at a grasp."""
+        self.restore(np.zeros(0))
+        self._estimate = np.array(estimate)
+
+    def joint_effect(self, q: Array, v: Array) -> Array:
+        """Return what the disturbance does to the joints (n,) N m, directly and through the free base.
+
+        A wrench r_b on the base does H_bm^T H_b^-1 r_b less, so the effect is r_m - H_bm^T H_b^-1 r_b.
+        """
+        inertia = np.array(pin.crba(self._robot.pin, self._data, q, pin.Convention.LOCAL))
         momentum = inertia @ v
         if self._begun:
             self._integral = self._integral + self._dt * (self._flow + self._estimate)
         else:
-            self._integral, self._begun = momentum, True
+            self._integral, self._begun = momentum - self._estimate / self._bandwidth, True
         self._estimate = self._bandwidth * (momentum - self._integral)
         base, coupling = inertia[:BASE_NV, :BASE_NV], inertia[:BASE_NV, BASE_NV:]
         through_base = coupling.T @ np.linalg.solve(base, self._estimate[:BASE_NV])
-        efforts: Array = self._efforts(q, v, desired, feedback) - self._estimate[BASE_NV:] + through_base
-        self._flow = np.array(pin.computeCoriolisMatrix(model, data, q, v)).T @ v
-        self._flow[BASE_NV:] += self._robot.limited(efforts)
-        return efforts
+        effect: Array = self._estimate[BASE_NV:] - through_base
+        return effect
 
-
-def memory_of(efforts: TrackingEfforts) -> Array:
-    """Return the memory of computed torque, empty where nothing is observed."""
-    return efforts.memory if isinstance(efforts, ObservedTorque) else np.zeros(0)
-
-
-def restore_memory(efforts: TrackingEfforts, memory: Array) -> None:
-    """Take computed torque back to a former memory."""
-    if isinstance(efforts, ObservedTorque):
-        efforts.restore(memory)
+    def act(self, q: Array, v: Array, efforts: Array) -> None:
+        """Take account of the efforts (n,) N m of the tick that begins at a state."""
+        self._flow = np.array(pin.computeCoriolisMatrix(self._robot.pin, self._data, q, v)).T @ v
+        self._flow[BASE_NV:] += efforts

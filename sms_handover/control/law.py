@@ -4,12 +4,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from sms_handover.control.computed_torque import ComputedTorque, TrackingEfforts
-from sms_handover.control.protocol import Controller, Distances, Preview
+from sms_handover.control.protocol import Controller, Distances, Preview, RemoteSolver
 from sms_handover.model.deputy import DeputyDescription
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import Array
@@ -42,7 +42,8 @@ class LawSetup(Generic[G]):
     A joint reference is extrapolated up to an age of ``longest_reference_ns``, without bound if None.
     ``computed_torque`` makes the inverse dynamics of a robot, by Pinocchio or compiled. ``deputy`` is the one
     that is handed over, as the law knows it. Guidance comes every ``reference_ns``. What a law needs besides
-    it gets if it declares so: a ``preview`` of targets to come, the ``distances`` between bodies.
+    it gets if it declares so: a ``preview`` of targets to come, the ``distances`` between bodies. In real
+    time ``start_solver`` starts a process that solves the problems of a planning law.
     """
 
     robot: RobotModel
@@ -54,6 +55,7 @@ class LawSetup(Generic[G]):
     reference_ns: int = 20_000_000
     preview: Preview | None = None
     distances: Distances | None = None
+    start_solver: Callable[["LawSetup[Any]"], RemoteSolver] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from sms_handover.configuration.parameters import parameter
+from sms_handover.control.compensation import continued, memory_of, restore_memory
 from sms_handover.control.computed_torque import ComputedTorque, TrackingEfforts
 from sms_handover.control.controller import JointController
-from sms_handover.control.disturbance_observer import memory_of, restore_memory
 from sms_handover.control.law import JointLaw, Law, LawSetup, LinearFeedback, Need
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import Array
@@ -53,12 +53,12 @@ class NmpcLaw(JointLaw[NmpcGains]):
     ) -> None:
         """Set up the law; ``computed_torque`` makes the inverse dynamics of a robot."""
         self._robot, self._make = robot, computed_torque
-        self.carry(robot)
+        self._efforts = computed_torque(robot)
         self.use(gains)
 
     def carry(self, robot: RobotModel) -> None:
         """Go on with the inverse dynamics of a robot that carries something else."""
-        self._efforts = self._make(robot)
+        self._efforts = continued(self._make(robot), self._efforts)
 
     @property
     def efforts(self) -> TrackingEfforts:
@@ -67,7 +67,7 @@ class NmpcLaw(JointLaw[NmpcGains]):
 
     @property
     def memory(self) -> Array:
-        """The memory of the computed torque, empty unless disturbances are observed."""
+        """The memory of the computed torque, empty unless something is compensated."""
         return memory_of(self._efforts)
 
     def restore(self, memory: Array) -> None:

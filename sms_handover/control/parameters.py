@@ -27,6 +27,33 @@ class ControllerParameters(MpcGains, PidGains, NmpcGains):
         minimum=0.0,
         maximum=1e4,
     )
+    integral_time: float = parameter(
+        "laws with a model of the dynamics: integral time T_i of their feedback of the tracking error; 0: no "
+        "integral action",
+        unit="s",
+        minimum=0.0,
+        maximum=1e4,
+    )
+    friction_viscous: float = parameter(
+        "laws with a model of the dynamics: viscous friction that each joint is believed to have, added to "
+        "the efforts; 0: none",
+        unit="N m s/rad",
+        minimum=0.0,
+        maximum=1e3,
+    )
+    friction_coulomb: float = parameter(
+        "laws with a model of the dynamics: Coulomb friction that each joint is believed to have, added to "
+        "the efforts; 0: none",
+        unit="N m",
+        minimum=0.0,
+        maximum=1e3,
+    )
+    friction_speed: float = parameter(
+        "desired joint rate within which the believed Coulomb friction changes its sign smoothly",
+        unit="rad/s",
+        minimum=1e-6,
+        maximum=10.0,
+    )
     reference_hold: float = parameter(
         "real time: how long the desired motion is extrapolated when the next reference is overdue, before "
         "it stops",

@@ -8,11 +8,11 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from sms_handover.errors import ControllerError
+from sms_handover.plan_report import PlannedPaths, PlanReport
 from sms_handover.types import (
     Array,
     GraspEvent,
     JointReference,
-    PlanReport,
     Pose,
     PreviewedTargets,
     PreviewState,
@@ -81,6 +81,46 @@ class Planning(Protocol):
         """Return the report of the solve since the last call, None if there was none."""
 
 
+@runtime_checkable
+class Showing(Protocol):
+    """What a controller has besides that shows where its plans lead the tools."""
+
+    def take_paths(self) -> PlannedPaths | None:
+        """Return the paths that are new since the last call, None if there are none."""
+
+
+class RemoteSolver(Protocol):
+    """What a planning law gets in real time: a process that solves its problems, one after the other."""
+
+    def submit(self, problem: Any) -> None:
+        """Send a problem."""
+
+    def take(self) -> Any:
+        """Return the next solution, None if there is none yet; never waits."""
+
+    def forget(self) -> None:
+        """Drop the solutions of all problems so far."""
+
+    @property
+    def trouble(self) -> str:
+        """How the process has ended, '' while it runs."""
+
+    def close(self) -> None:
+        """End the process."""
+
+
+@runtime_checkable
+class Remote(Planning, Protocol):
+    """What a controller has besides whose solver is another process."""
+
+    @property
+    def trouble(self) -> str:
+        """How that process has ended, '' while it runs."""
+
+    def close(self) -> None:
+        """End that process."""
+
+
 class Preview(Protocol):
     """What a law that declares the need gets: the targets to come, as far as the schedule tells."""
 
@@ -88,9 +128,14 @@ class Preview(Protocol):
         """Return to the start of a run."""
 
     def update(
-        self, phase: TaskPhase, reference: JointReference, tool_in_world: Mapping[str, Pose], q: Array
+        self,
+        phase: TaskPhase,
+        reference: JointReference,
+        tool_in_world: Mapping[str, Pose],
+        q: Array,
+        v: Array,
     ) -> None:
-        """Take the guidance of now, at a configuration (7 + n,)."""
+        """Take the guidance of now, at a configuration (7 + n,) and a velocity (6 + n,)."""
 
     def grasped(self, event: GraspEvent) -> None:
         """Learn what came of a grasp command, between two updates."""

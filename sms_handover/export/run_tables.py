@@ -81,6 +81,15 @@ def _ticks(run: RunData, wanted: Wanted) -> RunTable:
     columns.add_pose("base", run.base_pose)
     columns.add_all([f"base.linear_velocity.{axis}" for axis in _AXES], "m/s", run.base_twist[:, :3])
     columns.add_all([f"base.angular_velocity.{axis}" for axis in _AXES], "rad/s", run.base_twist[:, 3:])
+    if run.measured:
+        for quantity, unit, values in (
+            ("measured_position", "rad", run.measured.joint_position),
+            ("measured_velocity", "rad/s", run.measured.joint_velocity),
+        ):
+            columns.add_all([f"{joint}.{quantity}" for joint in run.joint_names], unit, values)
+        columns.add_pose("base.measured", run.measured.base_pose)
+        rate = run.measured.base_twist[:, 3:]
+        columns.add_all([f"base.measured_angular_velocity.{axis}" for axis in _AXES], "rad/s", rate)
     return columns.table("ticks")
 
 
@@ -96,6 +105,8 @@ def _references(run: RunData, wanted: Wanted) -> RunTable:
         columns.add_pose(f"{arm}.target", run.target_pose[arm])
         columns.add_pose(f"{arm}.tool", run.tool_pose[arm])
     columns.add_pose("deputy", run.deputy_pose)
+    if run.measured:
+        columns.add_pose("deputy.measured", run.measured.deputy_pose)
     columns.add_all([f"deputy.linear_velocity.{axis}" for axis in _AXES], "m/s", run.deputy_twist[:, :3])
     columns.add_all([f"deputy.angular_velocity.{axis}" for axis in _AXES], "rad/s", run.deputy_twist[:, 3:])
     columns.add_all([f"linear_momentum.{axis}" for axis in _AXES], "kg m/s", run.linear_momentum)

@@ -8,7 +8,8 @@ from enum import Enum
 from typing import TypeVar
 
 from sms_handover.graph.events import Severity
-from sms_handover.types import GraspAction, GraspStatus, IkStatus, PhaseState, PlanStatus
+from sms_handover.plan_report import PlanStatus
+from sms_handover.types import GraspAction, GraspStatus, IkStatus, PhaseState
 
 E = TypeVar("E", bound=Enum)
 

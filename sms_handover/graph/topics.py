@@ -5,7 +5,7 @@ recorder checks its counts against it. Names are relative, so a namespace moves 
 ``/clock`` and ``/diagnostics`` are global by ROS convention.
 """
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from enum import Enum
 
@@ -31,6 +31,8 @@ class Rate(Enum):
     CHANGE = "on change, latched"
     WALL = "every second of wall time"
     SOLVE = "every solve of a predictive law"
+    SHOWN = "every fifth solve of a predictive law"
+    SENSOR = "as the sensor gives results"
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,17 @@ TASK_PHASE = "task/phase"
 GRASP_EVENT = "task/grasp_event"
 DEPUTY_POSE = "deputy/pose"
 DEPUTY_ODOMETRY = "deputy/odometry"
+MEASURED_JOINT_STATES = "measured_joint_states"  # what sensors tell, only where there are any
+MEASURED_BASE_ODOMETRY = "measured_base_odometry"
+MEASURED_SAMPLED_JOINT_STATES = "sampled_measured_joint_states"
+MEASURED_SAMPLED_BASE_ODOMETRY = "sampled_measured_base_odometry"
+MEASURED_DEPUTY_POSE = "deputy/measured_pose"
+GYRO, STAR_TRACKER, VISION = "sensors/gyro", "sensors/star_tracker", "sensors/vision"
+SENSOR_TYPES = {  # of the topics of sensors that have one of their own
+    GYRO: "sensor_msgs/msg/Imu",
+    STAR_TRACKER: "geometry_msgs/msg/PoseWithCovarianceStamped",
+    VISION: "geometry_msgs/msg/PoseWithCovarianceStamped",
+}
 CLEARANCE = "clearance"  # only where it is measured online
 LINEAR_MOMENTUM = "momentum/linear"
 ANGULAR_MOMENTUM = "momentum/angular"
@@ -87,6 +100,7 @@ ANGULAR_IMPULSE = "impulse/angular"
 ENERGY = "energy"
 IK_STATUS = "ik/status"
 MPC_STATUS = "mpc/status"  # only where the law solves a program as it goes on
+PLANNED_PATHS = "mpc/planned_paths"  # markers, for viewers
 ROBOT_DESCRIPTION = "robot_description"
 DEPUTY_MARKER = "deputy/marker"
 RUN_STATE = "run/state"
@@ -115,26 +129,55 @@ _OURS = "sms_handover_interfaces/msg"
 RUN_STATE_TYPE = f"{_OURS}/RunState"
 
 
+def sensor_topic(sensor: str) -> str:
+    """Return the name of the topic with what a sensor gives."""
+    return f"sensors/{sensor}"
+
+
+def state_topics(*, measured: bool) -> tuple[str, str]:
+    """Return the topics of the state that a controller answers, as it is or as it is measured."""
+    return (MEASURED_JOINT_STATES, MEASURED_BASE_ODOMETRY) if measured else (JOINT_STATES, BASE_ODOMETRY)
+
+
+def sampled_topics(*, measured: bool) -> tuple[str, str, str]:
+    """Return the topics of robot and deputy that the trajectory goes by."""
+    if measured:
+        return MEASURED_SAMPLED_JOINT_STATES, MEASURED_SAMPLED_BASE_ODOMETRY, MEASURED_DEPUTY_POSE
+    return SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE
+
+
 def graph_topics(
-    arms: Iterable[str], *, clearance: bool = False, wrenches: bool = False
+    arms: Iterable[str],
+    *,
+    clearance: bool = False,
+    wrenches: bool = False,
+    sensors: Collection[str] = (),
+    measured: bool = False,
 ) -> tuple[Topic, ...]:
     """Return every topic of the graph for a robot with these arms.
 
-    ``clearance`` if it is measured online; ``wrenches`` if conditions have some from outside.
+    ``clearance`` if it is measured online; ``wrenches`` if conditions have some from outside; ``sensors`` are
+    the topics of those that conditions have; with ``measured`` the loop goes by what they tell.
     """
     everyone_else = (TRAJECTORY, IK, CONTROLLER)
+    by_law, by_trajectory = state_topics(measured=measured), sampled_topics(measured=measured)
     pose, vector = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/Vector3Stamped"
     odometry = "nav_msgs/msg/Odometry"
     joints, text = "sensor_msgs/msg/JointState", "std_msgs/msg/String"
+
+    def state(name: str, type_name: str, rate: Rate) -> Topic:
+        needed_by = (CONTROLLER,) * (name in by_law) + (TRAJECTORY,) * (name in by_trajectory)
+        return Topic(name, type_name, (PLANT,), needed_by, rate)
+
     table = [
-        Topic(JOINT_STATES, joints, (PLANT,), (CONTROLLER,), Rate.TICK),
-        Topic(BASE_ODOMETRY, odometry, (PLANT,), (CONTROLLER,), Rate.TICK),
-        Topic(SAMPLED_JOINT_STATES, joints, (PLANT,), (TRAJECTORY,), Rate.REFERENCE),
-        Topic(SAMPLED_BASE_ODOMETRY, odometry, (PLANT,), (TRAJECTORY,), Rate.REFERENCE),
+        state(JOINT_STATES, joints, Rate.TICK),
+        state(BASE_ODOMETRY, odometry, Rate.TICK),
+        state(SAMPLED_JOINT_STATES, joints, Rate.REFERENCE),
+        state(SAMPLED_BASE_ODOMETRY, odometry, Rate.REFERENCE),
         Topic(JOINT_COMMAND, joints, (CONTROLLER,), (PLANT,), Rate.TICK),
         Topic(JOINT_REFERENCE, joints, (TRAJECTORY,), (CONTROLLER,), Rate.REFERENCE),
         Topic(TASK_PHASE, f"{_OURS}/TaskPhase", (TRAJECTORY,), (PLANT, CONTROLLER), Rate.REFERENCE),
-        Topic(DEPUTY_POSE, pose, (PLANT,), (TRAJECTORY,), Rate.REFERENCE),
+        state(DEPUTY_POSE, pose, Rate.REFERENCE),
         Topic(DEPUTY_ODOMETRY, odometry, (PLANT,), (), Rate.REFERENCE),
         Topic(GRASP_EVENT, f"{_OURS}/GraspEvent", (PLANT,), (TRAJECTORY, CONTROLLER), Rate.CHANGE),
         Topic(LINEAR_MOMENTUM, vector, (PLANT,), (), Rate.REFERENCE),
@@ -142,6 +185,7 @@ def graph_topics(
         Topic(ENERGY, f"{_OURS}/EnergyStamped", (PLANT,), (), Rate.REFERENCE),
         Topic(IK_STATUS, f"{_OURS}/IkStatus", (TRAJECTORY,), (), Rate.REFERENCE),
         Topic(MPC_STATUS, f"{_OURS}/MpcStatus", (CONTROLLER,), (), Rate.SOLVE),
+        Topic(PLANNED_PATHS, "visualization_msgs/msg/MarkerArray", (CONTROLLER,), (), Rate.SHOWN),
         Topic(ROBOT_DESCRIPTION, text, (PLANT,), (), Rate.CHANGE),
         Topic(TF, TF_TYPE, (PLANT, TRAJECTORY), (), Rate.REFERENCE),
         Topic(TF_STATIC, TF_TYPE, (PLANT,), (), Rate.CHANGE),
@@ -158,6 +202,19 @@ def graph_topics(
     if wrenches:
         table += [
             Topic(name, vector, (PLANT,), (), Rate.REFERENCE) for name in (LINEAR_IMPULSE, ANGULAR_IMPULSE)
+        ]
+    if sensors or measured:
+        table += [
+            state(MEASURED_JOINT_STATES, joints, Rate.TICK),
+            state(MEASURED_BASE_ODOMETRY, odometry, Rate.TICK),
+            state(MEASURED_SAMPLED_JOINT_STATES, joints, Rate.REFERENCE),
+            state(MEASURED_SAMPLED_BASE_ODOMETRY, odometry, Rate.REFERENCE),
+            state(MEASURED_DEPUTY_POSE, pose, Rate.REFERENCE),
+        ]
+        table += [
+            Topic(name, kind, (PLANT,), (), Rate.SENSOR)
+            for name, kind in SENSOR_TYPES.items()
+            if name in sensors
         ]
     if clearance:
         table.append(Topic(CLEARANCE, f"{_OURS}/Clearance", (PLANT,), (TRAJECTORY,), Rate.REFERENCE))

@@ -22,7 +22,7 @@ from sms_handover.launcher.recorded_scenario import scenario_in
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.ros.parameters import as_arguments
 from sms_handover.ros.process.network_scope import network_scope_to
-from sms_handover.simulation.parameters import LOCKSTEP
+from sms_handover.simulation.parameters import LOCKSTEP, TRUE
 from sms_handover.simulation.scenario import Scenario
 from sms_handover.units import ns_to_seconds
 
@@ -89,6 +89,7 @@ def _plant_arguments(scenario: Scenario) -> list[str]:
     """Return the ROS arguments of a plant that waits for the commands and for no other node."""
     overrides = scenario.overrides
     common = {**overrides.get(COMMON, {}), "mode": LOCKSTEP, "peers": PEERS, "autostart": True}
+    common["source"] = TRUE  # the recorded commands answer whatever the law was given
     return as_arguments({**common, **overrides.get(PLANT, {})})
 
 

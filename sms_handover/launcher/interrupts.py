@@ -40,6 +40,11 @@ class Interrupts:
         """Whether nothing is to be waited for."""
         return self._count > 1
 
+    def heed(self) -> None:
+        """Raise KeyboardInterrupt if the run is to end: there is nothing yet to be ended in order."""
+        if self.asked:
+            raise KeyboardInterrupt
+
     def poll(self) -> list[str]:
         """Return a line for the user if there was an interrupt since the last call."""
         new = self._reported < self._count

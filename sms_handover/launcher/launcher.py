@@ -109,13 +109,17 @@ def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outc
         processes = stack.enter_context(
             NodeProcesses(plan.log_folder, graph_environment(plan), plan.inherited, plan.server)
         )
-        for name, arguments in arguments_of(plan).items():
+        driver = LifecycleDriver(node, plan.own_nodes)
+        if plan.server is not None:
+            plan.server.wait_until_ready(interrupts.heed)
+        started = arguments_of(plan)
+        for name in sorted(started, key=lambda name: name != RECORDER):  # which takes longest to configure
+            arguments = started[name]
             if name not in plan.external:
                 processes.start(name, arguments.line)
             elif plan.controller:
                 named = ("--remap", f"__node:={name}")
                 processes.start(name, (*arguments.line, *named), plan.controller)
-        driver = LifecycleDriver(node, plan.own_nodes)
         display = stack.enter_context(Display(end_ns))
         return _Run(plan, monitor, driver, executor, processes, display, interrupts, memory).to_the_end()
 

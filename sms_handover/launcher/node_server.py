@@ -13,15 +13,19 @@ import ctypes
 import gc
 import json
 import os
+import select
 import socket
 import subprocess
 import sys
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 
-from sms_handover.graph.topics import CONTAINER, NODES, graph_topics
+from sms_handover.errors import GraphError
+from sms_handover.graph.topics import CONTAINER, NODES, SENSOR_TYPES, graph_topics
+from sms_handover.launcher.timeouts import ActiveTime
 from sms_handover.ros.process.launcher_process import launcher_environment
 
 MODULE = "sms_handover.launcher.node_server"
@@ -31,6 +35,10 @@ _PR_SET_CHILD_SUBREAPER = 36  # of prctl(2)
 _ROOM = 4096  # characters of a command line
 _LARGEST = 2**20  # [byte] of a request
 _MOST_DESCRIPTORS = 64
+_READY = b"ready"  # what the server sends once it can fork
+_IMPORT_TIMEOUT_S = 60.0  # [s] of wall time for that
+_POLL_S = 0.02  # [s] between two looks meanwhile at what else there is
+_ANSWER_TIMEOUT_S = 20.0  # [s] of wall time for a fork, a millisecond's work
 _ARGUMENTS_AT = 46  # field of /proc/PID/stat behind the name in which the address of the arguments stands
 
 
@@ -40,6 +48,7 @@ class NodeServer:
     def __init__(self) -> None:
         """Start it, if this system can have one; it is busy with its imports for a moment."""
         self._channel: socket.socket | None = None
+        self._ready = False
         if not _adopts_orphans(True):
             return
         self._channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -70,17 +79,41 @@ class NodeServer:
     ) -> "ForkedProcess | None":
         """Return the process of a node or of the container, None if there is no server to fork it.
 
-        The first of the ``descriptors`` takes what it prints, the others are kept open.
+        The first of the ``descriptors`` takes what it prints, the others are kept open. Raises GraphError if
+        the server does not answer: it may have forked a node that nobody would know of.
         """
         if self._channel is None:
             return None
+        self.wait_until_ready()
         request = {"node": node, "arguments": list(arguments), "environment": dict(environment)}
         try:
             socket.send_fds(self._channel, [json.dumps(request).encode()], descriptors)
             answer = self._channel.recv(_LARGEST)
+        except TimeoutError as error:
+            text = f"the node server has not started {node!r} within {_ANSWER_TIMEOUT_S:g} s (suspended?)"
+            raise GraphError(text) from error
         except OSError:
             return None
         return ForkedProcess(int(answer)) if answer else None
+
+    def wait_until_ready(self, meanwhile: Callable[[], None] = lambda: None) -> None:
+        """Wait until the server has imported what it forks, or has ended: :meth:`start` then answers at once.
+
+        Calls ``meanwhile`` again and again; raises GraphError after a minute.
+        """
+        time = ActiveTime()
+        while self._channel is not None and not self._ready:
+            if select.select([self._channel], [], [], _POLL_S)[0]:
+                self._channel.settimeout(_ANSWER_TIMEOUT_S)
+                with suppress(OSError):  # it has ended, which is noticed by the first request
+                    self._channel.recv(_LARGEST)
+                self._ready = True
+            time.update()
+            if time.seconds > _IMPORT_TIMEOUT_S:
+                raise GraphError(
+                    f"the node server has not imported its modules within {_IMPORT_TIMEOUT_S:g} s"
+                )
+            meanwhile()
 
 
 SERVED_ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}  # what counts while modules load
@@ -121,16 +154,17 @@ def serve(channel: socket.socket) -> int:
 
     In a process of a node this returns too, when the node has ended.
     """
+    gc.disable()  # nearly all that an import makes stays: to look for what does not takes a fifth of the time
     warnings.simplefilter(
         "ignore", DeprecationWarning
     )  # of forking beside threads: those of LTTng, which rest
     mains = {node: import_module(f"{NODE_MODULES}.{node}").main for node in (*NODES, CONTAINER)}
     message_class = import_module("sms_handover.ros.message_types").message_class
-    for topic in graph_topics((), clearance=True):
+    for topic in graph_topics((), clearance=True, sensors=SENSOR_TYPES):
         message_class(topic.type).__class__.__import_type_support__()
     import_module("sms_handover.messages.message_types").MessageTypes()  # the definitions of rosbags
-    gc.collect()
     gc.freeze()
+    channel.send(_READY)
     while True:
         data, descriptors, _, _ = socket.recv_fds(channel, _LARGEST, _MOST_DESCRIPTORS)
         if not data:
@@ -156,6 +190,7 @@ def serve(channel: socket.socket) -> int:
 
 def _become(request: Mapping[str, object], descriptors: Sequence[int]) -> None:
     """Give this process what a node has that was started by itself."""
+    gc.enable()
     os.setsid()
     log, *kept = descriptors
     for stream in (1, 2):

@@ -3,8 +3,11 @@
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from sms_handover.graph.events import RunEvent, Severity
 from sms_handover.graph.message_constants import member_of
+from sms_handover.plan_report import PlannedPaths, PlanReport, PlanStatus
 from sms_handover.types import (
     Collision,
     GraspAction,
@@ -12,8 +15,6 @@ from sms_handover.types import (
     GraspEvent,
     GraspStatus,
     PhaseState,
-    PlanReport,
-    PlanStatus,
     TaskPhase,
 )
 from sms_handover.units import NS_PER_S
@@ -101,7 +102,7 @@ def grasp_event(message: Any) -> GraspEvent:
 
 
 def _components(vector: Any) -> tuple[float, float, float]:
-    """Return the components of a Vector3."""
+    """Return the components of a Vector3 or a Point."""
     return vector.x, vector.y, vector.z
 
 
@@ -133,6 +134,16 @@ def plan_report(message: Any) -> PlanReport:
         late_plans=int(message.late_plans),
         reused_plans=int(message.reused_plans),
     )
+
+
+def planned_paths(message: Any) -> PlannedPaths:
+    """Return the value of a MarkerArray with a line per arm; raises KeyError unless it has any."""
+    if not message.markers:
+        raise KeyError("a line per arm")
+    lines = {
+        marker.ns: np.array([_components(point) for point in marker.points]) for marker in message.markers
+    }
+    return PlannedPaths(header_ns(message.markers[0]), lines)
 
 
 def run_event(message: Any) -> RunEvent:

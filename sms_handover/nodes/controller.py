@@ -12,20 +12,21 @@ from sms_handover.configuration.scenario_file import LAW
 from sms_handover.control.law import Need
 from sms_handover.control.parameters import ControllerParameters, parameters_with
 from sms_handover.control.plan_events import PlanEvents
-from sms_handover.control.protocol import Carrying, Controller, Planning, inner_of
+from sms_handover.control.protocol import Carrying, Controller, Planning, Remote, Showing, inner_of
 from sms_handover.control.registry import law_named
 from sms_handover.frames import BASE, WORLD
 from sms_handover.graph.topics import (
-    BASE_ODOMETRY,
     CONTROLLER,
     GRASP_EVENT,
     JOINT_COMMAND,
     JOINT_REFERENCE,
-    JOINT_STATES,
     MPC_STATUS,
+    PLANNED_PATHS,
     TASK_PHASE,
+    state_topics,
 )
 from sms_handover.nodes.parts.guidance_parts import GuidanceParts
+from sms_handover.nodes.parts.marker import path_markers
 from sms_handover.nodes.parts.watchdogs import ReferenceWatchdog
 from sms_handover.ros.codecs.convert import plan_message
 from sms_handover.ros.codecs.events import read_grasp_event
@@ -43,11 +44,9 @@ from sms_handover.ros.node.graph_node import GraphNode, P
 from sms_handover.ros.node.message_filter import Decode
 from sms_handover.ros.process.main import run_node
 from sms_handover.ros.transport.stamp_sync import StampOrder, StampSync
-from sms_handover.simulation.parameters import LOCKSTEP
+from sms_handover.simulation.parameters import LOCKSTEP, REALTIME
 from sms_handover.simulation.wiring import longest_reference_ns, make_controller
 from sms_handover.units import NS_PER_S
-
-_STATE = (JOINT_STATES, BASE_ODOMETRY)
 
 
 class AnsweringNode(GraphNode[P]):
@@ -76,11 +75,12 @@ class AnsweringNode(GraphNode[P]):
         )
         guidance[TASK_PHASE] = self._phase_codec.checked
         guidance[JOINT_REFERENCE] = self._reference_codec.checked
+        self._state = self._joints, self._odometry = state_topics(measured=self.common.uses_measurements)
         state: dict[str, Decode[Stamped[Any]]] = {
-            JOINT_STATES: self._state_codec.joints.checked,
-            BASE_ODOMETRY: self._state_codec.odometry.checked,
+            self._joints: self._state_codec.joints.checked,
+            self._odometry: self._state_codec.odometry.checked,
         }
-        self._everything = (*_STATE, *guidance)
+        self._everything = (*self._state, *guidance)
         ahead_ns = self._reference_ns if self._lockstep else NS_PER_S
         self._inputs: StampSync[Any] = StampSync(ahead_ns=ahead_ns, paced=not self._lockstep)
         self._orders = {topic: StampOrder(ahead_ns) for topic in guidance}
@@ -140,11 +140,11 @@ class AnsweringNode(GraphNode[P]):
         stamp = self._inputs.oldest_ns
         if stamp is None:
             stamp = self._answered_ns + self._tick_ns if self._command.count else 0
-        return self._inputs.missing(stamp, self._needed(stamp)) or BASE_ODOMETRY
+        return self._inputs.missing(stamp, self._needed(stamp)) or self._odometry
 
     def _needed(self, stamp: int) -> tuple[str, ...]:
         """Return the inputs that belong to a stamp, the last one to come last."""
-        return self._everything if self._lockstep and stamp % self._reference_ns == 0 else _STATE
+        return self._everything if self._lockstep and stamp % self._reference_ns == 0 else self._state
 
     def _on_input(self, topic: str, message: Stamped[Any], sent_ns: int) -> None:
         """Take one input; a state of time zero after an answered one restarts the run.
@@ -153,7 +153,7 @@ class AnsweringNode(GraphNode[P]):
         """
         stamp, content = message
         if self._inputs.restarts_run(stamp):
-            if topic not in _STATE:
+            if topic not in self._state:
                 self._early[topic] = content
                 return
             self._inputs.reset()
@@ -166,7 +166,7 @@ class AnsweringNode(GraphNode[P]):
                 self._orders[topic].accept(stamp, self._answered_ns)
                 self._guide(topic, stamp, content)
             return
-        if topic == BASE_ODOMETRY and stamp == self._answered_ns and self._lockstep and self._answer_bytes:
+        if topic == self._odometry and stamp == self._answered_ns and self._lockstep and self._answer_bytes:
             self._command.publish(self._answer_bytes)  # the plant has resent it: it has missed the answer
         self._inputs.add(stamp, topic, content)
         self._answer(stamp)
@@ -208,7 +208,7 @@ class AnsweringNode(GraphNode[P]):
             commands = inputs[TASK_PHASE].commands
             if commands and isinstance(self._controller, Carrying):
                 self._commanded = stamp, len(commands)
-        q, v = coordinates(inputs[JOINT_STATES], inputs[BASE_ODOMETRY])
+        q, v = coordinates(inputs[self._joints], inputs[self._odometry])
         effort = self._controller.effort(stamp, q, v) if self._parts.complete else self._no_effort
         self._answer_bytes = self._command_codec.pack(stamp, effort=effort)
         self._command.publish(self._answer_bytes)
@@ -231,6 +231,7 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
 
     def __init__(self) -> None:
         super().__init__(ControllerParameters)
+        self._remote: Remote | None = None
 
     def parameter_group(
         self, group: type[ControllerParameters], scenario: Mapping[str, object]
@@ -244,9 +245,12 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
     def prepare(self) -> None:
         """Set up the law; raises UnstableLoopError if its gains cannot work at this tick."""
         self._plans = self.endpoints.publisher(MPC_STATUS)
+        self._lines = self.endpoints.publisher(PLANNED_PATHS)
         super().prepare()
         inner = inner_of(self._controller)
         self._solves = inner if isinstance(inner, Planning) else None
+        self._remote = inner if isinstance(inner, Remote) else None
+        self._shows = inner if isinstance(inner, Showing) else None
         self._plan_events = PlanEvents()
         self._watchdog = ReferenceWatchdog(longest_reference_ns(self.common, self.parameters))
 
@@ -262,7 +266,26 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
 
     def make_controller(self) -> Controller:
         """Return the controller that the parameters ask for; raises ConfigurationError."""
-        return make_controller(self.robot, self.schedule, self.common, self.parameters)
+        real_time = self.common.mode == REALTIME
+        return make_controller(
+            self.robot, self.schedule, self.common, self.parameters, in_real_time=real_time
+        )
+
+    def clean_up(self) -> None:
+        """Give the inputs back to the middleware, and end the process of a solver."""
+        super().clean_up()
+        self._close()
+
+    def destroy_node(self) -> None:
+        """Destroy the node with its inputs, and end the process of a solver."""
+        super().destroy_node()
+        self._close()
+
+    def _close(self) -> None:
+        """End the process of a solver."""
+        if self._remote:
+            self._remote.close()
+            self._remote = None
 
     def begin(self) -> None:
         """Go back to the start of a run."""
@@ -275,7 +298,11 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
         report = self._solves.take_status() if self._solves else None
         if report:
             self._plans.publish(plan_message(report))
-            self.events.publish_all(self._plan_events.of(report))
+            trouble = self._remote.trouble if self._remote else ""
+            self.events.publish_all(self._plan_events.of(report, trouble))
+        paths = self._shows.take_paths() if self._shows else None
+        if paths:
+            self._lines.publish(path_markers(paths))
         if not self._lockstep:
             event = self._watchdog.poll(self._parts.reference_ns, stamp)
             if event is not None:

@@ -162,10 +162,8 @@ class PlantNode(GraphNode[PlantParameters]):
     def _make_endpoints(self) -> None:
         names = [GRASP_EVENT, RUN_STATE, LOOP_TIMING]
         self._publish = {name: self.endpoints.publisher(name) for name in names}
-        wrenches = bool(self.conditions.wrenches)
-        self._outputs = PlantOutputs(
-            self.robot, self.endpoints.publisher, lockstep=self.lockstep, wrenches=wrenches
-        )
+        publisher = self.endpoints.publisher
+        self._outputs = PlantOutputs(self.robot, publisher, self.common, self.conditions)
         for topic, codec in ((TASK_PHASE, self._phase_codec), (JOINT_COMMAND, self._command_codec)):
             self.inputs.subscribe(topic, partial(self._on_input, topic), codec.checked)
         self.inputs.subscribe(RUN_RECORDED, self._on_recorded, stamped)

@@ -47,6 +47,7 @@ from sms_handover.simulation.scenario import scenario_text
 
 _POLL_S = 0.005  # [s] of wall time between two batches: long enough to be cheap, short enough to lose little
 _LOCKSTEP_POLL_S = 0.002  # [s] where the plant would run out of what it may be ahead, and wait
+_REALTIME_NICENESS = 3  # [-] at most in real time, where nobody waits for a recorder that is behind
 _QUIET_S = 0.05  # [s] of wall time without a message after which nothing is on the way any more
 _DRAIN_S = 1.0  # [s] of wall time at most to wait for that
 _FLUSH_NS = 15_000_000  # [ns] of simulation time after which what has come is written to the file
@@ -94,8 +95,12 @@ class RecorderNode(GraphNode[RecorderParameters]):
 
     @property
     def niceness(self) -> int:
-        """Return how far the process stands back behind others, as its parameter says."""
-        return self.parameters.niceness
+        """Return how far the process stands back behind others.
+
+        In lock step that is as its parameter says, as the plant waits for a recorder that is behind.
+        """
+        wanted = self.parameters.niceness
+        return wanted if self.common.mode == LOCKSTEP else min(wanted, _REALTIME_NICENESS)
 
     def is_ready(self) -> bool:
         """Whether a bag is open, and the parameters of every node have been written into it."""
@@ -140,6 +145,8 @@ class RecorderNode(GraphNode[RecorderParameters]):
         executor.spin_once(timeout_sec=self._poll_s)
         nothing = not self.inputs.loop.poll()
         if not self.active:
+            if not self._closed:
+                self._peer_parameters.poll()  # so that the answers are there when the run could begin
             return
         self._flush(idle=nothing and monotonic() - self._last_message > _POLL_S)
         if self._run_is_over and not self.finished and self._drained():

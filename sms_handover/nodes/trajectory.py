@@ -12,16 +12,14 @@ from sms_handover.errors import GraphError
 from sms_handover.frames import BASE, WORLD, target_frame
 from sms_handover.graph.topics import (
     CLEARANCE,
-    DEPUTY_POSE,
     GRASP_EVENT,
     IK_STATUS,
     JOINT_REFERENCE,
-    SAMPLED_BASE_ODOMETRY,
-    SAMPLED_JOINT_STATES,
     SOLVE_IK,
     TASK_PHASE,
     TF,
     TRAJECTORY,
+    sampled_topics,
     target_pose,
 )
 from sms_handover.messages.message_types import MessageTypes
@@ -50,8 +48,6 @@ from sms_handover.trajectory.generator import Targets
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.types import Array, RobotState, TaskPhase
 from sms_handover.units import NS_PER_S
-
-_INPUTS = (SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
 
 
 class TrajectoryNode(GraphNode[TrajectoryParameters]):
@@ -91,7 +87,9 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
             self.inputs.subscribe(CLEARANCE, self._on_clearance, stamped)
         state = StateCodec(self.robot.joint_names, WORLD, BASE)
         checks = (state.joints.checked, state.odometry.checked, self._pose_codec.checked)
-        for topic, checked in zip(_INPUTS, checks, strict=True):
+        self._needed = sampled_topics(measured=self.common.uses_measurements)
+        self._joints, self._odometry, self._deputy = self._needed
+        for topic, checked in zip(self._needed, checks, strict=True):
             self.inputs.subscribe(topic, partial(self._on_input, topic), checked)
 
     def is_ready(self) -> bool:
@@ -122,7 +120,7 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         if self._waits_for_clearance:
             return CLEARANCE
         stamp = self._inputs.oldest_ns
-        return (self._inputs.missing(stamp, _INPUTS) if stamp is not None else "") or DEPUTY_POSE
+        return (self._inputs.missing(stamp, self._needed) if stamp is not None else "") or self._deputy
 
     def _on_input(self, topic: str, message: Stamped[Any], sent_ns: int) -> None:
         """Take one input; time zero after a later time restarts the run."""
@@ -131,9 +129,9 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
             self._inputs.reset()
             self._generator.reset()
             self._unmeasured_ns = None
-        if topic == DEPUTY_POSE and self._requested is not None:
+        if topic == self._deputy and self._requested is not None:
             self._repeat_request(stamp)
-        elif topic == DEPUTY_POSE and stamp == self._stamp_ns:
+        elif topic == self._deputy and stamp == self._stamp_ns:
             self._publish_again()
         self._inputs.add(stamp, topic, content)
         self._newest_ns = stamp
@@ -173,12 +171,12 @@ class TrajectoryNode(GraphNode[TrajectoryParameters]):
         """Work on the state of a stamp if all of it is there."""
         if self._waits_for_grasps or self._waits_for_clearance:
             return
-        inputs = self._inputs.take(stamp, _INPUTS)
+        inputs = self._inputs.take(stamp, self._needed)
         if inputs is None:
             return
         self._stamp_ns = stamp
-        state = state_of(stamp, inputs[SAMPLED_JOINT_STATES], inputs[SAMPLED_BASE_ODOMETRY])
-        phase, targets = self._generator.targets(state, inputs[DEPUTY_POSE])
+        state = state_of(stamp, inputs[self._joints], inputs[self._odometry])
+        phase, targets = self._generator.targets(state, inputs[self._deputy])
         for event in self._generator.take_decisions():
             self.events.publish(event)
         if targets.tool_in_world:

@@ -11,16 +11,17 @@ from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
 from sms_handover.model.conserved import ConservedQuantities, together
 from sms_handover.model.robot_model import BASE_NQ, RobotModel
-from sms_handover.plant.deputy import DeputyMotion, MasslessDeputy
+from sms_handover.plant.deputy import MasslessDeputy
 from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics, pinocchio_dynamics
-from sms_handover.plant.effects import EffectsState, PlantEffects
+from sms_handover.plant.effects import PlantEffects
 from sms_handover.plant.enforced_limits import EnforcedLimits
 from sms_handover.plant.external_wrenches import Companion, ExternalAccount
 from sms_handover.plant.grasping import execute_grasp
 from sms_handover.plant.integrators import TABLEAUS
-from sms_handover.plant.joint_limits import ENFORCE, Excess, JointLimitWatch
+from sms_handover.plant.joint_limits import ENFORCE, JointLimitWatch
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.plant.payload import Payload
+from sms_handover.plant.plant_state import PlantState
 from sms_handover.plant.rigid_deputy import RigidDeputy
 from sms_handover.types import (
     Array,
@@ -55,22 +56,6 @@ class InitialState:
     deputy_grasp_frames: Mapping[str, Pose]
     deputy_twist_in_world: Twist | None = None
     deputy_inertia: pin.Inertia | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class PlantState:
-    """Everything that the later motion of a plant, its counts and its events depend on."""
-
-    tick: int
-    q: Array
-    v: Array
-    joint_effort: Array
-    work: float
-    losses: float
-    saturated_ticks: tuple[int, ...]
-    excesses: tuple[Excess, ...]
-    deputy: DeputyMotion
-    effects: EffectsState | None
 
 
 class FreeFloatingPlant:

@@ -8,6 +8,7 @@ import numpy as np
 
 from sms_handover.analysis import signals
 from sms_handover.analysis.decimation import decimate
+from sms_handover.analysis.measurement_errors import measurement_errors
 from sms_handover.analysis.numbers import lengths
 from sms_handover.analysis.phases import phase_spans
 from sms_handover.analysis.signals import Signal
@@ -102,11 +103,21 @@ _ENERGY = (
     _Kind("energy", "Kinetic energy, work of the torques, and heat", 1.0, "J"),
     _Kind("energy_residual", "Energy gained beyond the work done, less heat", 1.0, "J"),
 )
+_ENCODERS = (
+    _Kind("encoder_error", "Angles of {arm} by the encoders, less the true ones", DEG_PER_RAD, "deg"),
+    _Kind("rate_error", "Rates of {arm} by the encoders, less the true ones", DEG_PER_RAD, "deg/s"),
+)
+_OTHER_SENSORS = (
+    _Kind("gyro_error", "Angular velocity of the base by the gyro, less the true one", DEG_PER_RAD, "deg/s"),
+    _Kind("star_tracker_error", "Orientation of the base by the star tracker, off by", DEG_PER_RAD, "deg"),
+    _Kind("vision_position_error", "Position of the deputy by vision, less the true one", MM_PER_M, "mm"),
+    _Kind("vision_angle_error", "Orientation of the deputy by vision, off by", DEG_PER_RAD, "deg"),
+)
 
 
 def plot_groups(runs: Sequence[RunData]) -> tuple[PlotGroup, ...]:
     """Return all plots of the runs."""
-    found = [signals.signals_of(run) for run in runs]
+    found = [{**signals.signals_of(run), **measurement_errors(run)} for run in runs]
     arms = tuple(dict.fromkeys(arm for run in runs for arm in run.arms))
     cuts = [cuts_of(run) for run in runs]
     with_changes = any(_departs(of_run, kind.key) for of_run in found for kind in _MOMENTA)
@@ -114,6 +125,11 @@ def plot_groups(runs: Sequence[RunData]) -> tuple[PlotGroup, ...]:
     def plots(kinds: Sequence[_Kind], names: Sequence[str]) -> tuple[Plot, ...]:
         return tuple(_plot(kind, name, found, cuts) for kind in kinds for name in names)
 
+    sensed = PlotGroup(
+        "Measurements",
+        "What the sensors told of robot and deputy, less what was true, as the loop knew it at that time.",
+        (*plots(_ENCODERS, arms), *plots(_OTHER_SENSORS, [""])),
+    )
     return (
         PlotGroup(
             "Tools",
@@ -137,6 +153,7 @@ def plot_groups(runs: Sequence[RunData]) -> tuple[PlotGroup, ...]:
             "are rounding errors.",
             plots((*_MOMENTA, *(_CHANGES if with_changes else ()), *_ENERGY), [""]),
         ),
+        *([sensed] if any(run.measured for run in runs) else []),
     )
 
 

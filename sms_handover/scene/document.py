@@ -11,6 +11,7 @@ from sms_handover.frames import DEPUTY
 from sms_handover.model.poses import pose_row
 from sms_handover.run_data import Stamps
 from sms_handover.scene.momentum import Momentum
+from sms_handover.scene.planned_lines import PlannedLines
 from sms_handover.scene.scene import Scene
 from sms_handover.scene.shapes import Shape
 from sms_handover.types import Array, GraspAction, GraspEvent, TaskPhase
@@ -18,28 +19,45 @@ from sms_handover.units import NS_PER_S, ns_to_seconds
 
 Document = dict[str, object]
 
+_MEASURED = f"{DEPUTY}/measured"  # a body of the page
+
 
 def scene_document(name: str, scene: Scene) -> Document:
     """Return a whole scene with the name of its run."""
     blocks = [scene.link_in_world, scene.deputy_in_world[:, None]]
     blocks += [scene.target_in_world[arm][:, None] for arm in scene.arms]
+    measured = scene.measured_deputy
+    if measured is not None:
+        blocks.append(measured[:, None])
     return {
-        **still_document(name, scene.shapes, scene.links, scene.arms, scene.deputy_size),
+        **still_document(
+            name, scene.shapes, scene.links, scene.arms, scene.deputy_size, measured=measured is not None
+        ),
         **moving_document(scene.stamp_ns, np.concatenate(blocks, axis=1)),
         **task_document(scene.phases, scene.grasp_events),
         **({"clearance": _clearance(scene.worst_pair)} if scene.worst_pair else {}),
         **({"momentum": _momentum(scene.momentum)} if scene.momentum else {}),
+        **({"planned": _planned(scene.planned)} if scene.planned else {}),
     }
 
 
 def still_document(
-    name: str, shapes: Sequence[Shape], links: Sequence[str], arms: Sequence[str], deputy_size: Array
+    name: str,
+    shapes: Sequence[Shape],
+    links: Sequence[str],
+    arms: Sequence[str],
+    deputy_size: Array,
+    *,
+    measured: bool = False,
 ) -> Document:
-    """Return the static part: the bodies, in the order of their poses, and their shapes."""
+    """Return the static part: the bodies, in the order of their poses, and their shapes.
+
+    With ``measured`` the last one is the deputy where sensors have told it to be.
+    """
     return {
         "name": name,
         "arms": list(arms),
-        "bodies": [*links, DEPUTY, *(f"{arm}/target" for arm in arms)],
+        "bodies": [*links, DEPUTY, *(f"{arm}/target" for arm in arms), *([_MEASURED] if measured else [])],
         "shapes": [_shape(shape) for shape in shapes],
         "deputy_size": deputy_size.tolist(),
     }
@@ -74,6 +92,15 @@ def _momentum(momentum: Momentum) -> Document:
     return {
         "centres": _base64(momentum.centre_of_mass, "<f4"),
         "angular": _base64(momentum.angular_momentum, "<f4"),
+    }
+
+
+def _planned(planned: PlannedLines) -> Document:
+    """Return the instants (P,) s of plans, and their lines (P, A, K, 3) m with K points each."""
+    return {
+        "times": _base64(planned.stamp_ns / NS_PER_S, "<f8"),
+        "points": _base64(planned.points, "<f4"),
+        "size": planned.points.shape[2],
     }
 
 

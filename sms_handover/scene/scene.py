@@ -13,6 +13,7 @@ from sms_handover.frames import tool_frame
 from sms_handover.run_data import RunData, Stamps
 from sms_handover.scene.links import DescribedRobot
 from sms_handover.scene.momentum import MASSLESS, Momentum, PointMass, momentum_of
+from sms_handover.scene.planned_lines import PlannedLines, planned_lines
 from sms_handover.scene.shapes import Shape, read_shapes
 from sms_handover.types import Array, GraspEvent, TaskPhase, read_only
 from sms_handover.units import NS_PER_S
@@ -27,8 +28,9 @@ class Scene:
     ``stamp_ns`` (T,) is simulation time; ``link_in_world`` (T, L, 7) is in the order of ``links``;
     ``deputy_size`` (3,) m are the edges of the deputy and ``deputy_in_world`` (T, 7) is its centre;
     ``target_in_world`` has (T, 7) per arm. What was not recorded is NaN. ``phases`` has one entry per
-    start of a phase. ``worst_pair`` has the two bodies nearest to each other, None if that is unknown, and
-    ``momentum`` that of robot and deputy, None if there is none.
+    start of a phase. ``worst_pair`` has the two bodies nearest to each other, None if that is unknown,
+    ``momentum`` that of robot and deputy, and ``planned`` where plans led the tools, None if there is none;
+    ``measured_deputy`` (T, 7) is where sensors have told the deputy to be, None without sensors.
     """
 
     shapes: tuple[Shape, ...]
@@ -43,6 +45,8 @@ class Scene:
     grasp_events: tuple[GraspEvent, ...]
     worst_pair: WorstPair | None = None
     momentum: Momentum | None = None
+    planned: PlannedLines | None = None
+    measured_deputy: Array | None = None
 
     def __post_init__(self) -> None:
         self.stamp_ns.setflags(write=False)
@@ -92,6 +96,8 @@ def make_scene(
         grasp_events=run.grasp_events,
         worst_pair=worst_pair.at(stamps) if worst_pair else None,
         momentum=momentum_of(run, robot, deputy, ticks, periods),
+        planned=planned_lines(run.planned_paths, run.arms),
+        measured_deputy=run.measured.deputy_pose[periods] if run.measured else None,
     )
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from sms_handover.errors import CollisionError
 from sms_handover.simulation.loop import Loop
-from sms_handover.simulation.parameters import ONLINE
+from sms_handover.simulation.parameters import ONLINE, TRUE
 from sms_handover.simulation.scenario import Scenario
 from sms_handover.types import Collision, TaskPhase
 from sms_handover.units import ns_to_seconds
@@ -46,7 +46,7 @@ def dry_run(scenario: Scenario, progress: Progress | None = None) -> DryRun:
     :class:`~sms_handover.simulation.loop.Loop` does.
     """
     parameters = scenario.parameters
-    common = replace(parameters.common, clearance=ONLINE)
+    common = replace(parameters.common, clearance=ONLINE, source=TRUE)  # the model has no sensors
     known = replace(scenario, parameters=replace(parameters, common=common), truth=scenario.model)
     loop = Loop(known)
     found: list[Collision] = []

@@ -1,7 +1,7 @@
 """The loop as an object: plant, trajectory, inverse kinematics and controller of a scenario, tick by tick."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from sms_handover.clearance.monitor import PeriodClearance
@@ -15,6 +15,7 @@ from sms_handover.control.protocol import (
     Controller,
     Guidance,
     Planning,
+    Showing,
     inner_of,
 )
 from sms_handover.control.registry import law_named
@@ -22,7 +23,10 @@ from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import CONTROLLER
 from sms_handover.model.conserved import ConservedQuantities
+from sms_handover.plan_report import PlannedPaths, PlanReport
 from sms_handover.plant.external_wrenches import ExternalAccount
+from sms_handover.plant.sensed_plant import KnownState, SensedPlant, known_of
+from sms_handover.simulation.parameters import COMPILED
 from sms_handover.simulation.quiet_periods import QuietPeriods, QuietRunner
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.snapshot import Snapshot, controller_data, restore_controller
@@ -40,7 +44,6 @@ from sms_handover.types import (
     GraspEvent,
     IkStatus,
     JointReference,
-    PlanReport,
     Pose,
     RobotState,
     TaskPhase,
@@ -56,7 +59,7 @@ class Period:
     from outside ``external_work`` J, and ``lost`` J have become heat;
     ``external_impulse`` is None where no such wrenches act; ``ik_status`` is None where no tool had
     a target. ``events`` has what came of grasp commands, ``decisions`` what was decided about the task.
-    ``clearance`` is None unless it is measured online.
+    ``clearance`` is None unless it is measured online, ``measured`` without sensors.
     """
 
     phase: TaskPhase
@@ -73,6 +76,7 @@ class Period:
     events: tuple[GraspEvent, ...]
     decisions: tuple[RunEvent, ...]
     clearance: PeriodClearance | None = None
+    measured: KnownState | None = None
 
 
 class Observation(NamedTuple):
@@ -126,6 +130,7 @@ class Ticks:
     guidance: Guidance
     period: Period | None
     plan: PlanReport | None = None
+    paths: PlannedPaths | None = None
 
     @property
     def phases(self) -> tuple[TaskPhase, ...]:
@@ -164,9 +169,10 @@ class Loop:
         parameters, truth = self.scenario.parameters, self.scenario.truth
         robot, schedule = self.scenario.model.robot, self.scenario.model.schedule
         self._common = parameters.common
-        self._plant = make_plant(
-            truth.robot, truth.schedule, self._common, parameters.plant, truth.conditions
-        )
+        conditions = truth.conditions
+        if self._common.dynamics == COMPILED and not self._common.uses_measurements:
+            conditions = replace(conditions, sensors={})  # C does not measure, and nobody would listen
+        self._plant = make_plant(truth.robot, truth.schedule, self._common, parameters.plant, conditions)
         self._generator = make_generator(robot, schedule, self._common, parameters.trajectory)
         self._find_joints = make_ik(robot, self._common, parameters.ik)
         measured = self._common.measures_clearance
@@ -186,6 +192,7 @@ class Loop:
             self._aims = Need.TOOL_TARGETS in law_named(self.law).needs
             self._controller = make_controller(robot, schedule, self._common, parameters.controller)
         self._solves = self.controller if isinstance(self.controller, Planning) else None
+        self._shows = self.controller if isinstance(self.controller, Showing) else None
         self._plan_events = PlanEvents()
         self._runner = make_runner(self._plant, self._controller, robot, self._common, parameters.plant)
         self._quiet: QuietRunner | None = None
@@ -256,7 +263,8 @@ class Loop:
         told = self._plan_events.of(report) if report else ()
         if told:
             excesses = {**excesses, 0: excesses.get(0, ()) + told}
-        return Ticks(rows, excesses, self._guidance, period, report)
+        paths = self._shows.take_paths() if self._shows else None
+        return Ticks(rows, excesses, self._guidance, period, report, paths)
 
     def _run(self, ticks: int, left: int) -> tuple[TickRows, Mapping[int, tuple[RunEvent, ...]]]:
         """Carry out some ticks, with ``left`` still to be integrated; return them with their excesses."""
@@ -291,7 +299,15 @@ class Loop:
         plant, trajectory = self._plant.snapshot(), self._generator.snapshot()
         clearance = self._monitor.snapshot() if self._monitor else None
         return Snapshot(
-            self.seed, plant, trajectory, self.law, controller, self._guidance, self.finished, clearance
+            self.seed,
+            plant,
+            trajectory,
+            self.law,
+            controller,
+            self._guidance,
+            self.finished,
+            clearance,
+            self._plan_events.state,
         )
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -312,6 +328,7 @@ class Loop:
         self._controller.reset()
         self._plan_events.reset()
         if snapshot.law == self.law:
+            self._plan_events.restore(snapshot.plan)
             restore_controller(self._controller, snapshot.controller)
         elif snapshot.plant.tick:
             self._controller.guide(self._guidance)
@@ -321,12 +338,16 @@ class Loop:
         plant, generator = self._plant, self._generator
         state, deputy = plant.state, plant.deputy
         tools, conserved = plant.tools_in_world, plant.conserved
-        phase, targets = generator.targets(state, deputy.deputy_in_world)
-        request = generator.ik_request(state, targets)
+        measured = known_of(plant) if isinstance(plant, SensedPlant) else None
+        known = KnownState(state, deputy.deputy_in_world)
+        if measured and self._common.uses_measurements:
+            known = measured
+        phase, targets = generator.targets(known.state, known.deputy_in_world)
+        request = generator.ik_request(known.state, targets)
         asked = bool(request.tool_in_world)
         solution = self._find_joints(request) if asked else None
         joints = solution.joint_position if solution else targets.joint_position
-        reference, aims = generator.reference(state, targets, joints)
+        reference, aims = generator.reference(known.state, targets, joints)
         self._guidance = Guidance(phase, reference, aims if self._aims else {})
         self._controller.guide(self._guidance)
         events = plant.execute(phase.commands)
@@ -359,4 +380,5 @@ class Loop:
             events,
             decisions,
             clearance,
+            measured,
         )

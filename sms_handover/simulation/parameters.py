@@ -13,6 +13,8 @@ DIRECT, EXECUTOR = "direct", "executor"
 TRANSPORTS = (DIRECT, EXECUTOR)
 PINOCCHIO, COMPILED = "pinocchio", "compiled"
 DYNAMICS = (PINOCCHIO, COMPILED)
+TRUE, MEASURED = "truth", "measured"
+SOURCES = (TRUE, MEASURED)
 EXTERNAL = (CONTROLLER,)
 AFTER, ONLINE = "after", "online"
 CLEARANCE = (AFTER, ONLINE)
@@ -45,6 +47,11 @@ class CommonParameters:
         "truth, as in truth.robot.base.mass:=264, those of every other node with model"
     )
     seed: int = parameter("what every random number of the run follows from", minimum=0, maximum=2**53)
+    source: str = parameter(
+        "what trajectory, inverse kinematics and law are given; truth: robot and deputy as they are; "
+        "measured: what the sensors of the conditions tell of them",
+        choices=SOURCES,
+    )
     dynamics: str = parameter(
         "equations of motion; pinocchio: its algorithms; compiled: the same equations as C code, generated "
         "once for this robot: several times faster, needs CasADi and a C compiler",
@@ -121,6 +128,11 @@ class CommonParameters:
     def reference_ns(self) -> int:
         """The reference period in ns."""
         return seconds_to_ns(self.reference_period)
+
+    @property
+    def uses_measurements(self) -> bool:
+        """Whether trajectory, inverse kinematics and law are given what sensors tell."""
+        return self.source == MEASURED
 
     def last_tick(self, task_end_ns: int, *, failed: bool = False) -> int:
         """Return the number of ticks that the run integrates; a failed task ends it early."""

@@ -9,10 +9,11 @@ import numpy.typing as npt
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.message_constants import CONSTANTS
 from sms_handover.model.poses import pose_row, twist_in_deputy
-from sms_handover.run_data import RunData
+from sms_handover.plan_report import PlannedPaths, PlanReport
+from sms_handover.run_data import MeasuredRows, RunData
 from sms_handover.simulation.loop import Period, Ticks
 from sms_handover.simulation.quiet_periods import QuietPeriods
-from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, PlanReport, TaskPhase, TickRows
+from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, TaskPhase, TickRows
 
 _BY_PERIOD = (
     *("reference_position", "reference_velocity", "deputy_pose", "deputy_twist"),
@@ -44,6 +45,9 @@ class RunRecorder:
         self._events: list[GraspEvent] = []
         self._decisions: list[RunEvent] = []
         self._plans: list[PlanReport] = []
+        self._paths: list[PlannedPaths] = []
+        self._measured = list[Array]()  # by tick
+        self._measured_deputy = list[Array]()  # by period
 
     def add(self, ticks: Ticks | QuietPeriods) -> None:
         """Add some ticks, and the reference periods that begin with them."""
@@ -55,6 +59,8 @@ class RunRecorder:
             self._add_period(ticks.period)
         if isinstance(ticks, Ticks) and ticks.plan:
             self._plans.append(ticks.plan)
+        if isinstance(ticks, Ticks) and ticks.paths:
+            self._paths.append(ticks.paths)
         for index, events in ticks.excesses.items():
             self._decisions.extend(events if index else ())
 
@@ -79,6 +85,8 @@ class RunRecorder:
                 room[:, start:end] = values
         self._count += len(rows)
         self._stamps.append(rows.stamp_ns)
+        if rows.measured is not None:
+            self._measured.append(rows.measured)
 
     def _add_period(self, period: Period) -> None:
         """Add what a reference period begins with."""
@@ -106,6 +114,8 @@ class RunRecorder:
         for arm in self._arms:
             self._target_pose[arm].append(pose_row(period.targets_in_world[arm])[np.newaxis])
             self._tool_pose[arm].append(pose_row(period.tools_in_world[arm])[np.newaxis])
+        if period.measured:
+            self._measured_deputy.append(pose_row(period.measured.deputy_in_world))
         self._phases.append(period.phase)
         self._events.extend(period.events)
         self._decisions.extend(period.decisions)
@@ -142,5 +152,20 @@ class RunRecorder:
             grasp_events=tuple(self._events),
             run_events=tuple(self._decisions),
             plans=tuple(self._plans),
+            planned_paths=tuple(self._paths),
+            measured=self._measured_rows(),
             **{name: np.concatenate(rows) for name, rows in self._periods.items()},
+        )
+
+    def _measured_rows(self) -> MeasuredRows | None:
+        """Return what sensors have told, None without any."""
+        if not self._measured:
+            return None
+        rows, nq = np.concatenate(self._measured), self._ends[0]
+        return MeasuredRows(
+            joint_position=rows[:, BASE_NQ:nq],
+            joint_velocity=rows[:, nq + BASE_NV :],
+            base_pose=rows[:, :BASE_NQ],
+            base_twist=rows[:, nq : nq + BASE_NV],
+            deputy_pose=np.array(self._measured_deputy),
         )

@@ -13,7 +13,8 @@ import numpy as np
 from sms_handover.clearance.monitor import MonitorState
 from sms_handover.control.protocol import Controller, Guidance, Resumable, inner_of
 from sms_handover.errors import ConfigurationError, ControllerError
-from sms_handover.plant.free_floating import PlantState
+from sms_handover.plan_report import PlanStatus
+from sms_handover.plant.plant_state import PlantState
 from sms_handover.trajectory.generator import GeneratorState
 from sms_handover.types import read_only
 
@@ -23,7 +24,7 @@ class Snapshot:
     """All that the rest of a run depends on besides its scenario, before a tick.
 
     ``controller`` is the state of the controller under ``law``, as plain data; ``clearance`` is None where
-    clearance is not measured during the run.
+    clearance is not measured during the run. ``plan`` is what came of the latest solve of a predictive law.
     """
 
     seed: int
@@ -34,6 +35,7 @@ class Snapshot:
     guidance: Guidance
     finished: bool
     clearance: MonitorState | None
+    plan: PlanStatus = PlanStatus.SOLVED
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the JSON form: read-only mappings have no pickled form of their own."""

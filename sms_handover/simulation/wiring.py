@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache, partial
 from typing import Any
 
@@ -17,8 +18,11 @@ from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.compiled.tool_motion import CompiledToolMotion
 from sms_handover.compiled.wrench_table import WrenchTable
 from sms_handover.conditions.conditions import IDEAL, Conditions
+from sms_handover.conditions.sensors.suite import SensorSuite
+from sms_handover.control.compensation import CompensatedTorque, Compensation
 from sms_handover.control.computed_torque import ComputedTorque, TrackingEfforts
-from sms_handover.control.disturbance_observer import ObservedTorque
+from sms_handover.control.friction_feed_forward import FrictionFeedForward
+from sms_handover.control.integral_action import IntegralAction
 from sms_handover.control.law import Law, LawSetup, Need
 from sms_handover.control.parameters import ControllerParameters, gains_of
 from sms_handover.control.protocol import CheckedController, Controller
@@ -34,9 +38,11 @@ from sms_handover.plant.effects import PlantEffects
 from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
 from sms_handover.plant.integrators import TABLEAUS, Tableau
 from sms_handover.plant.parameters import PlantParameters
+from sms_handover.plant.sensed_plant import SensedPlant
 from sms_handover.simulation.near_pairs import NearPairs
-from sms_handover.simulation.parameters import COMPILED, CommonParameters
+from sms_handover.simulation.parameters import COMPILED, MEASURED, TRUE, CommonParameters
 from sms_handover.simulation.period_runner import PeriodRunner, PythonRunner
+from sms_handover.simulation.solver_process import SolverProcess
 from sms_handover.trajectory.generator import TrajectoryGenerator
 from sms_handover.trajectory.parameters import TrajectoryParameters
 from sms_handover.trajectory.preview import TargetPreview
@@ -75,11 +81,17 @@ def make_plant(
     )
     tableau, h = TABLEAUS[parameters.integrator], ns_to_seconds(common.tick_ns)
     _check_deputy_twist(schedule, h)
-    effects = None
-    if not conditions.ideal:
-        effects = PlantEffects(conditions, robot.n_joints, common.tick_ns, common.seed)
+    joints, tick_ns, seed = robot.n_joints, common.tick_ns, common.seed
+    effects = PlantEffects(conditions, joints, tick_ns, seed) if conditions.acts else None
     dynamics = make_dynamics(common.dynamics, tableau, h)
-    return FreeFloatingPlant(robot, parameters, initial, common.tick_ns, dynamics, effects)
+    if conditions.sensors:
+        sensors = SensorSuite(conditions.sensors, joints, tick_ns, seed)
+        return SensedPlant(robot, parameters, initial, tick_ns, sensors, dynamics, effects)
+    if common.uses_measurements:
+        raise ConfigurationError(
+            f"source is {MEASURED!r}, must be {TRUE!r} where there are no sensors: set conditions.sensors"
+        )
+    return FreeFloatingPlant(robot, parameters, initial, tick_ns, dynamics, effects)
 
 
 def make_dynamics(dynamics: str, tableau: Tableau, h: float) -> MakeDynamics:
@@ -145,16 +157,26 @@ def gains_by_phase(schedule: Schedule, parameters: ControllerParameters) -> tupl
 
 
 def make_controller(
-    robot: RobotModel, schedule: Schedule, common: CommonParameters, parameters: ControllerParameters
+    robot: RobotModel,
+    schedule: Schedule,
+    common: CommonParameters,
+    parameters: ControllerParameters,
+    *,
+    in_real_time: bool = False,
 ) -> Controller:
     """Return the controller of the scenario's law, with gains stable at the start.
 
-    The efforts of a law of another package are checked. Raises ConfigurationError.
+    The efforts of a law of another package are checked. ``in_real_time`` the plans of a law are made in a
+    process of their own. Raises ConfigurationError.
     """
     law, gains = law_named(parameters.law), gains_by_phase(schedule, parameters)
     start = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
-    check_stability(law, robot, gains, ns_to_seconds(common.tick_ns), start)  # nothing is carried there
-    computed_torque = _computed_torque(law, common, parameters)
+    compensation = _compensation(law, common, parameters)
+    checked = law
+    if law.linearised and compensation.integral:
+        checked = replace(law, linearised=compensation.integral.linearised(law.linearised))
+    check_stability(checked, robot, gains, ns_to_seconds(common.tick_ns), start)  # nothing is carried there
+    computed_torque = _computed_torque(common, compensation)
     longest_ns = longest_reference_ns(common, parameters)
     preview = TargetPreview(robot, schedule) if Need.PREVIEW in law.needs else None
     distances = NearPairs(make_clearance(robot, schedule)) if Need.CLEARANCE in law.needs else None
@@ -168,29 +190,43 @@ def make_controller(
         reference_ns=common.reference_ns,
         preview=preview,
         distances=distances,
+        start_solver=SolverProcess if in_real_time else None,
     )
     controller = law.make(setup)
     return controller if law.name in SHIPPED else CheckedController(controller, robot.joint_names)
 
 
 def _computed_torque(
-    law: Law[Any], common: CommonParameters, parameters: ControllerParameters
+    common: CommonParameters, compensation: Compensation
 ) -> Callable[[RobotModel], TrackingEfforts]:
-    """Return what makes the computed torque of a robot; raises ConfigurationError."""
+    """Return what makes the computed torque of a robot."""
     make = CompiledComputedTorque if common.dynamics == COMPILED else ComputedTorque
-    bandwidth, dt = parameters.disturbance_bandwidth, ns_to_seconds(common.tick_ns)
-    if not bandwidth:
+    if not compensation.any:
         return make
+    return lambda robot: CompensatedTorque(robot, make(robot), compensation)
+
+
+def _compensation(law: Law[Any], common: CommonParameters, parameters: ControllerParameters) -> Compensation:
+    """Return what a law compensates with; raises ConfigurationError where it cannot."""
+    dt, bandwidth = ns_to_seconds(common.tick_ns), parameters.disturbance_bandwidth
     if Need.PAYLOAD not in law.needs:
-        raise ConfigurationError(
-            f"disturbance_bandwidth is {bandwidth:g} 1/s, must be 0 under control law {law.name!r}, "
-            "which has no model of the dynamics"
-        )
+        for name in ("disturbance_bandwidth", "integral_time", "friction_viscous", "friction_coulomb"):
+            value = getattr(parameters, name)
+            if value:
+                raise ConfigurationError(
+                    f"{name} is {value:g}, must be 0 under control law {law.name!r}, "
+                    "which has no model of the dynamics"
+                )
     if bandwidth * dt > 1.0:
         raise ConfigurationError(
             f"disturbance_bandwidth is {bandwidth:g} 1/s, must be <= {1.0 / dt:g} 1/s at a tick of {dt:g} s"
         )
-    return lambda robot: ObservedTorque(robot, make(robot), bandwidth, dt)
+    integral = IntegralAction(parameters.integral_time, dt) if parameters.integral_time else None
+    friction = FrictionFeedForward(
+        parameters.friction_viscous, parameters.friction_coulomb, parameters.friction_speed
+    )
+    has_friction = bool(friction.viscous or friction.coulomb)
+    return Compensation(dt, integral, friction if has_friction else None, bandwidth or None)
 
 
 def make_runner(
@@ -204,12 +240,13 @@ def make_runner(
 
     ``known`` is the robot as the law knows it. Raises ConfigurationError.
     """
+    by_python = PythonRunner(plant, controller, uses_measurements=common.uses_measurements)
     if common.dynamics != COMPILED:
-        return PythonRunner(plant, controller)
+        return by_python
     obstacle = CompiledTicks.obstacle(plant, controller, known)
     if obstacle:
         _say_once(f"ticks are carried out by Python: C does not have {obstacle}")
-        return PythonRunner(plant, controller)
+        return by_python
     return CompiledTicks(plant, controller, known, parameters.integrator, common.tick_ns)
 
 

@@ -9,7 +9,7 @@ from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.trajectory.time_law import Progress
 from sms_handover.types import Array, Pose, Twist
 
-_AT_REST = Twist(np.zeros(3), np.zeros(3))
+AT_REST = Twist(np.zeros(3), np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class PosePath:
 
     start: Pose
     end: Pose
-    end_twist: Twist = _AT_REST
+    end_twist: Twist = AT_REST
 
     def at(self, progress: Progress) -> tuple[Pose, Twist]:
         """Return pose and twist (of the origin, in ``world`` axes) at a point of the time law."""
@@ -36,7 +36,7 @@ class PosePath:
         way = end.translation - start.translation
         pose = pose_of(pin.SE3(rotation, start.translation + progress.fraction * way))
         twist = Twist(progress.rate * way, start.rotation.dot(progress.rate * turn))
-        return pose, twist if self.end_twist is _AT_REST else self._with_the_end(
+        return pose, twist if self.end_twist is AT_REST else self._with_the_end(
             progress, rotation, turn, twist
         )
 

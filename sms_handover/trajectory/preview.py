@@ -9,10 +9,11 @@ import pinocchio as pin
 from sms_handover.model.poses import pose_distance, pose_of, se3_of
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.trajectory.generator import goal_in_world
-from sms_handover.trajectory.pose_path import PosePath
+from sms_handover.trajectory.pose_path import AT_REST, PosePath
 from sms_handover.trajectory.schedule import ArmTarget, GraspFrameTarget, Hold, JointTarget, Schedule
 from sms_handover.trajectory.time_law import TIME_LAWS, Progress
 from sms_handover.types import (
+    BASE_NQ,
     Array,
     GraspAction,
     GraspEvent,
@@ -51,9 +52,9 @@ class TargetPreview:
 
     A controller does not hear by which time law targets move, nor where the deputy is: of the time laws that
     one is taken which fits the targets of now best; the deputy is where the schedule has it, then in the
-    grasp of the arm that has grasped it. What the targets of now are off by,
-    those to come are too, and ever more if that grows. A
-    preview ends where commands are due, as what follows depends on their outcome.
+    grasp of the arm that has grasped it, whose tool goes on with the twist of now in its own axes; targets on
+    the deputy go with it. What the targets of now are off by, those to come are too, and ever more if that
+    grows. A preview ends where commands are due, as what follows depends on their outcome.
     """
 
     def __init__(self, robot: RobotModel, schedule: Schedule) -> None:
@@ -75,9 +76,14 @@ class TargetPreview:
         self._now = state
 
     def update(
-        self, phase: TaskPhase, reference: JointReference, tool_in_world: Mapping[str, Pose], q: Array
+        self,
+        phase: TaskPhase,
+        reference: JointReference,
+        tool_in_world: Mapping[str, Pose],
+        q: Array,
+        v: Array,
     ) -> None:
-        """Take the guidance of now, at a configuration (7 + n,)."""
+        """Take the guidance of now, at a configuration (7 + n,) and a velocity (6 + n,)."""
         tools = self._robot.tools_at(q)
         now = self._now
         if now is None or phase.entry != now.phase.entry:
@@ -86,12 +92,14 @@ class TargetPreview:
             frame = se3_of(self._schedule.deputy.grasp_frames[now.grasp_frame])
             held = pose_of(se3_of(tools[now.holder]) * frame.inverse())
             now = replace(now, deputy_in_world=held)
+            self._carried = self._robot.tool_motion(q, v, now.holder)
         self._leg, self._joints = self._leg_of(now), q[-self._robot.n_joints :]
         now = replace(now, time_law=self._fitting(now, reference, tool_in_world))
         found = self._corrections_of(now, phase.stamp_ns, tool_in_world)
         since = ns_to_seconds(phase.stamp_ns - now.stamp_ns)
         self._drifts = {arm: _drift(now.corrections.get(arm), one, since) for arm, one in found.items()}
         self._now = replace(now, stamp_ns=phase.stamp_ns, corrections=found)
+        self._base = q[:BASE_NQ]
 
     def grasped(self, event: GraspEvent) -> None:
         """Learn what came of a grasp command, between two updates."""
@@ -137,7 +145,7 @@ class TargetPreview:
         if phase.commands:
             return None
         end_ns = leg.end_ns + phase.end_ns - phase.start_ns
-        tools = {**leg.tools, **leg.goals}
+        tools = {**self._robot.tools_at(np.concatenate([self._base, leg.ends])), **leg.goals}
         joints = np.array(leg.ends)
         for arm in leg.goals:  # where inverse kinematics will take it is not known
             joints[self._robot.arm_joints[arm]] = self._joints[self._robot.arm_joints[arm]]
@@ -207,11 +215,28 @@ class TargetPreview:
             found[arm] = pose_of(pin.SE3(turn, given.position - expected.position))
         return found
 
+    def _moved(self, now: PreviewState, leg: _Leg, arm: str, goal: Pose, stamp_ns: int) -> tuple[Pose, Twist]:
+        """Return where the goal of an arm is at an instant, and its twist, both in ``world``.
+
+        On a deputy that is held it goes with the tool of the holder.
+        """
+        if not now.holder or not isinstance(leg.targets[arm], GraspFrameTarget):
+            return goal, AT_REST
+        pose, twist = self._carried
+        tool, ahead = se3_of(pose), ns_to_seconds(stamp_ns - now.stamp_ns)
+        along = pin.Motion(tool.rotation.T @ twist.linear, tool.rotation.T @ twist.angular)
+        later = tool * pin.exp6(ahead * along)
+        moved = later * tool.inverse() * se3_of(goal)
+        angular = later.rotation @ along.angular
+        linear = later.rotation @ along.linear + np.cross(angular, moved.translation - later.translation)
+        return pose_of(moved), Twist(linear, angular)
+
     def _targets(self, now: PreviewState, leg: _Leg, stamp_ns: int) -> PreviewedTargets:
         """Return the targets of a leg at an instant."""
         done, tools, twists = _progress(now.time_law, leg, stamp_ns), dict[str, Pose](), dict[str, Twist]()
         for arm, goal in leg.goals.items():
-            pose, twist = PosePath(leg.tools[arm], goal).at(done)
+            end, end_twist = self._moved(now, leg, arm, goal, stamp_ns)
+            pose, twist = PosePath(leg.tools[arm], end, end_twist).at(done)
             if arm in now.corrections:
                 ahead, drift = ns_to_seconds(stamp_ns - now.stamp_ns), self._drifts[arm]
                 turn = pin.exp3(ahead * drift.angular) @ se3_of(now.corrections[arm]).rotation

@@ -8,6 +8,7 @@ import pytest
 from playwright.sync_api import Page
 
 from sms_handover.analysis.clearance import TaskTexts, run_clearance
+from sms_handover.plan_report import PlannedPaths
 from sms_handover.scene.momentum import Momentum
 from sms_handover.scene.page import animation_html
 from sms_handover.scene.scene import FRAME_RATE, Scene, make_scene
@@ -40,6 +41,9 @@ def scenes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Scene]:
         run, truth = simulate(scenario), scenario.truth
         series = run_clearance(run, TaskTexts(truth.robot.urdf, truth.schedule.text)).series
         assert series is not None
+        if law == "nmpc":  # as if it had plans
+            lines = {arm: run.tool_pose[arm][:4, :3] for arm in run.arms}
+            run = replace(run, planned_paths=(PlannedPaths(100_000_000, lines),))
         size, rate = truth.schedule.deputy.size, FRAME_RATE
         made[law] = make_scene(run, truth.robot.urdf, size, rate, series.worst_pair)
     return made
@@ -97,6 +101,21 @@ def test_every_body_is_drawn_where_it_was_recorded(opened: Open, scenes: dict[st
             assert np.abs(drawn - scene.deputy_in_world[row, :3]).max() < SINGLE
             for arm, target in scene.target_in_world.items():
                 assert np.abs(position(page, run, f"{arm}/target") - target[row, :3]).max() < SINGLE
+
+
+def test_a_plan_is_drawn_while_it_is_the_latest(opened: Open, scenes: dict[str, Scene]) -> None:
+    """A line per arm through its points, of the run that has plans."""
+    page, planned = opened().page, scenes["nmpc"].planned
+    assert planned is not None and page.locator("#planned").is_visible()
+    script = """player.runs[0].planned.lines.map((line) => [line.visible,
+        Array.from(line.geometry.attributes.instanceEnd?.data.array ?? [])])"""
+    for t, shown in ((0.09, False), (0.1, True), (0.5, True), (0.7, False)):
+        seek(page, t)
+        for arm, (visible, numbers) in enumerate(page.evaluate(script)):
+            assert visible is shown, t
+            ends = np.reshape(numbers, (-1, 2, 3))[:, 1] if shown else planned.points[0, arm, 1:]
+            assert np.abs(ends - planned.points[0, arm, 1:]).max() < SINGLE
+    assert page.evaluate("player.runs[1].planned") is None
 
 
 def test_between_two_instants_a_body_is_on_the_straight_line(opened: Open, scenes: dict[str, Scene]) -> None:

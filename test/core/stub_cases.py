@@ -22,6 +22,7 @@ def main() -> None:
         if bad and case == HANGS:
             time.sleep(60.0)
         if bad and case == DIES:
+            print("warning\ncase 2 dies", file=sys.stderr, flush=True)
             os.kill(os.getpid(), signal.SIGKILL)
         eaten: list[bytes] = []
         while bad and case == EATS and len(eaten) < MOST:

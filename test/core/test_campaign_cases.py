@@ -156,7 +156,9 @@ def test_numbers_that_are_not_finite_are_a_numeric_failure(
     assert (row.status, row.cause) == (Status.NUMERIC_FAILURE, "numbers that are not finite")
 
 
-def test_bad_cases_end_as_rows_with_their_causes(tmp_path: Path) -> None:
+def test_bad_cases_end_as_rows_with_their_causes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "scratch").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "scratch"))
     limits = {"wall_time": 3.0, "memory": 100.0, "retries": 1}
     file = written(tmp_path, name="bad", cases=5, limits=limits)
     run_here(file, tmp_path / "out", program=STUB)
@@ -164,9 +166,13 @@ def test_bad_cases_end_as_rows_with_their_causes(tmp_path: Path) -> None:
     tries = {entry.row.task.case: entry.beside.tries for entry in CampaignFolder(tmp_path / "out").entries()}
     assert tries == {0: 1, 1: 1, 2: 2, 3: 1, 4: 1}, "only what died is tried again"
     assert (rows[1].status, rows[1].cause) == (Status.LIMIT, "more than 3 s of wall time")
-    assert (rows[2].status, rows[2].cause) == (Status.DIED, "its process ended by signal SIGKILL")
+    assert (rows[2].status, rows[2].cause) == (
+        Status.DIED,
+        "its process ended by signal SIGKILL: case 2 dies",
+    )
     assert (rows[3].status, rows[3].cause) == (Status.LIMIT, "more than 100 MB of memory")
     assert [rows[case].run_digest for case in range(5)] == ["00", "", "", "", "00"]
+    assert not list((tmp_path / "scratch").iterdir()), "whoever was killed left nothing behind"
 
 
 def test_a_process_that_cannot_start_is_an_error(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """The verbs of campaigns: run, status, rerun, merge, and check, compare and report as they take campaigns."""
 
 import json
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -23,8 +24,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     keep = {"trajectories": "failures", "worst": 1}
     changes = {"cases": 2, "laws": ["nmpc", "pid"], "success": "peak_torque < 1e-4", "keep": keep}
     file = written(path, worst_by="peak_torque", **changes)
-    assert main(["campaign", "run", str(file), "-o", str(path / "out")]) == 0
-    return path / "out"
+    assert main(["campaign", "run", str(file), "-o", str(path / "the rows")]) == 0
+    return path / "the rows"
 
 
 def test_a_folder_has_everything(finished: Path) -> None:
@@ -62,7 +63,7 @@ def test_status_tells_what_failed_and_what_is_worst(
     assert main(["campaign", "status", str(finished), "--worst", "1"]) == 0
     said = capsys.readouterr().out
     command = next(line.strip() for line in said.splitlines() if line.strip().startswith("sms-handover"))
-    assert main(command.split()[1:]) == 0
+    assert main(shlex.split(command)[1:]) == 0
     assert "equal to its row, bit for bit" in capsys.readouterr().out
 
 
@@ -106,6 +107,7 @@ def test_laws_are_compared_and_reported(
         (["campaign", "run", "lows"], "unknown campaign 'lows' (did you mean 'laws'?)"),
         (["campaign", "run", "FILE", "-j", "0"], "--jobs is 0, must be from 1 to 1024"),
         (["campaign", "run", "FILE", "--cases", "0"], "--cases is 0, must be from 1 to"),
+        (["campaign", "run", "FILE", "-o", "OUT", "--cases", "1"], "--cases is 1, must be >= 2, which OUT"),
         (["campaign", "status", "OUT", "--worst", "-1"], "--worst is -1, must be >= 0"),
         (["campaign", "run", "FILE", "--shard", "4/3"], "shard '4/3' must be NUMBER/OF"),
         (["campaign", "run", "FILE", "--trust-network"], "--trust-network is for --scheduler"),

@@ -12,6 +12,7 @@ from dataclasses import replace
 from errno import ENOSPC
 from pathlib import Path
 
+import distributed
 import psutil
 import pytest
 
@@ -20,12 +21,13 @@ from sms_handover.campaign.cases.case_process import Done
 from sms_handover.campaign.cases.case_row import Beside
 from sms_handover.campaign.definition.frozen import freeze
 from sms_handover.campaign.engine.choice import workers_for
-from sms_handover.campaign.engine.dask_workers import DaskWorkers
+from sms_handover.campaign.engine.dask_workers import DaskWorkers, answers_of
 from sms_handover.campaign.engine.run import run_campaign
 from sms_handover.campaign.engine.scheduler_url import require_safe
 from sms_handover.campaign.record.campaign_folder import CampaignFolder, merge, open_campaign
-from sms_handover.campaign.record.journal import JOURNAL
+from sms_handover.campaign.record.journal import JOURNAL, JournalWriter
 from sms_handover.campaign.record.manifest import Shard
+from sms_handover.cli.main import main
 from sms_handover.errors import ConfigurationError, SmsHandoverError
 
 from .campaigns import STUB, command, digests_of, rows_of, run_here, written
@@ -106,6 +108,7 @@ def test_rows_depend_on_no_worker_order_or_kill(tmp_path: Path, monkeypatch: pyt
         run_campaign(opened, lambda: DaskWorkers(frozen, number, workers=1), lambda tally: None)
     assert digests_of(out) == expected
     assert journal_lines(out) == CASES, "no case twice"
+    until(lambda: not list((tmp_path / "scratch").glob("sms_handover_*")), "no scratch folder left behind")
 
 
 def assert_only_local(processes: list[psutil.Process]) -> None:
@@ -221,12 +224,18 @@ def test_a_full_disk_is_a_clear_error_and_the_same_command_goes_on(
     assert digests_of(out) == digests_of(tmp_path / "good")
 
 
-def test_it_stops_at_a_look_whatever_the_order(tmp_path: Path) -> None:
+def test_it_stops_at_a_look_whatever_the_order(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     stop = {"half_width": 0.28, "looks": [4, 8, 12]}
     file = written(tmp_path, cases=40, stop=stop)
     tally = run_here(file, tmp_path / "out", program=STUB)
     assert tally.stopped_at == 8 and sorted(task.case for task in rows_of(tmp_path / "out")) == [*range(8)]
     assert run_here(file, tmp_path / "out", program=STUB).done == 8, "the same command has nothing to do"
+    assert main(["campaign", "status", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    assert "8 of 8 rows" in said and "stopped after 8 of 40 cases: every interval is narrow enough" in said
+    run_here(written(tmp_path / "all", cases=3, stop=stop), tmp_path / "few", program=STUB)
+    assert main(["campaign", "status", str(tmp_path / "few")]) == 0
+    assert "stopped" not in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("jobs", ["1", "2"])
@@ -263,6 +272,47 @@ def test_a_scheduler_is_reached_safely_or_on_request(url: str, trusted: bool, to
             require_safe(url, trust_network=trusted)
     else:
         require_safe(url, trust_network=trusted)
+
+
+# What it keeps of the worker is not looked at.
+DIED_AGAIN = distributed.KilledWorker("chunk", None, 20)  # type: ignore[arg-type]
+
+
+class Broken:
+    """A future of a chunk that failed."""
+
+    def __init__(self, error: Exception) -> None:
+        self._error = error
+
+    def result(self) -> None:
+        raise self._error
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (DIED_AGAIN, "workers die again and again: see what kills them"),
+        (distributed.CancelledError("chunk"), "a worker failed: CancelledError: chunk"),
+        (ModuleNotFoundError("No module named 'casadi'"), "a worker failed: ModuleNotFoundError: No module"),
+        (SmsHandoverError("a process for cases cannot start"), "^a process for cases cannot start$"),
+    ],
+)
+def test_whatever_fails_in_a_cluster_is_one_error(error: Exception, told: str) -> None:
+    with pytest.raises(SmsHandoverError, match=told):
+        answers_of(Broken(error))
+
+
+def test_rows_that_come_together_wait_for_the_disk_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, out, synced = written(tmp_path), tmp_path / "out", list[int]()
+    run_here(file, out, program=STUB)
+    entries = list(CampaignFolder(out).entries())
+    writer = JournalWriter(tmp_path / "journal.jsonl")
+    monkeypatch.setattr("sms_handover.campaign.record.journal.os.fsync", synced.append)
+    writer.add(*entries)
+    writer.close()
+    assert len(synced) == 1 and (tmp_path / "journal.jsonl").read_bytes() == (out / JOURNAL).read_bytes()
 
 
 def test_workers_that_cannot_be_reached_are_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

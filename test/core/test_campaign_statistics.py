@@ -13,11 +13,13 @@ from statsmodels.stats.proportion import proportion_confint
 from sms_handover.campaign.definition.campaign_file import Campaign, read_campaign
 from sms_handover.campaign.sampling.samples import Samples
 from sms_handover.campaign.statistics.case_columns import CaseColumns
+from sms_handover.campaign.statistics.holm import holm
 from sms_handover.campaign.statistics.paired_tests import paired_tests
 from sms_handover.campaign.statistics.pareto import pareto_front
 from sms_handover.campaign.statistics.percentiles import percentile
 from sms_handover.campaign.statistics.proportion import proportion
 from sms_handover.campaign.statistics.sensitivity import sensitivities
+from sms_handover.campaign.statistics.tables import outcome_sections, sensitivity_sections
 
 from .campaigns import written
 
@@ -51,6 +53,7 @@ def columns(
         np.ones(count),
         {"grasp_error": values},
         {name: np.asarray(column) for name, column in inputs.items()},
+        np.full(count, nan),
     )
 
 
@@ -83,6 +86,23 @@ def test_only_cases_that_both_laws_have_are_paired() -> None:
     assert np.isnan(success.p), "no case tells them apart"
 
 
+def test_tables_say_of_how_many_cases_and_adjust_for_how_many_draws(tmp_path: Path) -> None:
+    """Of six draws one matters; Holm's least p is six times what it was [Holm1979]."""
+    rng = np.random.default_rng(4)
+    drawn: dict[str, Any] = {f"x{k}": rng.normal(size=30) for k in range(6)}
+    values = [*drawn["x2"][:29], nan]
+    campaign = read_campaign(written(tmp_path))
+    found = {("smooth", "nmpc"): columns(values, **drawn)}
+    (section,) = outcome_sections(campaign, found)
+    labels = {row.label: row.cells for row in section.rows}
+    assert labels["grasp_error [m]"] == ("of 29 cases",) and labels["cases"] == ("30",)
+    ((head, table),) = sensitivity_sections(campaign, found)
+    assert head[-1] == "p, Holm"
+    p, adjusted = ([float(row.cells[place]) for row in table.rows] for place in (1, 2))
+    assert adjusted[2] == pytest.approx(6.0 * p[2]) and min(adjusted) == adjusted[2]
+    assert holm([0.01, nan, 0.04, 0.03]) == pytest.approx([0.03, nan, 0.06, 0.06], nan_ok=True)
+
+
 def test_percentiles_have_intervals_that_cover() -> None:
     """Of 100 samples of 200 normal draws about 95 hold the true percentile."""
     rng, truth, held = np.random.default_rng(5), 1.2815515655446004, 0
@@ -92,7 +112,7 @@ def test_percentiles_have_intervals_that_cover() -> None:
     assert 87 <= held <= 100
     assert np.isnan(percentile(np.array([nan]), 0.5).value)
     alone = percentile(np.array([2.0, 2.0, nan]), 0.5)
-    assert alone.value == 2.0 and np.isnan(alone.low)
+    assert (alone.value, alone.known) == (2.0, 2) and np.isnan(alone.low)
 
 
 def test_the_pareto_front_is_what_nothing_is_better_than() -> None:

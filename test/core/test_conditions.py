@@ -11,6 +11,7 @@ from sms_handover.analysis.conservation import physics_residuals
 from sms_handover.conditions.conditions import IDEAL
 from sms_handover.configuration.conditions_content import condition_names
 from sms_handover.errors import ConfigurationError, UnknownNameError
+from sms_handover.plant.sensed_plant import SensedPlant
 from sms_handover.run_data import RunData
 from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.scenario import Scenario, load_scenario
@@ -39,6 +40,12 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "history": {"wrenches.told.history": {"rows": [[0.0, 1, 0, 0, 0, 0, 0], [1.0, 0, 1, 0, 0, 0, 1]]}},
     "gravity_gradient": {"wrenches.gravity.gravity_gradient": _ORBIT},
     "relative_orbit": {"wrenches.hill.relative_orbit": {**_ORBIT, "reference": [3.0, 0.0, 0.0]}},
+    "sensors.encoders": {"sensors.encoders": {"step": 3e-5, "bandwidth": 100.0}},
+    "sensors.gyro": {"sensors.gyro.noise_density": 3e-5},
+    "sensors.star_tracker": {"sensors.star_tracker": {"noise": 1e-4, "period": 0.02, "latency": 0.02}},
+    "sensors.vision": {
+        "sensors.vision": {"position_noise": 0.002, "period": 0.02, "latency": 0.01, "dropped": 0.2}
+    },
     "model_error.base": {"model_error.base.mass": 0.05},
     "model_error.links": {"model_error.links.com": 0.005},
     "model_error.mounts": {"model_error.mounts.angle": 0.002},
@@ -47,7 +54,12 @@ EVERYTHING = {path: value for effect in EFFECTS.values() for path, value in effe
 
 
 def _scenario(effects: dict[str, Any], seconds: float = 0.06, **more: Any) -> Scenario:
-    """Return a short handover towards step targets, with rotors, under some effects."""
+    """Return a short handover towards step targets, with rotors, under some effects.
+
+    What is measured is what the loop goes by.
+    """
+    if any(path.startswith("sensors") for path in effects):
+        more = {"common.source": "measured", **more}
     conditions = {f"conditions.{path}": value for path, value in {**_ROTOR, **effects}.items()}
     return load_scenario("colliding", {"common.duration": seconds, **conditions, **more})
 
@@ -105,9 +117,14 @@ def test_one_effect_moves_no_draw_of_another() -> None:
             found["torque.noise_density"] = [effects.motor._noise.normal(k).tolist() for k in range(5)]
         if effects and effects.path:
             found["command.dropped"] = [effects.path._losses.uniform(k).tolist() for k in range(5)]
+        if isinstance(loop._plant, SensedPlant):
+            for name, sensor in loop._plant._sensors._sensors.items():
+                if hasattr(sensor, "_noise"):
+                    found[f"sensors.{name}"] = [sensor._noise.normal(k).tolist() for k in range(5)]
         return found
 
-    random = [name for name in EFFECTS if name.startswith(("model_error", "torque.n", "command.d"))]
+    drawn = ("model_error", "torque.n", "command.d", "sensors.g", "sensors.s", "sensors.v")
+    random = [name for name in EFFECTS if name.startswith(drawn)]
     alone = {name: draws(EFFECTS[name]) for name in random}
     for one, other in combinations(random, 2):
         both = draws({**EFFECTS[one], **EFFECTS[other]})

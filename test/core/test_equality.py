@@ -2,21 +2,30 @@
 
 from collections.abc import Callable
 from dataclasses import fields, replace
+from math import nan
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import pytest
 
-from sms_handover.analysis.equality import Difference, compare_runs
+from sms_handover.analysis.equality import Difference, as_far_as_recorded, before, compare_runs
+from sms_handover.bag.info import read_info
+from sms_handover.bag.run.reader import read_run
 from sms_handover.graph.events import RunEvent, Severity
+from sms_handover.launcher.recorded_scenario import scenario_in
+from sms_handover.plan_report import PlannedPaths, PlanReport, PlanStatus
 from sms_handover.run_data import RunData
-from sms_handover.types import GraspStatus, PlanReport, PlanStatus
+from sms_handover.simulation.simulate import simulate
+from sms_handover.types import GraspStatus
 
 from .bag_messages import made_up_run
 
+OLD = Path(__file__).parent.parent / "data" / "first_edition" / "nmpc"
 ARRAYS = [item.name for item in fields(RunData) if isinstance(getattr(made_up_run(3), item.name), np.ndarray)]
 PER_ARM = ("target_pose", "tool_pose")
-TEXTS = ("joint_names", "arms", "phases", "grasp_events", "run_events", "plans")
+TEXTS = ("joint_names", "arms", "phases", "grasp_events", "run_events", "plans", "planned_paths")
 
 
 @pytest.fixture
@@ -56,6 +65,30 @@ def test_one_bit_in_any_array_is_a_difference(run: RunData, name: str) -> None:
         assert str(difference) == f"{name}: {difference.detail}"
 
 
+def test_what_an_older_version_did_not_record_is_named_and_the_rest_judged(run: RunData) -> None:
+    run = replace(run, grasp_events=tuple(replace(event, relative_rate=0.1) for event in run.grasp_events))
+    twist = np.full_like(run.deputy_twist, np.nan)
+    events = tuple(replace(event, relative_rate=nan) for event in run.grasp_events)
+    old = replace(run, deputy_twist=twist, grasp_events=events)
+    assert {each.field for each in compare_runs(old, run)} == {"deputy_twist", "grasp_events"}
+    again, missing = as_far_as_recorded(old, run)
+    assert missing == ("deputy_twist", "grasp_events.relative_rate") and compare_runs(old, again) == ()
+    other = replace(run, kinetic_energy=changed(run.kinetic_energy, 1, lambda value: value + 1.0))
+    (difference,) = compare_runs(old, as_far_as_recorded(old, other)[0])
+    assert difference.field == "kinetic_energy"
+
+
+def test_of_the_first_edition_only_rounding_differs() -> None:
+    """Its bags have no twist of the deputy, and no rates of grasps; sums were done in another order once."""
+    with TemporaryDirectory() as folder:
+        again = simulate(scenario_in(read_info(OLD), Path(folder)))
+    recorded = read_run(OLD)
+    again, missing = as_far_as_recorded(recorded, before(again, int(recorded.tick_ns[-1]) + 1))
+    assert missing == ("deputy_twist", "grasp_events.relative_rate", "grasp_events.relative_twist")
+    for name in ARRAYS:
+        np.testing.assert_allclose(getattr(again, name), getattr(recorded, name), rtol=0.0, atol=1e-12)
+
+
 def test_a_plan_is_the_same_however_long_it_took(run: RunData) -> None:
     plan = PlanReport(0, 1, PlanStatus.SOLVED, 3, ("rate of a",), 0.1, "rate of a", 1e-9, 0.1, 0.2, 0.3, 0.0)
     slow = replace(plan, linearization_time=1.0, program_time=2.0, total_time=3.0)
@@ -64,6 +97,12 @@ def test_a_plan_is_the_same_however_long_it_took(run: RunData) -> None:
     assert compare_runs(mine, replace(run, plans=(slow,))) == ()
     (difference,) = compare_runs(mine, replace(run, plans=(other,)))
     assert difference.field == "plans"
+
+
+def test_one_bit_in_a_planned_path_is_a_difference(run: RunData) -> None:
+    one, other = (PlannedPaths(0, {"arm_a": np.full((2, 3), x)}) for x in (0.1, np.nextafter(0.1, 1.0)))
+    (difference,) = compare_runs(replace(run, planned_paths=(one,)), replace(run, planned_paths=(other,)))
+    assert difference.field == "planned_paths"
 
 
 @pytest.mark.parametrize("name", PER_ARM)

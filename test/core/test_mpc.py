@@ -10,30 +10,45 @@ import pytest
 
 from sms_handover.control.mpc import quadratic_program
 from sms_handover.control.mpc.constraints import Constraint
+from sms_handover.control.mpc.controller import MpcController, MpcState
 from sms_handover.control.mpc.distance_rows import DistanceModel
 from sms_handover.control.mpc.horizon import Horizon
-from sms_handover.control.mpc.law import MpcController, MpcState
 from sms_handover.control.mpc.momentum import BaseStart, base_start
 from sms_handover.control.mpc.placement import placements
 from sms_handover.control.mpc.plan import Plan
+from sms_handover.control.mpc.planner import Planner, PlanStart
 from sms_handover.control.mpc.prediction import Prediction, PredictionModel
 from sms_handover.control.mpc.quadratic_program import solve
 from sms_handover.control.mpc.sensitivity import Sensitivity
 from sms_handover.control.mpc.tool_errors import ToolErrorModel
-from sms_handover.errors import ConfigurationError, MissingDependencyError
+from sms_handover.errors import ConfigurationError, ControllerError, MissingDependencyError
 from sms_handover.graph.events import PLAN_FAILED
 from sms_handover.model.conserved import conserved_quantities
+from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.model.reduced import reduced_inverse_dynamics
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
+from sms_handover.plan_report import PlannedPaths, PlanReport, PlanStatus
 from sms_handover.run_data import RunData
+from sms_handover.scene.planned_lines import planned_lines
 from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.near_pairs import NearPairs
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
-from sms_handover.simulation.snapshot import plain, structured
-from sms_handover.simulation.wiring import make_clearance
+from sms_handover.simulation.snapshot import Snapshot, plain, structured
+from sms_handover.simulation.wiring import gains_by_phase, initial_joints, make_clearance
 from sms_handover.trajectory.preview import TargetPreview
-from sms_handover.types import Array, PlanReport, PlanStatus, PreviewedTargets, Twist
+from sms_handover.types import (
+    Array,
+    GraspAction,
+    GraspCommand,
+    GraspEvent,
+    GraspStatus,
+    JointReference,
+    Pose,
+    PreviewedTargets,
+    TaskPhase,
+    Twist,
+)
 
 from .conftest import Draw
 
@@ -172,6 +187,107 @@ def test_rows_are_the_derivatives_of_the_outputs(
             )
 
 
+def planner_of(robot: RobotModel, **values: object) -> Planner:
+    """Return a planner with the shipped parameters but for some."""
+    scenario = scenario_of("smooth", 1.0, **values)
+    gains = gains_by_phase(scenario.model.schedule, scenario.parameters.controller)[0]
+    return Planner(robot, gains, None, np.eye(3))
+
+
+def cost_of(
+    robot: RobotModel, planner: Planner, predicted: Prediction, a: Array, targets: list[PreviewedTargets]
+) -> float:
+    """Return the cost of a prediction, written out instant by instant."""
+    gains, horizon = planner.gains, planner.horizon
+    errors = ToolErrorModel(robot).at(placements(predicted)[1:], targets).errors
+    weights = np.tile([gains.tool_position_weight] * 3 + [gains.tool_orientation_weight] * 3, 2)
+    total = 0.0
+    for k, target in enumerate(targets, start=1):
+        last = k == horizon.count
+        time = 1.0 if last else horizon.intervals[k]
+        total += 0.5 * time * float(weights @ errors[k - 1] ** 2)
+        rate = gains.terminal_rate_weight if last else time * gains.joint_rate_weight
+        total += 0.5 * rate * float(np.sum((predicted.w[k] - target.joint_velocity) ** 2))
+        if not target.tool_in_world:
+            off = predicted.q[k] - target.joint_position
+            total += 0.5 * time * gains.joint_position_weight * float(off @ off)
+        still = horizon.intervals[k - 1]
+        total += 0.5 * gains.joint_acceleration_weight * still * float(a[k - 1] @ a[k - 1])
+    return total
+
+
+@pytest.mark.parametrize("led", ["tools", "joints"])
+def test_the_gradient_is_that_of_the_cost(
+    led: str, robot: RobotModel, draw: Draw, moving: tuple[BaseStart, Array, Array, Array, Array]
+) -> None:
+    """By central differences, with momentum; of joints that tools lead the rates have no weight here."""
+    start, joints, rates, accelerations, q = moving
+    weights = {"joint_rate_weight": 0.0, "terminal_rate_weight": 0.0} if led == "tools" else {}
+    planner, still = planner_of(robot, **weights), Twist(np.zeros(3), np.zeros(3))
+    goals = {arm: draw.near(pose, 0.2) for arm, pose in robot.tools_at(q).items()} if led == "tools" else {}
+    aims = joints + draw.vector(14, 0.1), draw.vector(14, 0.1)
+    deputy = load_scenario("smooth").model.schedule.deputy.deputy_in_world
+    target = PreviewedTargets(goals, dict.fromkeys(goals, still), *aims, "", deputy, frozenset())
+    targets = [target] * 10
+
+    def cost(a: Array) -> float:
+        predicted = planner.prediction.predict(planner.horizon, start, joints, rates, a)
+        return cost_of(robot, planner, predicted, a, targets)
+
+    gradient = planner.program(PlanStart(joints, rates, start), accelerations, targets).gradient
+    for _ in range(3):
+        change = draw.random.normal(size=accelerations.shape)
+        numeric = (cost(accelerations + 1e-5 * change) - cost(accelerations - 1e-5 * change)) / 2e-5
+        assert gradient @ change.ravel() == pytest.approx(numeric, rel=1e-6, abs=1e-7)
+
+
+def test_a_target_that_the_momentum_follows_needs_nothing(
+    robot: RobotModel, moving: tuple[BaseStart, Array, Array, Array, Array]
+) -> None:
+    """Targets that move as the tools do with the joints at rest: there the cost has its minimum."""
+    start, joints, _, _, _ = moving
+    planner, rest, nothing = planner_of(robot), np.zeros(14), np.zeros((10, 14))
+    predicted = planner.prediction.predict(planner.horizon, start, joints, rest, nothing)
+    targets = []
+    for place, twist in zip(placements(predicted)[1:], predicted.twist[1:], strict=True):
+        pin.forwardKinematics(robot.pin, robot.data, place.q, np.concatenate([twist, rest]))
+        tools = robot.tools_at(place.q)
+        rates = {}
+        for arm, frame in robot.tool_frame_id.items():
+            moved = pin.getFrameVelocity(robot.pin, robot.data, frame, pin.LOCAL_WORLD_ALIGNED)
+            rates[arm] = Twist(np.array(moved.linear), np.array(moved.angular))
+        held = PreviewedTargets(tools, rates, joints, rest, "", tools["arm_a"], frozenset())
+        targets.append(held)
+    assert max(np.linalg.norm(rate.linear) for rate in targets[0].tool_twist_in_world.values()) > 0.01
+    gradient = planner.program(PlanStart(joints, rest, start), nothing, targets).gradient
+    np.testing.assert_allclose(gradient, 0.0, atol=1e-5)
+
+
+def test_iterations_converge_to_where_the_optimality_conditions_hold(robot: RobotModel) -> None:
+    """Changes and residuals vanish at an optimum at which limits of efforts and rates bind."""
+    scenario = scenario_of("paper", 1.0)
+    schedule = scenario.model.schedule
+    q = robot.configuration(schedule.base_in_world, initial_joints(robot, schedule))
+    planner = planner_of(robot, joint_rate_limit=0.1, effort_share=0.02)
+    off = np.array([0.1, 0.0, 0.1])  # m
+    tools = robot.tools_at(q)
+    goals = {arm: Pose(tool.position + off, tool.quaternion_xyzw) for arm, tool in tools.items()}
+    rest, still = np.zeros(14), Twist(np.zeros(3), np.zeros(3))
+    target = PreviewedTargets(
+        goals, dict.fromkeys(goals, still), q[BASE_NQ:], rest, "", goals["arm_a"], frozenset()
+    )
+    start, a = PlanStart(q[BASE_NQ:], rest, base_start(robot, q, np.zeros(20))), np.zeros((10, 14))
+    changes, step = list[float](), None
+    for _ in range(10):
+        step = planner.step(start, a, [target] * 10).solution
+        assert step.status is PlanStatus.SOLVED and step.kkt_residual < 1e-9
+        a = a + step.change.reshape(a.shape)
+        changes.append(float(np.abs(step.change).max()))
+    assert step is not None and any("rate" in row for row in step.active)
+    assert any("effort" in row for row in step.active)
+    assert changes[-1] < 1e-7 < changes[0]
+
+
 def constraint(matrix: Array, low: Array, high: Array, *, soft: bool) -> Constraint:
     """Return rows about zero with a name each."""
     names = tuple(f"{'soft' if soft else 'hard'} {row}" for row in range(len(matrix)))
@@ -208,6 +324,9 @@ def test_rows_that_contradict_each_other_are_named(draw: Draw) -> None:
     )
     assert hard.status is PlanStatus.INFEASIBLE and hard.largest_slack_row == "hard 0"
     assert hard.change.size == 0
+    for wrong in (-np.eye(3), np.full((3, 3), np.nan)):
+        with pytest.raises(ControllerError, match="expected a convex and finite program"):
+            solve(wrong, np.zeros(3), [upper], 300)
 
 
 def test_without_its_solver_the_law_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -278,6 +397,26 @@ def test_a_plan_begins_where_the_robot_will_be() -> None:
     np.testing.assert_allclose(coming.w, state.joint_velocity, rtol=0.0, atol=1e-3)
 
 
+def test_planned_paths_are_those_that_the_tools_then_take() -> None:
+    """Of every fifth plan: it begins where the tools are one period later, and they go on along it."""
+    run, arm = simulate(scenario_of("smooth", 1.2)), "arm_a"
+    assert [paths.stamp_ns for paths in run.planned_paths] == run.reference_ns[::5].tolist()
+    paths = run.planned_paths[8]
+    horizon = Horizon.growing(1.6, 10, 0.02)  # as shipped
+    stamps, taken = paths.stamp_ns + 20_000_000 + 1e9 * horizon.times[:4], run.tool_pose[arm][:, :3].T
+    then = np.array([np.interp(stamps, run.reference_ns, row) for row in taken]).T
+    np.testing.assert_allclose(paths.tool_in_world[arm][0], then[0], rtol=0.0, atol=1e-8)
+    np.testing.assert_allclose(paths.tool_in_world[arm][:4], then, rtol=0.0, atol=1e-5)
+    assert np.linalg.norm(then[3] - then[0]) > 5e-4
+    lines = planned_lines(run.planned_paths, ("arm_b", arm))
+    assert lines is not None and lines.points.shape == (len(run.planned_paths), 2, 11, 3)
+    assert lines.points[3, 1].tobytes() == run.planned_paths[3].tool_in_world[arm].tobytes()
+    shorter = PlannedPaths(0, {arm: np.eye(3)[:2]})
+    padded = planned_lines([shorter, *run.planned_paths[:1]], (arm, "arm_c"))
+    assert padded is not None and np.isnan(padded.points[:, 1]).all()
+    assert (padded.points[0, 0, 1:] == np.eye(3)[1]).all()
+
+
 def test_targets_are_those_of_the_instants_of_the_plan(monkeypatch: pytest.MonkeyPatch) -> None:
     """The plan begins a period after the state; its first target is that after its first interval."""
     loop, asked = Loop(scenario_of("smooth", 1.0)), list[int]()
@@ -318,6 +457,9 @@ def test_solves_that_fail_are_carried_by_the_plan_before_then_the_arms_brake() -
     failing = Loop(scenario_of("paper", 4.0, program_iterations=1, joint_rate_limit=0.05, failed_plans=5))
     failing.restore(before)
     reports, rates, events = list[PlanReport](), list[float](), list[str]()
+    failing.advance_period()
+    snapshot = failing.snapshot()
+    failing.restore(before)
     while not failing.finished and failing.state.stamp_ns < 2_000_000_000:
         ticks = failing.advance_period()
         assert ticks.plan is not None
@@ -330,6 +472,8 @@ def test_solves_that_fail_are_carried_by_the_plan_before_then_the_arms_brake() -
     assert [report.plan_age for report in reports[:3]] == pytest.approx([0.0, 0.02, 0.04])
     assert rates[0] > 0.1 and rates[-1] < 1e-3
     assert events.count(PLAN_FAILED) == 2  # the old plan is carried on, then the arms brake
+    failing.restore(structured(Snapshot, plain(snapshot)))
+    assert not any(failing.advance_period().excesses.values())  # that has been told before the snapshot
 
 
 def test_the_state_has_every_bit_of_the_rest() -> None:
@@ -361,7 +505,7 @@ def test_the_preview_is_what_the_generator_will_say(law: str) -> None:
         state, period = loop.state, loop.advance_period().period
         assert period is not None
         now_ns, targets = period.phase.stamp_ns, period.targets_in_world
-        preview.update(period.phase, period.reference, targets, state.q)
+        preview.update(period.phase, period.reference, targets, state.q, state.v)
         for event in period.events:
             preview.grasped(event)
         if now_ns % 500_000_000 == 0:
@@ -381,3 +525,40 @@ def test_the_preview_is_what_the_generator_will_say(law: str) -> None:
                 off = np.abs(told.joint_position[part] - period.reference.position[part]).max()
                 assert off < 2e-3, (now_ns, arm)
     assert compared > duration
+
+
+def test_targets_on_a_held_deputy_turn_with_the_robot(draw: Draw) -> None:
+    """The whole turns and drifts as one body, with the joints at rest: a second ahead to rounding."""
+    scenario = load_scenario("tumbling")
+    robot, schedule = scenario.model.robot, scenario.model.schedule
+    preview, q, v = TargetPreview(robot, schedule), draw.q(), np.zeros(20)
+    names = [phase.name for phase in schedule.phases]
+    index, frames = names.index("meet"), schedule.deputy.grasp_frames
+    now_ns = schedule.phases[index].end_ns - 1_500_000_000  # the motion is over
+    v[:BASE_NV] = [0.01, -0.02, 0.005, 0.03, 0.05, -0.04]  # m/s, rad/s
+    reference = JointReference(now_ns, q[BASE_NQ:], np.zeros(14))
+
+    def goal_at(q: Array) -> pin.SE3:
+        deputy = se3_of(robot.tools_at(q)["arm_a"]) * se3_of(frames["end_a"]).inverse()
+        return deputy * se3_of(frames["end_b"])
+
+    def update(stamp_ns: int, phase: int) -> None:
+        given = {"arm_b": pose_of(goal_at(q))} if phase == index else robot.tools_at(q)
+        preview.update(TaskPhase(stamp_ns, phase, names[phase]), reference, given, q, v)
+
+    update(0, 0)
+    command = GraspCommand(GraspAction.GRASP, "arm_a", "end_a")
+    preview.grasped(GraspEvent(0, command, GraspStatus.SUCCEEDED, 0.0, 0.0, 0.0, ""))
+    update(schedule.phases[index].start_ns, index)
+    update(now_ns, index)
+    later = np.array(q)
+    base = robot.integrate_base(Pose(q[:3], q[3:BASE_NQ]), v[:BASE_NV], 1.0)
+    later[:BASE_NQ] = np.concatenate([base.position, base.quaternion_xyzw])
+    before, then, after = preview.ahead([now_ns + stamp * 1_000_000 for stamp in (999, 1000, 1001)])
+    goal, expected = se3_of(then.tool_in_world["arm_b"]), goal_at(later)
+    np.testing.assert_allclose(pin.log6(goal.inverse() * expected).vector, 0.0, atol=1e-9)
+    first, last = (se3_of(item.tool_in_world["arm_b"]) for item in (before, after))
+    twist = then.tool_twist_in_world["arm_b"]
+    np.testing.assert_allclose(twist.linear, (last.translation - first.translation) / 0.002, atol=1e-7)
+    turned = pin.log3(last.rotation @ first.rotation.T) / 0.002
+    np.testing.assert_allclose(twist.angular, turned, atol=1e-7)

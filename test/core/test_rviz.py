@@ -13,6 +13,7 @@ from sms_handover.model.robot_model import RobotModel
 TAKES = {  # what each display of rviz_default_plugins subscribes to
     "RobotModel": "std_msgs/msg/String",
     "Marker": "visualization_msgs/msg/Marker",
+    "MarkerArray": "visualization_msgs/msg/MarkerArray",
     "Pose": "geometry_msgs/msg/PoseStamped",
     "Odometry": "nav_msgs/msg/Odometry",
 }

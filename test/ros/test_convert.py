@@ -31,6 +31,7 @@ from sms_handover.messages.values import (
     task_phase,
     time_ns,
 )
+from sms_handover.plan_report import PlanReport, PlanStatus
 from sms_handover.ros.codecs.convert import (
     event_message,
     header,
@@ -52,8 +53,6 @@ from sms_handover.types import (
     IkResult,
     IkStatus,
     PhaseState,
-    PlanReport,
-    PlanStatus,
     Pose,
     TaskPhase,
 )

@@ -11,8 +11,11 @@ from sms_handover.graph.topics import (
     JOINT_STATES,
     SAMPLED_BASE_ODOMETRY,
     SAMPLED_JOINT_STATES,
+    sampled_topics,
+    state_topics,
 )
 from sms_handover.nodes.parts.plant_outputs import PlantOutputs
+from sms_handover.simulation.parameters import LOCKSTEP, REALTIME
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.wiring import make_plant
 
@@ -20,6 +23,7 @@ pytestmark = pytest.mark.ros
 
 STATE = [JOINT_STATES, BASE_ODOMETRY]
 SAMPLE = [SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE]
+MEASURED_STATE, MEASURED_SAMPLE = state_topics(measured=True), sampled_topics(measured=True)
 
 
 @pytest.mark.parametrize(
@@ -31,10 +35,18 @@ SAMPLE = [SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE]
         (False, False, STATE),
     ],
 )
-def test_who_is_told_first(lockstep: bool, with_reference: bool, expected: list[str]) -> None:
-    scenario = load_scenario()
-    parameters = scenario.parameters
-    plant = make_plant(scenario.truth.robot, scenario.truth.schedule, parameters.common, parameters.plant)
+@pytest.mark.parametrize("source", [None, "truth", "measured"])
+def test_who_is_told_first(
+    source: str | None, lockstep: bool, with_reference: bool, expected: list[str]
+) -> None:
+    """What is measured comes first where the loop goes by it, else last."""
+    values: dict[str, Any] = {"common.mode": LOCKSTEP if lockstep else REALTIME}
+    if source:
+        values |= {"conditions.sensors.encoders": {}, "common.source": source}
+    scenario = load_scenario(values=values)
+    parameters, truth = scenario.parameters, scenario.truth
+    common, conditions = parameters.common, truth.conditions
+    plant = make_plant(truth.robot, truth.schedule, common, parameters.plant, conditions)
     told: dict[str, list[Any]] = {}
     order: list[str] = []
 
@@ -45,8 +57,9 @@ def test_who_is_told_first(lockstep: bool, with_reference: bool, expected: list[
 
         return SimpleNamespace(publish=publish)
 
-    outputs = PlantOutputs(scenario.truth.robot, publisher, lockstep=lockstep)
+    outputs = PlantOutputs(truth.robot, publisher, common, conditions)
     outputs.publish_loop(plant, with_reference=with_reference)
-    assert order == expected
+    measured = [*MEASURED_SAMPLE * with_reference, *MEASURED_STATE] if source else []
+    assert order == (measured + expected if source == "measured" else expected + measured)
     if with_reference:
         assert told[JOINT_STATES] == told[SAMPLED_JOINT_STATES]

@@ -24,6 +24,7 @@ from sms_handover.graph.topics import (
     JOINT_STATES,
     LOOP_TIMING,
     MPC_STATUS,
+    PLANNED_PATHS,
     PLANT,
     RUN_EVENTS,
     RUN_PUBLISHED,
@@ -73,7 +74,7 @@ class FakeController:
         self._command = self._endpoints.publisher(JOINT_COMMAND)
         self._phase = self._endpoints.publisher(TASK_PHASE)
         self._ready = self._endpoints.publisher(RUN_READY)
-        for unused in (DIAGNOSTICS, MPC_STATUS, RUN_EVENTS, RUN_PUBLISHED):
+        for unused in (DIAGNOSTICS, MPC_STATUS, PLANNED_PATHS, RUN_EVENTS, RUN_PUBLISHED):
             self._endpoints.publisher(unused)
         self._endpoints.subscribe(JOINT_STATES, self._on_state)
         for unread in (BASE_ODOMETRY, GRASP_EVENT):

@@ -18,7 +18,7 @@ from .hosts import Host
 DEADLINE_S = 180.0  # s of wall time after which something that hangs has failed; nothing is measured by it
 
 _LOOK_S = 0.02  # s of wall time between two looks at a condition
-_NODES = "sms_handover.nodes."
+_NODES, _SOLVER = "sms_handover.nodes.", "sms_handover.simulation.solver_"
 
 
 @dataclass(frozen=True)
@@ -160,8 +160,11 @@ def busy_cores() -> Iterator[None]:
             process.wait()
 
 
-def nodes_of(launcher: int) -> dict[str, int]:
-    """Return the process ids of the nodes that a launcher has started, by name."""
+def nodes_of(launcher: int, prefix: str = _NODES) -> dict[str, int]:
+    """Return the process ids of the nodes that a launcher has started, by name.
+
+    With another ``prefix`` those of other modules of ours.
+    """
     wanted = f"{LAUNCHER_PID}={launcher}".encode()
     found = {}
     for folder in Path("/proc").iterdir():
@@ -170,10 +173,15 @@ def nodes_of(launcher: int) -> dict[str, int]:
                 environment = (folder / "environ").read_bytes().split(b"\0")
             except OSError:
                 continue
-            name = node_name(int(folder.name))
+            name = node_name(int(folder.name), prefix)
             if wanted in environment and name:
                 found[name] = int(folder.name)
     return found
+
+
+def solvers_of(launcher: int) -> list[int]:
+    """Return the process ids of the solvers that nodes of a launcher have started."""
+    return list(nodes_of(launcher, _SOLVER).values())
 
 
 def is_node(pid: int) -> bool:
@@ -181,11 +189,11 @@ def is_node(pid: int) -> bool:
     return bool(node_name(pid))
 
 
-def node_name(pid: int) -> str:
-    """Return the name of the node that a process is, or ''."""
+def node_name(pid: int, prefix: str = _NODES) -> str:
+    """Return the name of the node that a process is, or ''; with another ``prefix`` that of a module."""
     try:
         words = Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace").split("\0")
     except OSError:
         return ""
-    names = [word.removeprefix(_NODES) for word in words if word.startswith(_NODES)]
+    names = [word.removeprefix(prefix) for word in words if word.startswith(prefix)]
     return names[0] if names else ""

@@ -9,8 +9,9 @@ from sms_handover.analysis.equality import compare_runs
 from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import read_info
 from sms_handover.bag.run.reader import read_run
-from sms_handover.graph.topics import CLEARANCE, CONTAINER, RECORDER
+from sms_handover.graph.topics import CLEARANCE, CONTAINER, RECORDER, VISION
 from sms_handover.launcher.recorded_scenario import scenario_in
+from sms_handover.messages.stamps import stamp_ns
 from sms_handover.run_data import RunData
 from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.scenario import Scenario, load_scenario
@@ -121,16 +122,24 @@ def test_compiled_dynamics(schedule: Path, simulated: dict[str, RunData], tmp_pa
 
 
 def test_a_run_under_harsh_conditions(schedule: Path, tmp_path: Path) -> None:
-    """With noise, delay, friction, wrenches and model error: twice the run in one process, and verified."""
+    """With noise, delay, friction, wrenches, model error, and sensors that all go by: twice, and verified."""
     given = ("--conditions", "harsh", "-p", "seed:=4", "-p", "conditions.command.delay:=0.003")
-    values = {"common": {"schedule": str(schedule), "conditions": "harsh", "seed": 4}}
-    expected = simulate(load_scenario(values={**values, "conditions.command.delay": 0.003}))
+    given += ("-p", "source:=measured", "-p", "conditions.sensors.vision.latency:=0.03")
+    values = {"common": {"schedule": str(schedule), "conditions": "harsh", "seed": 4, "source": "measured"}}
+    sooner = {"conditions.command.delay": 0.003, "conditions.sensors.vision.latency": 0.03}
+    expected = simulate(load_scenario(values={**values, **sooner}))
     assert expected.linear_impulse[-1].any() and expected.lost[-1] > 0.0
     for name, more in (("one", ()), ("two", ("--compose",))):
         ended = sms_handover("run", *given, *more, "--schedule", schedule, "-o", name, cwd=tmp_path)
         assert ended.code in (0, 4), ended  # grasps may miss
         assert_same_bits(read_run(tmp_path / name / "bag"), expected)
-    assert sms_handover("verify", tmp_path / "one" / "bag", cwd=tmp_path).code == 0
+    bag = tmp_path / "one" / "bag"
+    recorded = read_run(bag).measured
+    assert recorded is not None and expected.measured is not None
+    assert recorded.base_twist.tobytes() == expected.measured.base_twist.tobytes()
+    given_late = [stamp_ns(message.data) for message in read_messages(bag, [f"/{VISION}"])]
+    assert given_late and all(at_ns % 100_000_000 == 0 for at_ns in given_late)  # as it was measured
+    assert sms_handover("verify", bag, cwd=tmp_path).code == 0
 
 
 def test_a_collision_ends_the_run_in_the_same_tick(schedule: Path, tmp_path: Path) -> None:

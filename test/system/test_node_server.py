@@ -7,7 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from sms_handover.errors import GraphError
+from sms_handover.launcher import node_server
 from sms_handover.launcher.domain import reserved_domain
+from sms_handover.launcher.interrupts import Interrupts
 from sms_handover.launcher.node_server import ForkedProcess, NodeServer
 from sms_handover.launcher.processes import NodeProcesses
 from sms_handover.ros.process.launcher_process import LAUNCHER_PID
@@ -44,6 +47,26 @@ def test_a_forked_node_has_command_session_log_and_exit_code_of_its_own(tmp_path
             os.kill(pid, signal.SIGTERM)
             assert has_ended(pid, DEADLINE_S) and processes.exit_code("ik") == 0
     os.close(lock)
+
+
+def test_a_server_that_does_not_answer_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What it may still fork would be a second node of that name, so nothing else is started in its place."""
+    monkeypatch.setattr(node_server, "_ANSWER_TIMEOUT_S", 0.01)
+    with NodeServer() as server:
+        server.wait_until_ready()
+        os.kill(server._process.pid, signal.SIGSTOP)
+        with pytest.raises(GraphError, match=r"the node server has not started 'ik' within 0\.01 s"):
+            server.start("ik", UNKNOWN, {}, [1])
+        os.kill(server._process.pid, signal.SIGKILL)
+
+
+def test_a_signal_ends_the_wait_for_a_server() -> None:
+    with Interrupts() as interrupts, NodeServer() as server:
+        os.kill(server._process.pid, signal.SIGSTOP)
+        os.kill(os.getpid(), signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            server.wait_until_ready(interrupts.heed)
+        os.kill(server._process.pid, signal.SIGKILL)
 
 
 def test_where_there_is_no_server_a_node_starts_by_itself(tmp_path: Path) -> None:

@@ -1,7 +1,9 @@
 """What the bag of a run over DDS holds, and the commands that read it."""
 
 import json
+import os
 import shutil
+import signal
 import subprocess
 import sys
 from collections import Counter
@@ -21,6 +23,7 @@ from sms_handover.bag.run.reader import read_run
 from sms_handover.bag.writer import BagWriter
 from sms_handover.frames import DEPUTY, target_frame
 from sms_handover.graph.topics import LOOP_NODES, NODES, Rate, graph_topics
+from sms_handover.plan_report import PlanStatus
 from sms_handover.run_data import RunData
 from sms_handover.scene.recorded_scene import read_scene
 from sms_handover.simulation.scenario import load_scenario
@@ -34,7 +37,7 @@ from ..core.layout_paths import (
 )
 from ..transforms import TransformTree, matrix_of
 from .conftest import LAWS, TICKS, Command
-from .runs import Ended, sms_handover
+from .runs import Ended, running, solvers_of
 
 pytestmark = [pytest.mark.system, pytest.mark.slow]
 
@@ -194,16 +197,35 @@ def test_a_report_is_one_page_on_the_runs(recorded: Recorded, tmp_path: Path, ca
         assert part in text, part
 
 
-def test_real_time_ends_and_tells_how_it_kept_time(schedule: Path, tmp_path: Path) -> None:
-    """Paced by the wall clock the whole run is recorded too, with the timing of its loop."""
-    done = sms_handover(
-        "run", "--real-time", "--duration", "1.5", "--schedule", schedule, "-o", "run", cwd=tmp_path
-    )
-    assert done.code in (0, 4), done  # 4: a late command made a grasp miss
-    info = read_info(tmp_path / "run" / "bag")
+def test_real_time_goes_on_to_the_end_without_a_solver(tmp_path: Path) -> None:
+    """Paced by the wall clock, with plans from a process that is killed: the arms brake, the bag is whole.
+
+    It lasts longer than what a busy machine takes to make some plans.
+    """
+    law = ("--controller", "mpc", "-p", "controller.failed_plans:=40")
+    run = tmp_path / "run"
+    with running(
+        "run", "paper", "--real-time", *law, "--duration", "4", "-o", "run", cwd=tmp_path
+    ) as command:
+        command.until(lambda: solvers_of(command.pid), "the process of the solver")
+        command.until_recorded(run / "bag", 300_000)
+        (solver,) = solvers_of(command.pid)
+        os.kill(solver, signal.SIGKILL)
+        code = command.end()
+        printed = command.text
+    assert code == 0, printed
+    (line,) = [line for line in printed.splitlines() if "SIGKILL" in line]
+    assert "no plan for too long: the arms brake to rest; the solver process was ended by SIGKILL" in line
+    info, data = read_info(run / "bag"), read_run(run / "bag")
     assert info.topics["/loop_timing"].message_count > 0
-    assert info.topics["/joint_states"].message_count == 1501
+    assert info.topics["/joint_states"].message_count == 4001
     assert info.parameters["plant"]["mode"] == "realtime"
+    numbers = [plan.plan for plan in data.plans]
+    assert len(numbers) > 1 and numbers == sorted(set(numbers))
+    assert data.plans[-1].status is PlanStatus.BRAKING and data.plans[-1].late_plans > 0
+    assert np.abs(data.joint_velocity[-1]).max() < 0.05 < np.abs(data.joint_velocity).max()
+    limit = load_scenario("paper").model.robot.effort_limit
+    assert np.nanmax(np.abs(data.joint_command) - limit) <= 0.0  # NaN where no command came in time
 
 
 def test_the_transforms_in_the_bag_put_every_link_where_the_scene_has_it(bag: Path) -> None:

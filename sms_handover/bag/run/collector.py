@@ -16,6 +16,7 @@ from sms_handover.messages.values import (
     energy_values,
     grasp_event,
     plan_report,
+    planned_paths,
     pose_values,
     run_event,
     status_values,
@@ -23,9 +24,15 @@ from sms_handover.messages.values import (
     twist_values,
     vector_values,
 )
-from sms_handover.types import GraspEvent, PlanReport, TaskPhase
+from sms_handover.plan_report import PlannedPaths, PlanReport
+from sms_handover.types import GraspEvent, TaskPhase
 
-JOINT_TOPICS = (topics.JOINT_STATES, topics.JOINT_COMMAND, topics.JOINT_REFERENCE)
+JOINT_TOPICS = (
+    topics.JOINT_STATES,
+    topics.JOINT_COMMAND,
+    topics.JOINT_REFERENCE,
+    topics.MEASURED_JOINT_STATES,
+)
 POSITION, VELOCITY, EFFORT = range(3)  # blocks gathered from a JointState
 BASE_POSE, BASE_TWIST = range(2)  # blocks gathered from an Odometry
 
@@ -45,8 +52,10 @@ class RunCollector:
             name: BlockCollector(joint_state, (POSITION, VELOCITY, EFFORT)) for name in JOINT_TOPICS
         }
         self.odometry = BlockCollector(odometry, _POSE_WITHOUT_COVARIANCE)
+        self.measured_odometry = BlockCollector(odometry, _POSE_WITHOUT_COVARIANCE)
         self.rows = {
             topics.DEPUTY_POSE: RowCollector(7, pose_values),
+            topics.MEASURED_DEPUTY_POSE: RowCollector(7, pose_values),
             topics.LINEAR_MOMENTUM: RowCollector(3, vector_values),
             topics.ANGULAR_MOMENTUM: RowCollector(3, vector_values),
             topics.LINEAR_IMPULSE: RowCollector(3, vector_values),
@@ -61,6 +70,7 @@ class RunCollector:
         self.events: list[GraspEvent] = []
         self.run_events: list[RunEvent] = []
         self.plans: list[PlanReport] = []
+        self.planned_paths: list[PlannedPaths] = []
         self._first_ns: int | None = None
         self._newest_ns = 0
 
@@ -71,12 +81,14 @@ class RunCollector:
             topics.GRASP_EVENT: lambda message: self.events.append(grasp_event(message)),
             topics.RUN_EVENTS: lambda message: self.run_events.append(run_event(message)),
             topics.MPC_STATUS: lambda message: self.plans.append(plan_report(message)),
+            topics.PLANNED_PATHS: lambda message: self.planned_paths.append(planned_paths(message)),
             **{name: rows.add for name, rows in self.rows.items()},
         }
         takers: dict[str, Callable[[bytes], None]] = {
             **{name: collector.add for name, collector in self.joints.items()},
             topics.JOINT_STATES: self._take_state,
             topics.BASE_ODOMETRY: self.odometry.add,
+            topics.MEASURED_BASE_ODOMETRY: self.measured_odometry.add,
             **{name: decoder(self._info, self.full_name(name), take) for name, take in decoders.items()},
         }
         by_name = {self.full_name(name): taker for name, taker in takers.items()}
@@ -92,6 +104,7 @@ class RunCollector:
             self.events.clear()
             self.run_events.clear()
             self.plans.clear()
+            self.planned_paths.clear()
         self._newest_ns = time_ns
         self.joints[topics.JOINT_STATES].add(data)
 
@@ -100,7 +113,9 @@ class RunCollector:
         return f"{self._prefix}/{name}"
 
     def _check_types(self) -> None:
-        for topic in topics.graph_topics(self.arms, clearance=True, wrenches=True):
+        for topic in topics.graph_topics(
+            self.arms, clearance=True, wrenches=True, sensors=topics.SENSOR_TYPES
+        ):
             recorded = self._info.topics.get(self.full_name(topic.name))
             if recorded is not None and (recorded.type, recorded.encoding) != (topic.type, "cdr"):
                 raise BagError(

@@ -12,7 +12,7 @@ from sms_handover.bag.run.series import Series
 from sms_handover.errors import BagError
 from sms_handover.frames import arm_of_joint
 from sms_handover.graph import topics
-from sms_handover.run_data import Array, RunData, Stamps
+from sms_handover.run_data import Array, MeasuredRows, RunData, Stamps
 from sms_handover.types import TaskPhase
 
 _NO_IK = -1  # in RunData.ik_status where no solve was asked
@@ -90,6 +90,25 @@ def _assemble(collector: RunCollector) -> RunData:
         grasp_events=tuple(collector.events),
         run_events=tuple(collector.run_events),
         plans=tuple(collector.plans),
+        planned_paths=tuple(collector.planned_paths),
+        measured=_measured(collector, joint_names, ticks, periods),
+    )
+
+
+def _measured(
+    collector: RunCollector, joint_names: Sequence[str], ticks: Stamps, periods: Stamps
+) -> MeasuredRows | None:
+    """Return what sensors have told, None if the bag has none of it."""
+    joints, odometry = collector.joints[topics.MEASURED_JOINT_STATES], collector.measured_odometry
+    if not joints.first_names():
+        return None
+    deputy = collector.rows[topics.MEASURED_DEPUTY_POSE]
+    return MeasuredRows(
+        joint_position=joints.series(POSITION, joint_names).settled().at(ticks),
+        joint_velocity=joints.series(VELOCITY, joint_names).settled().at(ticks),
+        base_pose=odometry.series(BASE_POSE, 7).settled().at(ticks),
+        base_twist=odometry.series(BASE_TWIST, 6).settled().at(ticks),
+        deputy_pose=deputy.series().settled().at(periods),
     )
 
 

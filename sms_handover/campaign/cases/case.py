@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from sms_handover.analysis.equality import run_digest
+from sms_handover.analysis.plan_use import plan_use
 from sms_handover.campaign.cases.case_metrics import known_metrics, metrics_of
 from sms_handover.campaign.cases.case_row import Beside, Row, Status, Task
 from sms_handover.campaign.cases.read_back import is_exact, is_same, read_back
@@ -76,7 +77,13 @@ class Cases:
             status, cause = Status.ERROR, f"{type(error).__name__}: {error}"
         digest = run_digest(run) if run is not None else ""
         row = Row(task, seed, inputs, status, " ".join(cause.split())[:_ONE_LINE], metrics, digest)
-        spent = Beside(time.process_time() - cpu, time.monotonic() - wall, platform.node())
+        plans = plan_use(run) if run is not None else None
+        spent = Beside(
+            time.process_time() - cpu,
+            time.monotonic() - wall,
+            platform.node(),
+            solve=plans.solve_median if plans else None,
+        )
         return CaseResult(row, spent, run)
 
     def _run(

@@ -8,7 +8,6 @@ import json
 import os
 import shutil
 import sys
-import tempfile
 from base64 import b64encode
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -30,17 +29,15 @@ def main() -> int:
     """Answer tasks until standard input ends; return the exit code."""
     answers = os.fdopen(os.dup(_STANDARD_OUTPUT), "w", encoding="ascii")
     os.dup2(os.open(os.devnull, os.O_WRONLY), _STANDARD_OUTPUT)  # what a law prints is no row
-    with tempfile.TemporaryDirectory(prefix="sms_handover_cases_") as folder:
-        lines = _lines(folder)
-        first = json.loads(next(lines))
-        try:
-            cases = Cases(Frozen(first["files"]), first["cases"], Path(folder))
-        except SmsHandoverError as error:
-            _answer(answers, {"error": str(error)})
-            return 2
-        _answer(answers, {"ready": os.getpid()})
-        for line in lines:
-            _answer(answers, _done(cases, Task(*json.loads(line))))
+    first = json.loads(sys.stdin.readline())
+    try:
+        cases = Cases(Frozen(first["files"]), first["cases"], Path(first["folder"]))
+    except SmsHandoverError as error:
+        _answer(answers, {"error": str(error)})
+        return 2
+    _answer(answers, {"ready": os.getpid()})
+    for line in _lines(first["folder"]):
+        _answer(answers, _done(cases, Task(*json.loads(line))))
     return 0
 
 

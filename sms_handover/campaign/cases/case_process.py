@@ -3,16 +3,18 @@
 import json
 import os
 import platform
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from base64 import b64decode
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from select import select
-from typing import NamedTuple
+from typing import IO, NamedTuple
 
 from sms_handover.campaign.cases.case_row import Beside, Row, Status, Task, row_of
 from sms_handover.campaign.definition.campaign_file import Limits
@@ -27,6 +29,8 @@ _LOOK_S = 0.05  # [s] between two looks at the memory
 _END_S = 5.0  # [s] to end when asked to
 _MB = 1e6  # [byte]
 _READ = 1 << 16  # [byte]
+_LONGEST_SAID = 4096  # [byte] of standard error that are kept
+_LONGEST_LINE = 200  # [characters] of it in a cause
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
@@ -50,10 +54,11 @@ class CaseProcess:
         program: Sequence[str] = CASE_PROGRAM,
     ) -> None:
         """Take what the child needs; it starts with the first task."""
-        self._first = json.dumps({"files": dict(frozen.files), "cases": cases})
+        self._first: dict[str, object] = {"files": dict(frozen.files), "cases": cases}
         self._seed, self._limits, self._program = seed, limits, tuple(program)
         self._child: subprocess.Popen[bytes] | None = None
-        self._pending = b""
+        self._scratch: Path | None = None
+        self._pending, self._said = b"", b""
 
     def run(self, task: Task) -> Done:
         """Return what comes of a task; raises SmsHandoverError if the child cannot even start."""
@@ -81,8 +86,11 @@ class CaseProcess:
         except subprocess.TimeoutExpired:
             child.kill()
             child.wait()
-        if child.stdout:
-            child.stdout.close()
+        for stream in (child.stdout, child.stderr):
+            if stream:
+                stream.close()
+        if self._scratch is not None:
+            shutil.rmtree(self._scratch, ignore_errors=True)
 
     def _start(self) -> None:
         """Start the child unless it runs."""
@@ -90,15 +98,16 @@ class CaseProcess:
             return
         self.close()
         self._pending = b""
+        self._scratch = Path(tempfile.mkdtemp(prefix="sms_handover_cases_"))  # ours, as a child may be killed
         self._child = subprocess.Popen(
             self._program,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
             env={**os.environ, **_ONE_THREAD},
             start_new_session=True,  # Ctrl-C is for the parent, which ends it
         )
-        answer, _, cause = self._ask(self._first, _START_S)
+        answer, _, cause = self._ask(json.dumps({**self._first, "folder": str(self._scratch)}), _START_S)
         if answer is None:
             raise SmsHandoverError(f"a process for cases cannot start: {cause}")
         if "error" in answer:
@@ -107,14 +116,17 @@ class CaseProcess:
     def _ask(self, text: str, limit_s: float) -> tuple[dict[str, object] | None, Status, str]:
         """Send a line and wait for the answer; without one tell how and why that ended."""
         child = self._child
-        assert child is not None and child.stdin is not None and child.stdout is not None
+        assert child is not None and child.stdin and child.stdout and child.stderr
+        self._said, streams = b"", [child.stdout, child.stderr]
         deadline = time.monotonic() + limit_s
         with suppress(OSError):  # a dead child has no answer either
             child.stdin.write(text.encode() + b"\n")
             child.stdin.flush()
         while b"\n" not in self._pending:
-            ready = select([child.stdout], [], [], _LOOK_S)[0]
-            if ready:
+            ready = select(streams, [], [], _LOOK_S)[0]
+            if child.stderr in ready:
+                self._hear(child.stderr, streams)
+            if child.stdout in ready:
                 part = os.read(child.stdout.fileno(), _READ)
                 if not part:
                     return None, Status.DIED, self._end_in_words()
@@ -129,6 +141,14 @@ class CaseProcess:
         answer: dict[str, object] = json.loads(line)
         return answer, Status.SUCCEEDED, ""
 
+    def _hear(self, stream: IO[bytes], streams: list[IO[bytes]]) -> bool:
+        """Take what the child says on standard error and keep its end; return whether it said any."""
+        part = os.read(stream.fileno(), _READ)
+        self._said = (self._said + part)[-_LONGEST_SAID:]
+        if not part and stream in streams:
+            streams.remove(stream)
+        return bool(part)
+
     def _kill(self) -> None:
         """End the child at once."""
         if self._child is not None:
@@ -136,14 +156,19 @@ class CaseProcess:
             self.close()
 
     def _end_in_words(self) -> str:
-        """Return how the child ended."""
+        """Return how the child ended, and the last line that it said."""
         child = self._child
+        assert child is not None and child.stderr is not None
+        while select([child.stderr], [], [], 0.0)[0] and self._hear(child.stderr, []):
+            pass
         self.close()
-        code = child.returncode if child is not None else 0
-        if code is not None and code < 0:
+        code, how = child.returncode, f"with exit code {child.returncode}"
+        if code < 0:
             with suppress(ValueError):
-                return f"its process ended by signal {signal.Signals(-code).name}"
-        return f"its process ended with exit code {code}"
+                how = f"by signal {signal.Signals(-code).name}"
+        lines = [line for line in self._said.decode(errors="replace").splitlines() if line.strip()]
+        said = f": {lines[-1].strip()}"[:_LONGEST_LINE] if lines else ""
+        return f"its process ended {how}{said}"
 
     @staticmethod
     def _done(answer: dict[str, object], tries: int) -> Done:

@@ -79,12 +79,16 @@ class Row:
 
 @dataclass(frozen=True)
 class Beside:
-    """What was measured beside a row: CPU seconds, wall time s, host, and how often it was tried."""
+    """What was measured beside a row: CPU seconds, wall time s, host, and how often it was tried.
+
+    ``solve`` is the median wall time in s of a solve of a law that plans, None of any other.
+    """
 
     cpu: float
     wall: float
     host: str
     tries: int = 1
+    solve: float | None = None
 
 
 def row_of(values: Any) -> Row:

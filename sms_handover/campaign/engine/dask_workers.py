@@ -32,6 +32,7 @@ _WAITING = 2  # [-] chunks of each worker that are handed out
 _DEATHS = 20  # [-] of workers that one chunk survives
 _CLOSE_S = 1.5  # [s] that a cluster has to end by itself
 _TIMEOUT = "30s"  # to reach a scheduler
+_GOES_ON = "the same command goes on"
 _Answer = tuple[str, dict[str, Any], bytes]
 
 
@@ -126,13 +127,24 @@ class DaskWorkers:
             )
         try:
             self._client = distributed.Client(self._cluster or scheduler, timeout=_TIMEOUT)
-            self._client.register_plugin(plugin, name=_PLUGIN)
         except OSError as error:
             self.close()
             raise SmsHandoverError(f"scheduler {scheduler} cannot be reached: {error}") from error
+        try:
+            self._client.register_plugin(plugin, name=_PLUGIN)
+        except Exception as error:  # whatever a worker has to say, such as that the package is not there
+            self.close()
+            raise SmsHandoverError(f"workers cannot take cases: {_in_words(error)}") from error
 
-    def run(self, tasks: Iterable[Task]) -> Iterator[Done]:
-        """Yield finished cases as they come; raises SmsHandoverError where workers die again and again."""
+    def run(self, tasks: Iterable[Task]) -> Iterator[Sequence[Done]]:
+        """Yield finished chunks as they come; raises SmsHandoverError where workers or scheduler fail."""
+        try:
+            yield from self._chunks(tasks)
+        except (OSError, distributed.CancelledError) as error:  # after as long as it takes to reach one
+            raise SmsHandoverError(f"the scheduler was lost: {_in_words(error)}; {_GOES_ON}") from error
+
+    def _chunks(self, tasks: Iterable[Task]) -> Iterator[Sequence[Done]]:
+        """Hand out chunks and yield what came of each; raises what Dask raises."""
         left, self._chunk_size, number = iter(tasks), 1, 0
         running = distributed.as_completed()
         waiting = 0
@@ -155,12 +167,12 @@ class DaskWorkers:
                 return
             future = next(running)
             waiting -= 1
-            answers = self._result(future)
+            answers = answers_of(future)
             future.release()
             walls = [beside["wall"] for _, beside, _ in answers]
             mean = max(sum(walls) / len(walls), _CHUNK_S / _LARGEST_CHUNK)
             self._chunk_size = max(1, min(_LARGEST_CHUNK, round(_CHUNK_S / mean)))
-            yield from (_done(answer) for answer in answers)
+            yield [_done(answer) for answer in answers]
 
     def close(self) -> None:
         """End the cluster, or leave the one of others as it was."""
@@ -189,13 +201,23 @@ class DaskWorkers:
         """The number of cases that run at the same time."""
         return sum(self._client.nthreads().values())
 
-    def _result(self, future: Any) -> list[_Answer]:
-        """Return what a chunk gave."""
-        try:
-            answers: list[_Answer] = future.result()
-        except distributed.KilledWorker as error:
-            raise SmsHandoverError("workers die again and again: see what kills them") from error
-        return answers
+
+def answers_of(future: Any) -> list[_Answer]:
+    """Return what a chunk gave; raises SmsHandoverError, whatever failed."""
+    try:
+        answers: list[_Answer] = future.result()
+    except distributed.KilledWorker as error:
+        raise SmsHandoverError(f"workers die again and again: see what kills them; {_GOES_ON}") from error
+    except SmsHandoverError:
+        raise
+    except Exception as error:  # of the worker, of Dask or of the network
+        raise SmsHandoverError(f"a worker failed: {_in_words(error)}; {_GOES_ON}") from error
+    return answers
+
+
+def _in_words(error: BaseException) -> str:
+    """Return an error as one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())
 
 
 def _done(answer: _Answer) -> Done:

@@ -1,7 +1,7 @@
 """Run of a campaign: what is missing in its folder is handed to workers, and each row is kept as it comes."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 
@@ -10,6 +10,7 @@ from sms_handover.campaign.cases.case_row import Row, Task
 from sms_handover.campaign.engine.workers import Workers
 from sms_handover.campaign.record.campaign_folder import OpenCampaign, tasks_of
 from sms_handover.campaign.statistics.proportion import Proportion, proportion
+from sms_handover.campaign.statistics.stop_rule import stopped_at
 
 Group = tuple[str, str]  # scenario and law
 
@@ -65,8 +66,7 @@ def run_campaign(
     campaign, cases = folder.campaign, folder.cases
     groups = tuple((scenario, law) for scenario in campaign.scenarios for law in campaign.laws)
     shard = folder.manifest.shard
-    own = sum(1 for _ in range(shard.number - 1, cases, shard.of))
-    tally, done = Tally(own * len(groups), groups), _DoneCases(groups, cases)
+    tally, done = Tally(folder.runs(), groups), _DoneCases(groups, cases)
     for entry in folder.entries():
         if entry.row.task.case < cases:
             done.add(entry.row.task)
@@ -80,24 +80,16 @@ def run_campaign(
     begin = 0
     with _Lazy(make_workers) as workers:
         for end in (*looks, cases):
-            for one in workers.run(missing(begin, end)):
-                folder.add(one)
-                tally.add(one.row)
+            for done_now in workers.run(missing(begin, end)):
+                folder.add(*done_now)
+                for one in done_now:
+                    tally.add(one.row)
                 show(tally)
             begin = end
-            if end < cases and campaign.stop and _is_enough(folder, groups, end, campaign.stop.half_width):
+            if end < cases and stopped_at(campaign, cases, folder.entries()) == end:
                 tally.stopped_at = end
                 break
     return tally
-
-
-def _is_enough(folder: OpenCampaign, groups: Iterable[Group], cases: int, half_width: float) -> bool:
-    """Whether the intervals of all laws in all scenarios over the first cases are narrow enough."""
-    tally = Tally(0, tuple(groups))
-    for entry in folder.entries():
-        if entry.row.task.case < cases:
-            tally.add(entry.row)
-    return all(tally.proportion(group).half_width <= half_width for group in tally.groups)
 
 
 class _Lazy:
@@ -114,8 +106,8 @@ class _Lazy:
         if self._workers is not None:
             self._workers.close()
 
-    def run(self, tasks: Iterator[Task]) -> Iterator[Done]:
-        """Yield finished cases."""
+    def run(self, tasks: Iterator[Task]) -> Iterator[Sequence[Done]]:
+        """Yield finished cases, those together that come together."""
         first = next(tasks, None)
         if first is None:
             return

@@ -11,8 +11,8 @@ from sms_handover.campaign.definition.frozen import Frozen
 class Workers(Protocol):
     """Carries out tasks; takes no more of them than it soon needs."""
 
-    def run(self, tasks: Iterable[Task]) -> Iterator[Done]:
-        """Yield finished cases as they come."""
+    def run(self, tasks: Iterable[Task]) -> Iterator[Sequence[Done]]:
+        """Yield finished cases as they come, those together that come together."""
 
     def close(self) -> None:
         """End every process that was started, within seconds."""
@@ -26,9 +26,10 @@ class SerialWorkers:
         campaign = frozen.campaign(cases)
         self._process = CaseProcess(frozen, cases, campaign.seed, campaign.limits, program)
 
-    def run(self, tasks: Iterable[Task]) -> Iterator[Done]:
-        """Yield finished cases in the order of tasks."""
-        yield from map(self._process.run, tasks)
+    def run(self, tasks: Iterable[Task]) -> Iterator[Sequence[Done]]:
+        """Yield finished cases one by one in the order of tasks."""
+        for task in tasks:
+            yield (self._process.run(task),)
 
     def close(self) -> None:
         """End the process."""

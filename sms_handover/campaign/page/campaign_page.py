@@ -9,6 +9,7 @@ from sms_handover.campaign.cases.case_row import Row
 from sms_handover.campaign.page.campaign_plots import campaign_plots
 from sms_handover.campaign.record.campaign_folder import CampaignFolder
 from sms_handover.campaign.statistics.case_columns import Group, columns_of
+from sms_handover.campaign.statistics.stop_rule import stopped_at
 from sms_handover.campaign.statistics.tables import (
     TEST_HEAD,
     outcome_sections,
@@ -49,7 +50,7 @@ def campaign_page(folder: CampaignFolder) -> str:
     plots = campaign_plots(campaign, columns)
     scripts = (plotly_script(), "\n".join(web_file(name) for name in _SCRIPTS))
     causes = failures_by_cause(entries).most_common(_MOST_CAUSES)
-    paired = paired_section(columns)
+    paired, stop = paired_section(columns), stopped_at(campaign, folder.cases, entries)
     return render(
         "campaign.html.j2",
         version=__version__,
@@ -60,8 +61,9 @@ def campaign_page(folder: CampaignFolder) -> str:
         description=campaign.description,
         success=campaign.success.text,
         rows=len(entries),
-        total=sum(1 for _ in folder.tasks),
+        total=folder.runs(stop),
         stop=campaign.stop,
+        stopped_at=stop,
         runs=[Headed(style) for style in run_styles(campaign.laws, campaign.laws)],
         sections=outcome_sections(campaign, columns),
         causes=[(*cause, times) for cause, times in causes],

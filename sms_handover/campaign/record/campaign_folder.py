@@ -24,7 +24,7 @@ from sms_handover.campaign.record.manifest import (
     write_manifest,
 )
 from sms_handover.campaign.sampling.samples import Samples
-from sms_handover.errors import ConfigurationError
+from sms_handover.errors import ConfigurationError, SmsHandoverError
 
 
 class CampaignFolder:
@@ -50,10 +50,10 @@ class CampaignFolder:
         """The number of cases of the whole campaign."""
         return Samples(self.campaign).count
 
-    @property
-    def tasks(self) -> Iterator[Task]:
-        """All runs of this part of the campaign, those of a case after one another."""
-        return tasks_of(self.campaign, range(self.cases), self.manifest.shard)
+    def runs(self, stopped_at: int = 0) -> int:
+        """Return the number of runs of this part of the campaign, up to the case where it stopped early."""
+        shard = self.manifest.shard
+        return len(range(shard.number - 1, stopped_at or self.cases, shard.of)) * self.campaign.runs_per_case
 
     def entries(self, faults: JournalFaults | None = None) -> Iterator[Entry]:
         """Yield what the journal has, each run once; raises ConfigurationError on two rows that differ."""
@@ -84,13 +84,23 @@ class OpenCampaign(CampaignFolder):
     def __exit__(self, *error: object) -> None:
         self._journal.close()
 
-    def add(self, done: Done) -> None:
-        """Keep a finished case; when this returns, it is on disk."""
-        if done.trajectory:
-            path = file_of(self.path, TRAJECTORIES, done.row.task)
+    def add(self, *done: Done) -> None:
+        """Keep finished cases; when this returns, they are on disk. Raises SmsHandoverError if it is full."""
+        for one in done:
+            if one.trajectory:
+                self._keep(file_of(self.path, TRAJECTORIES, one.row.task), one.trajectory)
+        self._journal.add(*(Entry(one.row, one.beside) for one in done))
+
+    @staticmethod
+    def _keep(path: Path, data: bytes) -> None:
+        """Write retained data before the row that says it is there."""
+        try:
             path.parent.mkdir(exist_ok=True)
-            path.write_bytes(done.trajectory)
-        self._journal.add(done.row, done.beside)
+            path.write_bytes(data)
+        except OSError as error:
+            raise SmsHandoverError(
+                f"{path} cannot be written: {error.strerror}; make room, then the same command goes on"
+            ) from error
 
 
 def open_campaign(path: Path, frozen: Frozen, cases: int | None, shard: Shard) -> OpenCampaign:

@@ -41,6 +41,7 @@ def write_table(path: Path, entries: Iterable[Entry]) -> int:
         "cpu": arrow.array([entry.beside.cpu for entry in rows], arrow.float64()),
         "wall": arrow.array([entry.beside.wall for entry in rows], arrow.float64()),
         "host": arrow.array([entry.beside.host for entry in rows], arrow.string()),
+        "solve": arrow.array([entry.beside.solve for entry in rows], arrow.float64()),
         "tries": arrow.array([entry.beside.tries for entry in rows], arrow.int64()),
     }
     unfinished = path.with_name(f".{path.name}")

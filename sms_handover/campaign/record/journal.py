@@ -105,9 +105,9 @@ class JournalWriter:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         return descriptor
 
-    def add(self, row: Row, beside: Beside) -> None:
-        """Append a line and wait until it is on disk; raises SmsHandoverError where it cannot be written."""
-        self._write(_line(row, beside))
+    def add(self, *entries: Entry) -> None:
+        """Append lines and wait until they are on disk; raises SmsHandoverError where they cannot be."""
+        self._write(b"".join(_line(*entry) for entry in entries))
 
     def _write(self, data: bytes) -> None:
         """Write bytes whole or not at all."""

@@ -37,7 +37,13 @@ def campaign_values(campaign: Campaign, columns: Mapping[Group, CaseColumns]) ->
     for (scenario, law), one in columns.items():
         successes = proportion(int(one.succeeded.sum()), len(one.case))
         metrics = {
-            name: {f"{share:g}": list(map(_plain, percentile(one.metrics[name], share))) for share in _SHARES}
+            name: {
+                "cases": int((~np.isnan(one.metrics[name])).sum()),
+                **{
+                    f"{share:g}": list(map(_plain, percentile(one.metrics[name], share)[:3]))
+                    for share in _SHARES
+                },
+            }
             for name in (*KEY_METRICS, *campaign.metrics)
             if name in one.metrics
         }

@@ -19,7 +19,8 @@ Flags = npt.NDArray[np.bool_]
 class CaseColumns:
     """The cases (N,) of a scenario under a law: numbers, outcomes, metrics and numeric inputs.
 
-    A metric is NaN where it is not defined, as after a numeric failure.
+    A metric is NaN where it is not defined, as after a numeric failure; ``solve``, the median wall time of a
+    solve in s, where the law makes no plans.
     """
 
     case: Numbers
@@ -28,6 +29,7 @@ class CaseColumns:
     cpu: Array
     metrics: Mapping[str, Array]
     inputs: Mapping[str, Array]
+    solve: Array
 
     def common(self, other: "CaseColumns") -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
         """Return the places of the cases that both have, in the one and in the other."""
@@ -55,6 +57,7 @@ def _columns(entries: list[Entry]) -> CaseColumns:
         np.array([entry.beside.cpu for entry in entries]),
         {name: np.array([_number(entry.row.metrics.get(name)) for entry in entries]) for name in metrics},
         {path: np.array(values) for path, values in columns.items() if not all(np.isnan(values))},
+        np.array([_number(entry.beside.solve) for entry in entries]),
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from sms_handover.campaign.sampling.designs import needed
 from sms_handover.campaign.statistics.case_columns import CaseColumns, Group
+from sms_handover.campaign.statistics.holm import holm
 
 SUCCESS = "success"
 
@@ -82,9 +83,5 @@ def _metric(scenario: str, one: str, other: str, a: CaseColumns, b: CaseColumns,
 
 def _adjusted(tests: Sequence[PairedTest]) -> tuple[PairedTest, ...]:
     """Return tests with their p values adjusted for their number."""
-    made = [test for test in tests if test.p == test.p]
-    if not made:
-        return tuple(tests)
-    multipletests = needed("statsmodels.stats.multitest", "statsmodels").multipletests
-    adjusted = iter(multipletests([test.p for test in made], method="holm")[1].tolist())
-    return tuple(replace(test, adjusted=next(adjusted)) if test.p == test.p else test for test in tests)
+    adjusted = holm([test.p for test in tests])
+    return tuple(replace(test, adjusted=value) for test, value in zip(tests, adjusted, strict=True))

@@ -13,11 +13,12 @@ _MOST = 20_000  # [-] values that are resampled; of more a part, evenly taken
 
 
 class Percentile(NamedTuple):
-    """A percentile, and the bounds of its 95 % bootstrap interval; NaN where there are too few values."""
+    """A percentile of so many values, and the bounds of its 95 % bootstrap interval, NaN of too few."""
 
     value: float
     low: float
     high: float
+    known: int
 
 
 def percentile(values: Array, share: float) -> Percentile:
@@ -27,10 +28,10 @@ def percentile(values: Array, share: float) -> Percentile:
     """
     known = values[~np.isnan(values)]
     if known.size == 0:
-        return Percentile(np.nan, np.nan, np.nan)
+        return Percentile(np.nan, np.nan, np.nan, 0)
     value = float(np.quantile(known, share))
     if known.size < 2 or np.ptp(known) == 0.0:
-        return Percentile(value, np.nan, np.nan)
+        return Percentile(value, np.nan, np.nan, known.size)
     sample = known[:: max(1, known.size // _MOST)]
     interval = (
         needed("scipy.stats", "scipy")
@@ -44,4 +45,4 @@ def percentile(values: Array, share: float) -> Percentile:
         )
         .confidence_interval
     )
-    return Percentile(value, float(interval.low), float(interval.high))
+    return Percentile(value, float(interval.low), float(interval.high), known.size)

@@ -11,6 +11,7 @@ from sms_handover.campaign.sampling.designs import needed, problem
 from sms_handover.campaign.sampling.samples import Samples
 from sms_handover.campaign.statistics.case_columns import CaseColumns
 
+CORRELATION = "correlation"
 _FEWEST = 8  # [-] cases for a rank correlation
 _SEED = 0  # of the resampling that gives the intervals
 _LEVELS = 4  # [-] of morris by default
@@ -20,9 +21,9 @@ _LEVELS = 4  # [-] of morris by default
 class Sensitivity:
     """How much a metric depends on a drawn value; half widths of 95 % intervals, NaN where there are none.
 
-    ``kind`` says which: ``correlation``, Spearman's, with its p value in ``second``; ``morris``, mean
-    magnitude mu* of the elementary effects and their spread sigma [Morris1991]; ``sobol``, first-order and
-    total index [Saltelli2010].
+    ``kind`` says which: ``correlation``, Spearman's, with its p value in ``second``, not adjusted for their
+    number; ``morris``, mean magnitude mu* of the elementary effects and their spread sigma [Morris1991];
+    ``sobol``, first-order and total index [Saltelli2010].
     """
 
     path: str
@@ -55,9 +56,9 @@ def _correlation(path: str, drawn: np.ndarray, values: np.ndarray) -> Sensitivit
     """Return Spearman's rank correlation of a drawn value and a metric, with its p value."""
     known = ~(np.isnan(drawn) | np.isnan(values))
     if known.sum() < _FEWEST or np.ptp(drawn[known]) == 0.0 or np.ptp(values[known]) == 0.0:
-        return Sensitivity(path, "correlation", nan, nan, nan, nan)
+        return Sensitivity(path, CORRELATION, nan, nan, nan, nan)
     found = needed("scipy.stats", "scipy").spearmanr(drawn[known], values[known])
-    return Sensitivity(path, "correlation", float(found.statistic), nan, float(found.pvalue), nan)
+    return Sensitivity(path, CORRELATION, float(found.statistic), nan, float(found.pvalue), nan)
 
 
 def _morris(campaign: Campaign, values: np.ndarray) -> tuple[Sensitivity, ...]:

@@ -1,6 +1,7 @@
 """Tables of a campaign with a column per law: success, percentiles, costs; and what tells laws apart."""
 
 from collections.abc import Mapping, Sequence
+from math import nan
 
 import numpy as np
 
@@ -8,16 +9,18 @@ from sms_handover.analysis.layout import MISSING, Row, Section, number
 from sms_handover.campaign.cases.case_metrics import USUAL
 from sms_handover.campaign.definition.campaign_file import Campaign
 from sms_handover.campaign.statistics.case_columns import CaseColumns, Group
+from sms_handover.campaign.statistics.holm import holm
 from sms_handover.campaign.statistics.paired_tests import SUCCESS, PairedTest, paired_tests
 from sms_handover.campaign.statistics.percentiles import percentile
 from sms_handover.campaign.statistics.proportion import proportion
-from sms_handover.campaign.statistics.sensitivity import Sensitivity, sensitivities
+from sms_handover.campaign.statistics.sensitivity import CORRELATION, Sensitivity, sensitivities
 
 KEY_METRICS = (
     *("grasp_error", "grasp_angle", "grasp_speed", "clearance", "base_turn", "base_shift"),
     *("control_effort", "peak_torque", "rate_share", "time_beyond_position_limit"),
 )
 TESTED = ("grasp_error", "base_turn", "control_effort")
+_MS_PER_S = 1000.0  # [ms/s]
 _SHARES = ((0.05, "5 %"), (0.5, "median"), (0.95, "95 %"))
 
 
@@ -38,11 +41,23 @@ def _scenario(campaign: Campaign, name: str, columns: Mapping[Group, CaseColumns
     further = [metric for metric in campaign.metrics if metric not in KEY_METRICS]
     for metric in (*KEY_METRICS, *further):
         unit = f" [{USUAL[metric][0]}]" if metric in USUAL else ""
-        rows.append(Row(f"{metric}{unit}"))
+        rows.append(Row(f"{metric}{unit}", _known(found, metric)))
         for share, words in _SHARES:
             rows.append(Row(f"  {words}", tuple(_percentile(one, metric, share) for one in found)))
     rows.append(Row("CPU time of a case, mean [s]", tuple(map(_cpu, found))))
+    if any(one is not None and not np.isnan(one.solve).all() for one in found):
+        rows.append(Row("solve time of a plan, median [ms]", tuple(map(_solve, found))))
     return Section(f"Scenario {name}", tuple(rows))
+
+
+def _known(found: Sequence[CaseColumns | None], metric: str) -> tuple[str, ...]:
+    """Return how many cases have a metric, '' of those that all have; nothing if every law has it in all."""
+    cells = []
+    for one in found:
+        known = 0 if one is None or metric not in one.metrics else int((~np.isnan(one.metrics[metric])).sum())
+        every = 0 if one is None else len(one.case)
+        cells.append(f"of {known} cases" if known < every else "")
+    return tuple(cells) if any(cells) else ()
 
 
 def _success(one: CaseColumns | None) -> str:
@@ -59,6 +74,10 @@ def _numeric(one: CaseColumns | None) -> str:
 
 def _cpu(one: CaseColumns | None) -> str:
     return MISSING if one is None or not one.cpu.size else number(float(one.cpu.mean()))
+
+
+def _solve(one: CaseColumns | None) -> str:
+    return MISSING if one is None else number(_MS_PER_S * percentile(one.solve, 0.5).value)
 
 
 def _percentile(one: CaseColumns | None, metric: str, share: float) -> str:
@@ -89,7 +108,7 @@ def _test(test: PairedTest) -> Row:
 
 
 SENSITIVITY_HEADS: Mapping[str, tuple[str, ...]] = {
-    "correlation": ("Spearman's rho", "p"),
+    CORRELATION: ("Spearman's rho", "p", "p, Holm"),
     "morris": ("mu*", "95 % +-", "sigma"),
     "sobol": ("first order", "95 % +-", "total", "95 % +-"),
 }
@@ -98,20 +117,26 @@ SENSITIVITY_HEADS: Mapping[str, tuple[str, ...]] = {
 def sensitivity_sections(
     campaign: Campaign, columns: Mapping[Group, CaseColumns]
 ) -> tuple[tuple[tuple[str, ...], Section], ...]:
-    """Return head and rows of the sensitivity of the worst-case metric, by scenario and law."""
+    """Return head and rows of the sensitivity of the worst-case metric, by scenario and law.
+
+    p values of correlations are adjusted over all of them.
+    """
+    made = {group: sensitivities(campaign, one, campaign.worst_by) for group, one in columns.items()}
+    every = [(group, one) for group, rows in made.items() for one in rows]
+    adjusted = iter(holm([one.second if one.kind == CORRELATION else nan for _, one in every]))
     found = []
-    for (scenario, law), one in columns.items():
-        rows = sensitivities(campaign, one, campaign.worst_by)
+    for (scenario, law), rows in made.items():
         if rows:
             title = f"{campaign.worst_by} in {scenario} under {law}, by {rows[0].kind}"
-            found.append((SENSITIVITY_HEADS[rows[0].kind], Section(title, tuple(map(_sensitivity, rows)))))
+            lines = tuple(_sensitivity(one, next(adjusted)) for one in rows)
+            found.append((SENSITIVITY_HEADS[rows[0].kind], Section(title, lines)))
     return tuple(found)
 
 
-def _sensitivity(one: Sensitivity) -> Row:
+def _sensitivity(one: Sensitivity, adjusted: float) -> Row:
     """Return the sensitivity to a drawn value as a row."""
     cells: Sequence[float] = {
-        "correlation": (one.first, one.second),
+        CORRELATION: (one.first, one.second, adjusted),
         "morris": (one.first, one.first_half, one.second),
         "sobol": (one.first, one.first_half, one.second, one.second_half),
     }[one.kind]

@@ -4,11 +4,12 @@ import heapq
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from shlex import quote
 
 from sms_handover.campaign.cases.case_row import Row, Task
 from sms_handover.campaign.record.journal import Entry
 
-_NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
+_NUMBER = re.compile(r"0x[0-9a-f]+|-?\d+(\.\d+)?(e[-+]?\d+)?")
 Group = tuple[str, str]  # scenario and law
 
 
@@ -47,7 +48,7 @@ def cause_of(row: Row) -> str:
 def rerun_command(folder: str, task: Task, *, one_scenario: bool) -> str:
     """Return the command that runs a case again."""
     scenario = "" if one_scenario else f" --scenario {task.scenario}"
-    return f"sms-handover campaign rerun {folder} {task.case} --law {task.law}{scenario}"
+    return f"sms-handover campaign rerun {quote(folder)} {task.case} --law {task.law}{scenario}"
 
 
 def failed(entries: Iterable[Entry]) -> Iterator[Row]:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from sms_handover.campaign.record.campaign_folder import merge
 from sms_handover.campaign.record.outputs import write_outputs
+from sms_handover.campaign.statistics.stop_rule import stopped_at
 from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
 
 
@@ -24,8 +25,9 @@ def add_parser(parser: ArgumentParser) -> None:
 def command(options: Namespace) -> int:
     """Run the command; return the exit code."""
     with merge(options.output, options.folders) as merged:
-        there, total = sum(1 for _ in merged.entries()), sum(1 for _ in merged.tasks)
+        entries = list(merged.entries())
+        there, total = len(entries), merged.runs(stopped_at(merged.campaign, merged.cases, entries))
     print(f"{there} of {total} rows")
     for line in write_outputs(options.output):
         print(line)
-    return EXIT_OK if there == total else EXIT_LOSS
+    return EXIT_OK if there >= total else EXIT_LOSS

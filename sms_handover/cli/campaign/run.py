@@ -13,7 +13,7 @@ from sms_handover.campaign.engine.plan import require_metrics
 from sms_handover.campaign.engine.run import Tally, run_campaign
 from sms_handover.campaign.engine.scheduler_url import require_safe
 from sms_handover.campaign.record.campaign_folder import open_campaign
-from sms_handover.campaign.record.manifest import Shard, shard_of
+from sms_handover.campaign.record.manifest import MANIFEST, Shard, read_manifest, shard_of
 from sms_handover.campaign.record.outputs import write_outputs
 from sms_handover.cli.exit_codes import EXIT_INTERRUPTED, EXIT_OK
 from sms_handover.errors import ConfigurationError
@@ -85,7 +85,15 @@ def command(options: Namespace) -> int:
     require_metrics(frozen, path)
     part = f".shard_{shard.number}_of_{shard.of}" if options.shard else ""
     folder = options.output or Path("runs") / f"{campaign.name}{part}"
+    known = read_manifest(folder).cases or 0 if (folder / MANIFEST).exists() else 0
+    if options.cases is not None and options.cases < known:
+        raise ConfigurationError(
+            f"--cases is {options.cases}, must be >= {known}, which {folder} was made for: cases are only "
+            "added; choose another folder with --output"
+        )
     with open_campaign(folder, frozen, cases, shard) as opened, Progress() as progress:
+        if known > (cases or known):
+            progress.print(f"{folder} has {known} cases, as was asked for before, not {cases}")
         for fault in opened.faults:
             progress.print(fault)
         for difference in opened.manifest.differences:

@@ -6,10 +6,10 @@ import numpy as np
 
 from sms_handover.control.mpc.horizon import Horizon
 from sms_handover.control.mpc.parameters import MpcGains
-from sms_handover.control.mpc.prediction import Prediction
+from sms_handover.control.mpc.prediction import Prediction, flow_derivatives
 from sms_handover.control.mpc.products import product, times_vector
 from sms_handover.control.mpc.sensitivity import Sensitivity
-from sms_handover.control.mpc.tool_errors import ToolErrors
+from sms_handover.control.mpc.tool_errors import ROWS, ToolErrors
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import Array, PreviewedTargets
 
@@ -22,7 +22,7 @@ class PlanCost:
 
     ell = w_p |e_p|^2 + w_o |e_o|^2 of tools that have a target, w_q |q - q_d|^2 of the joints of other arms,
     w_w |w - w_d|^2 of all joint rates, w_a |a|^2; each over 2. Desired rates w_d are those of joint targets,
-    and the least that move the tools as their targets move.
+    and the least that move the tools as their targets move beside what the momentum moves them.
     """
 
     def __init__(self, robot: RobotModel, gains: MpcGains, horizon: Horizon) -> None:
@@ -55,9 +55,10 @@ class PlanCost:
         rate_weights = gains.joint_rate_weight * times
         rate_weights[-1] = gains.terminal_rate_weight
         by_joint += beta.T @ (rate_weights[:, None] * beta)
-        slope += beta.T @ (
-            rate_weights[:, None] * (prediction.w[later] - _led_rates(prediction, errors, targets))
-        )
+        led = np.array([target.joint_velocity for target in targets])
+        if errors.by.q.any():
+            led += _led_rates(prediction, errors, self._drift(prediction))
+        slope += beta.T @ (rate_weights[:, None] * (prediction.w[later] - led))
         held = gains.joint_position_weight * times[:, None] * self._led_by_joints(targets)
         aims = np.array([target.joint_position for target in targets])
         by_joint += np.einsum("kj,kn,ki->nji", alpha, held, alpha)
@@ -70,6 +71,11 @@ class PlanCost:
         blocks[:, joints, :, joints] += by_joint
         return hessian, gradient + slope.ravel()
 
+    def _drift(self, prediction: Prediction) -> Array:
+        """Return the velocity (3,) m/s of the centre of mass in ``world``."""
+        first, second = prediction.centre_in_world[:2]
+        return np.asarray((second - first) / self._horizon.intervals[0])
+
     def _led_by_joints(self, targets: Sequence[PreviewedTargets]) -> Array:
         """Return (K, n) with 1 for the joints of arms that no tool leads, 0 for the others."""
         led = np.ones((len(targets), self._robot.n_joints))
@@ -79,13 +85,22 @@ class PlanCost:
         return led
 
 
-def _led_rates(prediction: Prediction, errors: ToolErrors, targets: Sequence[PreviewedTargets]) -> Array:
-    """Return the desired joint rates (K, n): J*^T (J* J*^T + d^2)^-1 of the targets' motion [Umetani1989]."""
-    rates = np.array([target.joint_velocity for target in targets])
-    if not errors.target_rates.any():
-        return rates
-    jacobian = errors.by.q + errors.by.phi @ prediction.omega_by.w[1:]
+def _led_rates(prediction: Prediction, errors: ToolErrors, drift: Array) -> Array:
+    """Return the rates (K, n) that keep the tools on their targets: J*^T (J* J*^T + d^2)^-1 of what is left.
+
+    ``drift`` (3,) m/s is the velocity of the centre of mass. With the joints at rest the momentum turns the
+    base at omega_0 and moves the tools by themselves, so that what is left of the motion of the targets is
+    e_d' - e_phi phi'(omega_0) - P/M [Umetani1989].
+    """
+    later = slice(1, None)
+    flows = zip(prediction.phi[later], prediction.omega[later], strict=True)
+    by_omega = errors.by.phi @ np.array([flow_derivatives(*row)[1] for row in flows])
+    turned = prediction.omega_by.w[later]
+    alone = prediction.omega[later] - (turned @ prediction.w[later, :, None])[:, :, 0]  # omega_0
+    left = errors.target_rates - (by_omega @ alone[:, :, None])[:, :, 0]
+    left.reshape(len(left), -1, ROWS)[:, :, :3] -= drift
+    left[~errors.by.q.any(axis=2)] = 0.0  # a tool without a target
+    jacobian = errors.by.q + by_omega @ turned
     transposed = jacobian.transpose(0, 2, 1)
     damped = jacobian @ transposed + _DAMPING**2 * np.eye(jacobian.shape[1])
-    found = transposed @ np.linalg.solve(damped, errors.target_rates[:, :, None])
-    return np.asarray(rates + found[:, :, 0])
+    return np.asarray((transposed @ np.linalg.solve(damped, left[:, :, None]))[:, :, 0])

@@ -1,266 +1,12 @@
-"""Law ``mpc``: predictive control of robot and base under constraints, replanned every reference period.
-
-A plan begins one reference period after the state it is made for, which is predicted along the plan in use,
-so that the result does not depend on how long a solve takes. Between solves the joints follow the plan by
-computed torque. Nothing here waits for a clock: a solve that gives no plan leaves the one before in use.
-"""
-
-from dataclasses import dataclass, replace
-from time import perf_counter
+"""Law ``mpc``: predictive control of robot and base under constraints."""
 
 import numpy as np
-import pinocchio as pin
 
-from sms_handover.control.disturbance_observer import memory_of, restore_memory
 from sms_handover.control.law import Law, LawSetup, LinearFeedback, Need
-from sms_handover.control.mpc.braking import braking_plan
-from sms_handover.control.mpc.momentum import base_start, base_velocity
+from sms_handover.control.mpc.controller import MpcController
 from sms_handover.control.mpc.parameters import MpcGains
-from sms_handover.control.mpc.plan import Plan
-from sms_handover.control.mpc.planner import Planner, PlanStart, Step
-from sms_handover.control.mpc.quadratic_program import require_daqp
-from sms_handover.control.protocol import Guidance
-from sms_handover.errors import ConfigurationError
-from sms_handover.model.known_payload import EMPTY_HANDS, Grip, KnownPayload
-from sms_handover.types import (
-    BASE_NQ,
-    BASE_NV,
-    Array,
-    GraspEvent,
-    PlanReport,
-    PlanStatus,
-    PreviewState,
-    frozen,
-    read_only,
-)
-from sms_handover.units import ns_to_seconds, seconds_to_ns
-
-
-@dataclass(frozen=True, eq=False)
-class MpcState:
-    """Everything that later efforts depend on: plans, counts, the preview, and the initial attitude (3, 3).
-
-    ``coming`` takes the place of ``plan`` when it begins; ``failures`` counts solves in a row without a plan;
-    ``news`` are grasps that count from the next state on, ``observed`` is the memory of the computed torque.
-    """
-
-    phase_index: int
-    plan: Plan | None
-    coming: Plan | None
-    solves: int
-    failures: int
-    reused: int
-    initial_rotation: Array
-    preview: PreviewState | None
-    grip: Grip
-    news: tuple[GraspEvent, ...]
-    observed: Array
-
-
-class MpcController:
-    """Plans every reference period and follows the plan; not thread-safe."""
-
-    def __init__(self, setup: LawSetup[MpcGains]) -> None:
-        """Set up the planners of all phases; raises ConfigurationError, MissingDependencyError."""
-        require_daqp()
-        if setup.preview is None or setup.distances is None:
-            raise ConfigurationError(
-                "control law 'mpc' needs a preview of targets and the distances of bodies"
-            )
-        self._gains, self._preview, self._make_efforts = setup.gains, setup.preview, setup.computed_torque
-        self._distances, self._period_ns = setup.distances, setup.reference_ns
-        self._payload = KnownPayload(setup.robot, setup.deputy)
-        self._rest = read_only(np.zeros(setup.robot.n_joints))  # N m
-        period = ns_to_seconds(setup.reference_ns)
-        for gains in setup.gains:
-            followed = (1 + gains.failed_plans) * period  # by the last plan before the arms brake
-            if gains.plan_horizon < followed:
-                raise ConfigurationError(
-                    f"plan_horizon is {gains.plan_horizon:g} s, must be >= {followed:g} s, one reference "
-                    f"period and failed_plans more of {period:g} s: so long a plan may have to be followed"
-                )
-            Planner(setup.robot, gains, None, np.eye(3))  # rejects what cannot be planned with
-        self.reset()
-
-    def reset(self) -> None:
-        """Return to the start of a run."""
-        self._preview.reset()
-        self._phase_index = 0
-        self._plan: Plan | None = None
-        self._coming: Plan | None = None
-        self._solves = self._failures = self._reused = 0
-        self._initial_rotation: Array = np.zeros((3, 3))
-        self._guidance: Guidance | None = None
-        self._news: tuple[GraspEvent, ...] = ()
-        self._hold(EMPTY_HANDS)
-        self._report: PlanReport | None = None
-
-    def guide(self, guidance: Guidance) -> None:
-        """Plan for these targets at the next state."""
-        self._guidance = guidance
-        self._phase_index = guidance.phase.index
-
-    def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
-        """Return the efforts (n,) N m for a state, read-only; zero until first guidance has come."""
-        if self._news:
-            self._heed_news(stamp_ns)
-        if self._coming and stamp_ns >= self._coming.begin_ns:
-            self._plan, self._coming = self._coming, None
-        if self._guidance is not None:
-            guidance, self._guidance = self._guidance, None
-            self._replan(stamp_ns, q, v, guidance)
-        if self._plan is None:
-            return self._rest
-        gains = self._gains[self._phase_index]
-        feedback = np.array([[gains.plan_position_gain], [gains.plan_velocity_gain]])
-        every = np.repeat(feedback, self._robot.n_joints, axis=1)
-        return frozen(self._robot.limited(self._efforts(q, v, self._plan.at(stamp_ns), every)))
-
-    def grasped(self, event: GraspEvent) -> None:
-        """Learn what came of a grasp command; it counts from the next state on."""
-        self._news = (*self._news, event)
-
-    def take_status(self) -> PlanReport | None:
-        """Return the report of the solve since the last call, None if there was none."""
-        report, self._report = self._report, None
-        return report
-
-    @property
-    def plan(self) -> Plan | None:
-        """The plan in use."""
-        return self._plan
-
-    @property
-    def state(self) -> MpcState:
-        """Everything that later efforts depend on."""
-        return MpcState(
-            self._phase_index,
-            self._plan,
-            self._coming,
-            self._solves,
-            self._failures,
-            self._reused,
-            read_only(self._initial_rotation),
-            self._preview.state,
-            self._payload.grip,
-            self._news,
-            memory_of(self._efforts),
-        )
-
-    def restore(self, state: MpcState) -> None:
-        """Go back to a former :attr:`state`."""
-        self.reset()
-        self._phase_index, self._plan, self._coming = state.phase_index, state.plan, state.coming
-        self._solves, self._failures, self._reused = state.solves, state.failures, state.reused
-        self._initial_rotation = state.initial_rotation
-        self._preview.restore(state.preview)
-        self._news = state.news
-        self._hold(state.grip)
-        restore_memory(self._efforts, state.observed)
-
-    def _heed_news(self, stamp_ns: int) -> None:
-        """Take up the payload of the events before a state."""
-        news = [event for event in self._news if event.stamp_ns < stamp_ns]
-        self._news = self._news[len(news) :]
-        for event in news:
-            self._preview.grasped(event)
-        if any([self._payload.grasped(event) for event in news]):
-            self._hold(self._payload.grip)
-
-    def _hold(self, grip: Grip) -> None:
-        """Go on with the dynamics of the robot with what an arm holds."""
-        self._payload.hold(grip)
-        self._robot = self._payload.robot
-        self._efforts = self._make_efforts(self._robot)
-        self._planners: dict[MpcGains, Planner] = {}
-
-    def _replan(self, stamp_ns: int, q: Array, v: Array, guidance: Guidance) -> None:
-        """Make the plan of the next reference period."""
-        begun = perf_counter()
-        if self._plan is None:
-            self._initial_rotation = np.array(pin.Quaternion(q[3:BASE_NQ]).normalized().matrix())
-        planner = self._planner
-        self._preview.update(guidance.phase, guidance.reference, guidance.tool_in_world, q)
-        if self._plan is None:
-            here = PlanStart(q[BASE_NQ:], v[BASE_NV:], base_start(self._robot, q, v))
-            self._plan = braking_plan(planner, here, self._limit(planner.gains), 0, stamp_ns)
-        begin_ns = stamp_ns + self._period_ns
-        start = self._start(stamp_ns, q, v, begin_ns)
-        accelerations = self._plan.resampled(planner.horizon, begin_ns)
-        stamps = [begin_ns + seconds_to_ns(time) for time in planner.horizon.times[1:].tolist()]
-        step = planner.step(start, accelerations, self._preview.ahead(stamps))
-        self._solves += 1
-        status = self._use(step, planner, start, accelerations, begin_ns)
-        self._report = self._reported(stamp_ns, status, step, perf_counter() - begun)
-
-    def _use(
-        self, step: Step, planner: Planner, start: PlanStart, accelerations: Array, begin_ns: int
-    ) -> PlanStatus:
-        """Take over what a step gave: a plan, the one before, or one that brakes."""
-        status, plan = step.solution.status, self._plan
-        assert plan is not None
-        if status is PlanStatus.SOLVED:
-            self._failures = 0
-            changed = accelerations + step.solution.change.reshape(accelerations.shape)
-            intervals = planner.horizon.intervals
-            self._coming = Plan(self._solves, begin_ns, start.q, start.w, changed, intervals)
-            return status
-        self._failures += 1
-        self._reused += 1
-        if self._failures < planner.gains.failed_plans:
-            return status
-        if self._failures == planner.gains.failed_plans:
-            self._coming = braking_plan(planner, start, self._limit(planner.gains), self._solves, begin_ns)
-        return PlanStatus.BRAKING
-
-    def _start(self, stamp_ns: int, q: Array, v: Array, begin_ns: int) -> PlanStart:
-        """Return where the next plan begins: the state of now, moved along the plan in use.
-
-        What the joints are off from that plan they still are then; the base turns by the mean of its angular
-        velocities now and then.
-        """
-        assert self._plan is not None
-        now, later = self._plan.at(stamp_ns), self._plan.at(begin_ns)
-        base, period = base_start(self._robot, q, v), ns_to_seconds(begin_ns - stamp_ns)
-        joints, rates = q[BASE_NQ:] + (later[0] - now[0]), v[BASE_NV:] + (later[1] - now[1])
-        turned = base.rotation @ pin.exp3(period * v[3:BASE_NV])
-        then = base_velocity(self._robot, replace(base, rotation=turned), joints, rates)
-        rotation = base.rotation @ pin.exp3(0.5 * period * (v[3:BASE_NV] + then))
-        centre = base.centre_of_mass + period / self._robot.mass * base.linear_momentum
-        return PlanStart(joints, rates, replace(base, rotation=rotation, centre_of_mass=centre))
-
-    def _reported(self, stamp_ns: int, status: PlanStatus, step: Step, total: float) -> PlanReport:
-        """Return the report of a solve."""
-        solution, plan = step.solution, self._plan
-        assert plan is not None
-        return PlanReport(
-            stamp_ns,
-            self._solves,
-            status,
-            solution.iterations,
-            solution.active,
-            solution.largest_slack,
-            solution.largest_slack_row,
-            solution.kkt_residual,
-            step.linearization_time,
-            step.program_time,
-            total,
-            ns_to_seconds(stamp_ns - plan.begin_ns),
-            0,
-            self._reused,
-        )
-
-    def _limit(self, gains: MpcGains) -> Array:
-        """Return the efforts (n,) N m that a plan may use."""
-        return np.asarray(gains.effort_share * self._robot.effort_limit)
-
-    @property
-    def _planner(self) -> Planner:
-        """The planner under the parameters of the phase."""
-        gains = self._gains[self._phase_index]
-        if gains not in self._planners:
-            self._planners[gains] = Planner(self._robot, gains, self._distances, self._initial_rotation)
-        return self._planners[gains]
+from sms_handover.control.mpc.real_time import MpcInRealTime
+from sms_handover.types import Array
 
 
 def linearised(gains: MpcGains, inertia: Array) -> LinearFeedback:
@@ -269,11 +15,16 @@ def linearised(gains: MpcGains, inertia: Array) -> LinearFeedback:
     return LinearFeedback(gains.plan_position_gain * inertia, gains.plan_velocity_gain * inertia, none)
 
 
+def _controller(setup: LawSetup[MpcGains]) -> MpcController:
+    """Return the controller of a setup; raises what it does."""
+    return MpcController(setup) if setup.start_solver is None else MpcInRealTime(setup)
+
+
 MPC = Law(
     "mpc",
     "predictive control that keeps limits of efforts, rates, attitude and distances",
     MpcGains,
-    MpcController,
+    _controller,
     linearised,
     frozenset({Need.TOOL_TARGETS, Need.PREVIEW, Need.PAYLOAD, Need.CLEARANCE}),
 )

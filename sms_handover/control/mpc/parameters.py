@@ -80,7 +80,8 @@ class MpcGains:
         maximum=100_000,
     )
     failed_plans: int = parameter(
-        "mpc: solves in a row without a plan after which the arms brake to rest and planning begins anew",
+        "mpc: solves in a row without a plan, in real time reference periods, after which the arms brake to "
+        "rest and planning begins anew",
         minimum=1,
         maximum=10_000,
     )

@@ -9,11 +9,12 @@ import numpy as np
 
 from sms_handover.control.mpc.constraints import Constraint
 from sms_handover.control.mpc.products import times_vector
-from sms_handover.errors import MissingDependencyError
-from sms_handover.types import Array, PlanStatus
+from sms_handover.errors import ControllerError, MissingDependencyError
+from sms_handover.plan_report import PlanStatus
+from sms_handover.types import Array
 
 _HARD, _SOFT = 0, 8  # of DAQP
-_INFEASIBLE = -1  # of DAQP; others below 0 are ends without an answer, such as -4 after all iterations
+_INFEASIBLE, _ENDLESS = -1, (-2, -4)  # flags of DAQP; the latter where it cycles, and after all iterations
 _SOFTNESS = 1e-8  # [-] slack of a scaled row per multiplier: rows are exceeded by about a thousandth
 _BINDS = 1e-9  # [-] multiplier from which a row binds
 _EXCEEDED = 1e-9  # [-] of the scale of a row, from which it is exceeded
@@ -47,7 +48,8 @@ def solve(
 ) -> Solution:
     """Return the minimum of x^T P x / 2 + g^T x under the constraints, with slack where a row is soft.
 
-    Without a solution that keeps the hard rows the one is named that would have to be exceeded most.
+    Without a solution that keeps the hard rows the one is named that would have to be exceeded most. Raises
+    ControllerError on a program that is not convex or not finite, which no state of a robot makes.
     """
     matrix = np.vstack([item.matrix for item in constraints])
     high = np.concatenate([item.high - item.value for item in constraints])
@@ -56,15 +58,20 @@ def solve(
     change, multipliers, flag, iterations = _daqp(
         hessian, gradient, matrix, high, low, np.concatenate(kinds), most_iterations
     )
-    if flag > 0:
+    if flag > 0 and np.isfinite(change).all():
         active = _active(constraints, multipliers)
         slack, row = _worst(constraints, change, soft=True)
         residual = times_vector(hessian, change) + gradient + times_vector(matrix.T, multipliers)
         scaled = float(np.abs(residual).max() / max(1.0, float(np.abs(gradient).max())))
         return Solution(PlanStatus.SOLVED, change, iterations, active, slack, row, scaled)
     nothing = np.zeros(0)
-    if flag != _INFEASIBLE:
+    if flag in _ENDLESS:
         return Solution(PlanStatus.ITERATION_LIMIT, nothing, iterations, (), 0.0, "", float("nan"))
+    if flag != _INFEASIBLE:
+        raise ControllerError(
+            f"control law 'mpc': DAQP ended with flag {flag} and {np.isnan(hessian).sum()} numbers of the "
+            "Hessian are not finite, expected a convex and finite program: the state or a weight is wrong"
+        )
     softened = np.full(len(high), _SOFT, dtype=np.int32)
     change, _, flag, _ = _daqp(hessian, gradient, matrix, high, low, softened, most_iterations)
     slack, row = _worst(constraints, change, soft=False) if flag > 0 else (float("nan"), "")

@@ -1,6 +1,6 @@
 """Tool errors over a horizon: how far the tools are from their targets, with derivatives."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +32,16 @@ class ToolErrorModel:
 
     def __init__(self, robot: RobotModel) -> None:
         self._robot, self._data = robot, robot.pin.createData()
+
+    def paths(self, placed: Sequence[Placement]) -> Mapping[str, Array]:
+        """Return the positions (K, 3) m of the tools in ``world`` at some placements, by arm."""
+        robot, model, data = self._robot, self._robot.pin, self._data
+        found = {arm: np.zeros((len(placed), 3)) for arm in robot.arms}
+        for k, place in enumerate(placed):
+            pin.forwardKinematics(model, data, place.q)
+            for arm, path in found.items():
+                path[k] = pin.updateFramePlacement(model, data, robot.tool_frame_id[arm]).translation
+        return found
 
     def at(self, placed: Sequence[Placement], targets: Sequence[PreviewedTargets]) -> ToolErrors:
         """Return the errors at some placements; an arm without a target has zeros."""

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from sms_handover.conditions.conditions import Conditions
 from sms_handover.frames import BASE, DEPUTY, WORLD
 from sms_handover.graph.topics import (
     ANGULAR_IMPULSE,
@@ -25,7 +26,9 @@ from sms_handover.graph.topics import (
 from sms_handover.messages.layout import head
 from sms_handover.model.poses import pose_row, twist_in_deputy
 from sms_handover.model.robot_model import RobotModel
+from sms_handover.nodes.parts.measured_outputs import MeasuredOutputs
 from sms_handover.plant.free_floating import FreeFloatingPlant
+from sms_handover.plant.sensed_plant import SensedPlant
 from sms_handover.ros.codecs.loop_messages import (
     OdometryCodec,
     PoseCodec,
@@ -34,6 +37,7 @@ from sms_handover.ros.codecs.loop_messages import (
     vector_codec,
 )
 from sms_handover.ros.node.endpoints import CountedPublisher
+from sms_handover.simulation.parameters import LOCKSTEP, CommonParameters
 
 _LOOP = (JOINT_STATES, BASE_ODOMETRY, SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
 _PERIOD = (DEPUTY_ODOMETRY, LINEAR_MOMENTUM, ANGULAR_MOMENTUM, ENERGY)
@@ -47,19 +51,20 @@ class PlantOutputs:
         self,
         robot: RobotModel,
         publisher: Callable[[str], CountedPublisher],
-        *,
-        lockstep: bool,
-        wrenches: bool = False,
+        common: CommonParameters,
+        conditions: Conditions,
     ) -> None:
-        """Make the publishers; ``publisher`` returns the one of a topic, ``wrenches`` act from outside."""
-        self._lockstep = lockstep
+        """Make the publishers; ``publisher`` returns the one of a topic."""
+        self._lockstep, self._by_measurement = common.mode == LOCKSTEP, common.uses_measurements
         names = (
             *_LOOP,
             *_PERIOD,
-            *(_IMPULSE if wrenches else ()),
+            *(_IMPULSE if conditions.wrenches else ()),
             CLOCK,
             *(tool_pose(arm) for arm in robot.arms),
         )
+        sensors = conditions.sensors
+        self._measured = MeasuredOutputs(robot, publisher, sensors) if sensors else None
         self._publish: dict[str, Callable[[Any], None]] = {name: publisher(name).publish for name in names}
         self._state_codec = StateCodec(robot.joint_names, WORLD, BASE)
         self._pose_codec, self._vector_codec = PoseCodec(WORLD), vector_codec(WORLD)
@@ -72,6 +77,19 @@ class PlantOutputs:
         At a reference period in lock step what the trajectory waits for goes first, because more has to be
         done with it. In real time the controller is the one who must not wait.
         """
+        if self._by_measurement:
+            self._publish_measured(plant, with_reference=with_reference)
+        self._publish_truth(plant, with_reference=with_reference)
+        if not self._by_measurement:
+            self._publish_measured(plant, with_reference=with_reference)
+
+    def _publish_measured(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
+        """Publish what sensors tell, if there are any."""
+        if self._measured and isinstance(plant, SensedPlant):
+            self._measured.publish_loop(plant, with_reference=with_reference)
+
+    def _publish_truth(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
+        """Publish the state as it is."""
         publish = self._publish
         joints, odometry = self._state_codec.pack_arrays(plant.stamp_ns, plant.q, plant.v, plant.joint_effort)
         if with_reference and self._lockstep:
@@ -91,6 +109,8 @@ class PlantOutputs:
     def publish_rest(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
         """Publish what nobody in the loop waits for: tools, momenta, energy, the clock."""
         now_ns, publish = plant.stamp_ns, self._publish
+        if self._measured and isinstance(plant, SensedPlant):
+            self._measured.publish_readings(plant)
         if with_reference:
             conserved = plant.conserved
             for arm, pose in plant.tools_in_world.items():

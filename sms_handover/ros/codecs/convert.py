@@ -25,7 +25,8 @@ from sms_handover.errors import MessageError, Reason
 from sms_handover.frames import WORLD
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.message_constants import CONSTANTS
-from sms_handover.types import Array, GraspCommand, GraspEvent, IkResult, PlanReport, Pose, TaskPhase, frozen
+from sms_handover.plan_report import PlanReport
+from sms_handover.types import Array, GraspCommand, GraspEvent, IkResult, Pose, TaskPhase, frozen
 from sms_handover.units import NS_PER_S
 
 

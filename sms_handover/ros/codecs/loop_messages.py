@@ -153,7 +153,7 @@ class PoseCodec(StampedCodec):
 
     def __init__(self, frame: str) -> None:
         super().__init__(
-            "geometry_msgs/msg/PoseStamped", frame, BASE_NQ, lambda types, n: {"pose": _pose(types, n)}
+            "geometry_msgs/msg/PoseStamped", frame, BASE_NQ, lambda types, n: {"pose": pose_message(types, n)}
         )
         self._frame = frame
 
@@ -179,7 +179,7 @@ class PoseCodec(StampedCodec):
 def vector_codec(frame: str) -> StampedCodec:
     """Return what packs Vector3Stamped."""
     name = "geometry_msgs/msg/Vector3Stamped"
-    return StampedCodec(name, frame, 3, lambda types, n: {"vector": _geometry(types, "Vector3", n)})
+    return StampedCodec(name, frame, 3, lambda types, n: {"vector": geometry(types, "Vector3", n)})
 
 
 def energy_codec(frame: str) -> StampedCodec:
@@ -266,9 +266,9 @@ def _joint_state(names: tuple[str, ...], filled: Collection[str]) -> bytes:
 def _odometry(frame: str, child_frame: str) -> bytes:
     """Return the bytes of an Odometry of zeros."""
     types = MessageTypes()
-    vector, covariance = _geometry(types, "Vector3", np.zeros(3)), np.zeros(_COVARIANCE)
+    vector, covariance = geometry(types, "Vector3", np.zeros(3)), np.zeros(_COVARIANCE)
     twist = types.make("geometry_msgs/msg/Twist", linear=vector, angular=vector)
-    pose = _pose(types, np.zeros(BASE_NQ))
+    pose = pose_message(types, np.zeros(BASE_NQ))
     message = types.make(
         "nav_msgs/msg/Odometry",
         header=_header(types, frame),
@@ -279,15 +279,15 @@ def _odometry(frame: str, child_frame: str) -> bytes:
     return types.serialize(message)
 
 
-def _pose(types: MessageTypes, numbers: Array) -> Any:
+def pose_message(types: MessageTypes, numbers: Array) -> Any:
     """Return a Pose message from position and quaternion."""
-    position = _geometry(types, "Point", numbers[:3])
+    position = geometry(types, "Point", numbers[:3])
     return types.make(
-        "geometry_msgs/msg/Pose", position=position, orientation=_geometry(types, "Quaternion", numbers[3:7])
+        "geometry_msgs/msg/Pose", position=position, orientation=geometry(types, "Quaternion", numbers[3:7])
     )
 
 
-def _geometry(types: MessageTypes, name: str, numbers: Array) -> Any:
+def geometry(types: MessageTypes, name: str, numbers: Array) -> Any:
     """Return a Point, Vector3 or Quaternion message from its components."""
     return types.make(f"geometry_msgs/msg/{name}", **dict(zip("xyzw", numbers.tolist(), strict=False)))
 

@@ -12,7 +12,15 @@ from sms_handover.configuration.scenario_file import COMMON
 from sms_handover.configuration.values import MODEL, TRUTH
 from sms_handover.errors import ConfigurationError, MessageError, Reason
 from sms_handover.graph.events import MESSAGE_REFUSED, RunEvent, Severity
-from sms_handover.graph.topics import DIAGNOSTICS, LOOP_NODES, PLANT, RECORDER, RUN_EVENTS, graph_topics
+from sms_handover.graph.topics import (
+    DIAGNOSTICS,
+    LOOP_NODES,
+    PLANT,
+    RECORDER,
+    RUN_EVENTS,
+    graph_topics,
+    sensor_topic,
+)
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.ros.node.diagnostics import NodeReport, diagnostics_message
 from sms_handover.ros.node.endpoints import Endpoints
@@ -122,8 +130,13 @@ class GraphNode(LifecycleNode, Generic[P]):
         self.robot: RobotModel = world.robot
         self.schedule: Schedule = world.schedule
         self.conditions: Conditions = world.conditions
-        clearance, wrenches = self.common.measures_clearance, bool(world.conditions.wrenches)
-        topics = graph_topics(self.robot.arms, clearance=clearance, wrenches=wrenches)
+        topics = graph_topics(
+            self.robot.arms,
+            clearance=self.common.measures_clearance,
+            wrenches=bool(world.conditions.wrenches),
+            sensors=[sensor_topic(name) for name in world.conditions.sensors],
+            measured=self.common.uses_measurements,
+        )
         self.endpoints = Endpoints(self, topics, self.common.peers, self.common.external)
         self.message_filter = MessageFilter(self.get_logger().warning, self._on_first_rejected)
         self.inputs.connect(self.endpoints, self.message_filter)

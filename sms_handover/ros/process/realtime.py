@@ -12,6 +12,7 @@ _PR_SET_TIMERSLACK = 29  # of prctl(2)
 _SLACK_NS = 1  # [ns] by which the kernel may delay a wake-up; its default of 50 us is seen in every period
 _MCL_CURRENT, _MCL_FUTURE = 1, 2  # of mlockall(2)
 _ANY_CPU = -1
+_AUTOGROUP = Path("/proc/self/autogroup")
 
 
 def settle(common: CommonParameters) -> None:
@@ -36,10 +37,17 @@ def exact_timers() -> None:
 
 
 def stand_back(niceness: int) -> None:
-    """Let others of the same priority go first, as nice(1) does: for all threads, as each has a niceness."""
+    """Let others of the same priority go first, as nice(1) does: for all threads, as each has a niceness.
+
+    Where Linux weighs sessions against each other (autogroup, sched(7)) a niceness counts within
+    its session only; so a process that is a session of its own says it for that too.
+    """
     for thread in _threads() if niceness else ():
         with suppress(OSError):  # it has ended
             os.setpriority(os.PRIO_PROCESS, thread, os.getpriority(os.PRIO_PROCESS, thread) + niceness)
+    if niceness and os.getsid(0) == os.getpid():
+        with suppress(OSError):  # there are no autogroups, or somebody has set one within the last 0.1 s
+            _AUTOGROUP.write_text(str(niceness))
 
 
 def _stay_on(cpu: int) -> None:

@@ -20,6 +20,7 @@ from sms_handover.graph.topics import (
     PLANT,
     PLAYER,
     RECORDER,
+    SENSOR_TYPES,
     TOPIC_RECORDER,
     TRAJECTORY,
     VIEWER,
@@ -123,7 +124,7 @@ def subscribers_of(topic: Topic) -> tuple[str, ...]:
 
 def topics_of(node: str) -> tuple[tuple[Topic, ...], tuple[Topic, ...]]:
     """Return the topics of the graph that a node publishes, and those that it subscribes to."""
-    table = graph_topics([ANY_ARM], clearance=True, wrenches=True)
+    table = graph_topics([ANY_ARM], clearance=True, wrenches=True, sensors=SENSOR_TYPES)
     published = tuple(topic for topic in table if node in publishers_of(topic))
     return published, tuple(topic for topic in table if node in subscribers_of(topic))
 

@@ -9,6 +9,8 @@ const GHOST_OPACITY = 0.3;
 const EDGE_ANGLE = 30; // degrees, smallest angle between two faces whose common edge is drawn
 const AXIS_LENGTH = 0.16; // m
 const TRACE_WIDTH = 2.5; // px
+const PLANNED_WIDTH = 4; // px
+const PLANNED_SHOWN = 0.5; // s for which a plan is shown where no other takes its place
 const MOMENTUM_LENGTH = 0.6; // m, of the arrow of the largest angular momentum of a run
 
 /** Decode base64 of little-endian floats. */
@@ -247,6 +249,42 @@ class Momentum {
   get text() { return this.known ? `${this.size.toPrecision(3)} kg m\u00b2/s` : "\u2013"; }
 }
 
+/** Where the plans of a predictive law lead the tools: a line per arm, from the latest plan not after the time. */
+class Planned {
+  constructor(data, arms, group) {
+    this.times = numbers(data.times, Float64Array); // s, of the plans
+    this.points = numbers(data.points, Float32Array); // m, x y z per plan, arm and instant of its horizon
+    this.width = 3 * data.size; // numbers of a line
+    this.lines = arms.map(() => {
+      const above = { depthTest: false, transparent: true }; // seen through the arms and the deputy
+      const dashes = { dashed: true, dashSize: 0.02, gapSize: 0.012 }; // m
+      const line = new THREE.Line2(new THREE.LineGeometry(), new THREE.LineMaterial({ linewidth: PLANNED_WIDTH, ...dashes, ...above }));
+      line.frustumCulled = false;
+      line.renderOrder = 1;
+      group.add(line);
+      return line;
+    });
+  }
+
+  /** Show the plan at time t; none after the last one has ended. */
+  place(t) {
+    let index = -1;
+    while (index + 1 < this.times.length && this.times[index + 1] <= t + 1e-9) index += 1;
+    this.lines.forEach((line, arm) => {
+      const begin = (index * this.lines.length + arm) * this.width;
+      const points = index < 0 || t > this.times[index] + PLANNED_SHOWN ? [] : this.points.subarray(begin, begin + this.width);
+      line.visible = points.length > 0 && !Number.isNaN(points[0]);
+      if (!line.visible) return;
+      line.geometry.dispose();
+      line.geometry = new THREE.LineGeometry();
+      line.geometry.setPositions(points);
+      line.computeLineDistances(); // of the dashes
+    });
+  }
+
+  paint(colours) { this.lines.forEach((line, arm) => line.material.color.set(colours.arms[arm % 4])); }
+}
+
 /** Everything drawn of one run, as a group that moves with time. */
 class RunBody {
   constructor(data) {
@@ -259,7 +297,8 @@ class RunBody {
     this.startGroup = new THREE.Group();
     this.nearestGroup = new THREE.Group();
     this.momentumGroup = new THREE.Group();
-    this.group.add(this.traceGroup, this.targetGroup, this.startGroup, this.nearestGroup, this.momentumGroup);
+    this.plannedGroup = new THREE.Group();
+    this.group.add(this.traceGroup, this.targetGroup, this.startGroup, this.nearestGroup, this.momentumGroup, this.plannedGroup);
     this.painted = []; // { material, role, arm } to recolour when the theme changes
     this.bodies = this.motion.bodies.map(() => new THREE.Group());
     this.bodies.forEach((body) => this.group.add(body));
@@ -269,6 +308,7 @@ class RunBody {
     this.basePath = new Trace(this.motion, 0, this.traceGroup);
     this.nearest = data.clearance ? new Nearest(data.clearance, this.motion, this.nearestGroup) : null;
     this.momentum = data.momentum ? new Momentum(data.momentum, this.motion, this.momentumGroup) : null;
+    this.planned = data.planned ? new Planned(data.planned, data.arms, this.plannedGroup) : null;
     this.drawStart();
   }
 
@@ -317,6 +357,10 @@ class RunBody {
   addDeputy(size) {
     const mesh = this.solid(new THREE.BoxGeometry(...size), { role: "deputy", arm: -1 });
     this.bodies[this.body("deputy")].add(mesh);
+    const measured = this.bodies[this.body("deputy/measured")];
+    if (!measured) return; // a run without sensors
+    measured.add(this.solid(new THREE.BoxGeometry(...size), { role: "measured", arm: -1 }));
+    this.targetGroup.add(measured);
   }
 
   addArm(arm, index) {
@@ -346,11 +390,12 @@ class RunBody {
     this.startLines = outline;
   }
 
-  /** Apply the colours of a theme; a ghost is translucent and casts no shadow. */
-  paint(theme, ghost) {
+  /** Apply the colours of a theme; a ghost, as what is only measured, is translucent and casts no shadow. */
+  paint(theme, isGhost) {
     const colours = COLOURS[theme];
     this.painted.forEach(({ role, arm, own, material, lines, mesh }) => {
-      const colour = { arm: colours.arms[arm % 4], target: colours.arms[arm % 4], deputy: colours.deputy }[role];
+      const ghost = isGhost || role === "measured";
+      const colour = { arm: colours.arms[arm % 4], target: colours.arms[arm % 4], deputy: colours.deputy, measured: colours.deputy }[role];
       material.color.set(role === "own" ? own : colour);
       material.emissive.set(role === "deputy" ? colour : 0x000000);
       material.emissiveIntensity = 0.25;
@@ -367,11 +412,12 @@ class RunBody {
     this.traces.forEach((trace, arm) => trace.colour(colours.arms[arm % 4]));
     this.basePath.colour(colours.start);
     this.startLines.color.set(colours.start);
-    this.startGroup.visible = !ghost;
+    this.startGroup.visible = !isGhost;
     this.nearest?.paint(colours);
     this.momentum?.paint(colours.momentum);
+    this.planned?.paint(colours);
     [...this.traces, this.basePath].forEach((trace) => {
-      trace.past.material.linewidth = ghost ? TRACE_WIDTH * 0.6 : TRACE_WIDTH;
+      trace.past.material.linewidth = isGhost ? TRACE_WIDTH * 0.6 : TRACE_WIDTH;
     });
   }
 
@@ -392,6 +438,7 @@ class RunBody {
     [...this.traces, this.basePath].forEach((trace) => trace.show(index));
     this.nearest?.place(t);
     this.momentum?.place(t);
+    this.planned?.place(t);
   }
 
   /** The current position of a body, in m. */

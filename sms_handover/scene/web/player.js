@@ -57,7 +57,8 @@ class Player {
     element("runs").addEventListener("change", (event) => this.arrange(Number(event.target.value)));
     element("nearest").parentElement.hidden = !this.runs.some((run) => run.nearest);
     element("momentum").parentElement.hidden = !this.runs.some((run) => run.momentum);
-    ["traces", "targets", "nearest", "momentum"].forEach((id) => element(id).addEventListener("change", () => this.showParts()));
+    element("planned").parentElement.hidden = !this.runs.some((run) => run.planned);
+    ["traces", "targets", "nearest", "momentum", "planned"].forEach((id) => element(id).addEventListener("change", () => this.showParts()));
     document.addEventListener("keydown", (event) => {
       if (event.key === " " && !["BUTTON", "SELECT"].includes(event.target.tagName)) { event.preventDefault(); this.toggle(); }
     });
@@ -103,6 +104,7 @@ class Player {
       run.targetGroup.visible = element("targets").checked;
       run.nearestGroup.visible = element("nearest").checked;
       run.momentumGroup.visible = element("momentum").checked;
+      run.plannedGroup.visible = element("planned").checked;
     });
     this.picture.ask();
   }

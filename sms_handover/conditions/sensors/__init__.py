@@ -1,0 +1,1 @@
+"""Sensors: what is known of robot and deputy where the truth is not."""
