@@ -94,11 +94,11 @@ class PlantOutputs:
     def _publish_truth(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
         """Publish the state as it is."""
         publish = self._publish
-        state, panels = (plant.q, plant.v, plant.joint_effort), plant.panels
+        q, v, effort, panels = plant.q, plant.v, plant.joint_effort, plant.panels
         if panels:
-            beside = (panels.angle, panels.rate, panels.torque)
-            state = tuple(np.concatenate(pair) for pair in zip(state, beside, strict=True))
-        joints, odometry = self._state_codec.pack_arrays(plant.stamp_ns, *state)
+            q, v = np.concatenate([q, panels.angle]), np.concatenate([v, panels.rate])
+            effort = np.concatenate([effort, panels.torque])
+        joints, odometry = self._state_codec.pack_arrays(plant.stamp_ns, q, v, effort)
         if with_reference and self._lockstep:
             self._publish_sample(plant, joints, odometry)
         publish[JOINT_STATES](joints)
