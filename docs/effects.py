@@ -138,8 +138,9 @@ def section(found: Mapping[str, Mapping[str, Effect]]) -> str:
 This section is written by `make effects`. The smooth handover with rotors of {ROTOR:g} kg m^2, a tick of
 {TICK * MS_PER_S:g} ms, seed {_SEED}, and one effect alone. Distances are those of tool and grasp frame at the
 grasp and at the transfer, the angle is the larger one of both, the base its largest turn. Tolerances are
-opened, so that each effect is followed to the end, and sensors are what the loop goes by; **bold** is where a
-grasp would have missed (10 mm, 2 degrees). Sorted by the larger distance under the better law.
+opened, so that each effect is followed to the end, and the loop goes by sensors where there are any;
+**bold** is where a grasp would have missed (10 mm, 2 degrees). Sorted by the larger distance under the
+better law.
 
 ![The effects, ranked](images/effects.svg)
 

@@ -14,6 +14,7 @@ from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepp
 from sms_handover.compiled.effects import CompiledResistedStepper
 from sms_handover.compiled.inverse_kinematics import CompiledIk
 from sms_handover.compiled.kinematics import CompiledKinematics
+from sms_handover.compiled.linearisation import CompiledDerivatives
 from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.compiled.tool_motion import CompiledToolMotion
 from sms_handover.compiled.wrench_table import WrenchTable
@@ -195,6 +196,7 @@ def make_controller(
         reference_ns=common.reference_ns,
         preview=preview,
         distances=distances,
+        compiled_derivatives=CompiledDerivatives,
         start_solver=SolverProcess if in_real_time else None,
     )
     controller = law.make(setup)

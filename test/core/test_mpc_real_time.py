@@ -36,7 +36,7 @@ class Delayed:
     """Solves in this process, and answers when it has been asked as often as ``delay`` says of a plan."""
 
     def __init__(self, delay: Callable[[int], int], setup: Any) -> None:
-        self._solver = PlanSolver(setup.robot, setup.deputy, setup.gains, setup.distances)
+        self._solver = PlanSolver(setup.robot, setup.deputy, setup.gains, setup.distances, None)
         self._delay = delay
         self.trouble = ""
         self.problems = list[PlanProblem]()
@@ -193,7 +193,7 @@ def test_the_process_of_the_solver_gives_the_same_bits_and_tells_its_end(
     try:
         loop.advance()
         (answer,) = _answers(process, 1)
-        here = PlanSolver(setup.robot, setup.deputy, setup.gains, setup.distances)
+        here = PlanSolver(setup.robot, setup.deputy, setup.gains, setup.distances, None)
         delayed = in_real_time(lambda number: 1000)
         delayed.advance()
         (problem,) = delayed.controller._remote.problems  # type: ignore[attr-defined]

@@ -999,6 +999,20 @@ BREAKS: tuple[Break, ...] = (
         "campaign_runs",
     ),
     _core(
+        "a campaign that stopped early taken for unfinished",
+        "campaign/statistics/stop_rule",
+        "if all(half <= rule.half_width for half in halves):",
+        "if False:",
+        "campaign_runs",
+    ),
+    _core(
+        "the scratch folder of a killed case left behind",
+        "campaign/cases/case_process",
+        "shutil.rmtree(self._scratch, ignore_errors=True)",
+        "pass",
+        "campaign_cases",
+    ),
+    _core(
         "what is not defined taken for false, and its contrary for true",
         "campaign/definition/success_expression",
         "return value == value and not value",
@@ -1254,6 +1268,13 @@ BREAKS: tuple[Break, ...] = (
         "mpc",
     ),
     _core(
+        "a preview that begins where tools were before joints led them",
+        "trajectory/preview",
+        "tools = {**self._robot.tools_at(np.concatenate([self._base, leg.ends])), **leg.goals}",
+        "tools = {**leg.tools, **leg.goals}",
+        "balancer",
+    ),
+    _core(
         "a plan made for the state of now",
         "control/mpc/controller",
         "now, later = plan.at(stamp_ns), plan.at(begin_ns)",
@@ -1321,6 +1342,13 @@ BREAKS: tuple[Break, ...] = (
         "trajectory/preview",
         "later = tool * pin.exp6(ahead * along)",
         "later = tool * pin.exp6(0.0 * ahead * along)",
+        "mpc",
+    ),
+    _core(
+        "a law that never gives up",
+        "control/mpc/patience",
+        "brakings = self._state.brakings + 1",
+        "brakings = self._state.brakings",
         "mpc",
     ),
     # what compensates for what a model does not know
