@@ -20,6 +20,7 @@ from sms_handover.control.protocol import Guidance
 from sms_handover.model.known_payload import Grip, KnownPayload
 from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.model.reduced import base_twist_per_joint_rate
+from sms_handover.plan_report import PlanStatus
 from sms_handover.run_data import RunData
 from sms_handover.simulation.near_pairs import NearPairs
 from sms_handover.simulation.scenario import Scenario, load_scenario
@@ -37,7 +38,6 @@ from sms_handover.types import (
     GraspStatus,
     JointReference,
     PhaseState,
-    PlanStatus,
     PreviewedTargets,
     TaskPhase,
     Twist,
