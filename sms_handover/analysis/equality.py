@@ -77,7 +77,7 @@ def before(run: RunData, end_ns: int) -> RunData:
             values[item.name] = value[ticks if item.name in _PER_TICK else periods]
         elif isinstance(value, Mapping):
             values[item.name] = {arm: rows[periods] for arm, rows in value.items()}
-        elif item.name in ("joint_names", "arms"):
+        elif item.name in ("joint_names", "arms", "panel_names"):
             values[item.name] = value
         elif isinstance(value, MeasuredRows):
             cut = {name: ticks if name in _PER_TICK else periods for name in _MEASURED_ROWS}

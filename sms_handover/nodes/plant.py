@@ -23,6 +23,7 @@ from sms_handover.graph.topics import (
     RUN_STATE,
     TASK_PHASE,
 )
+from sms_handover.nodes.parts.base_wrench_input import BaseWrenchInput
 from sms_handover.nodes.parts.plant_clearance import PlantClearance
 from sms_handover.nodes.parts.plant_description import PlantDescription
 from sms_handover.nodes.parts.plant_outputs import PlantOutputs
@@ -164,6 +165,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self._publish = {name: self.endpoints.publisher(name) for name in names}
         publisher = self.endpoints.publisher
         self._outputs = PlantOutputs(self.robot, publisher, self.common, self.conditions)
+        BaseWrenchInput(self._plant, self.inputs, lambda: self._last_tick * self._tick_ns)
         for topic, codec in ((TASK_PHASE, self._phase_codec), (JOINT_COMMAND, self._command_codec)):
             self.inputs.subscribe(topic, partial(self._on_input, topic), codec.checked)
         self.inputs.subscribe(RUN_RECORDED, self._on_recorded, stamped)
@@ -342,6 +344,7 @@ class PlantNode(GraphNode[PlantParameters]):
             self.membership.end()
         self.membership.finished = False
         self._control.reset_run()
+        self._plant.base_wrenches.clear()
         self._plant.reset()
         self._clearance.reset()
         self._inputs.reset_run()

@@ -1,8 +1,11 @@
 """Effects of conditions that are not ideal on the plant: one object that it asks in every tick."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from sms_handover.conditions.conditions import Conditions
+import numpy as np
+
+from sms_handover.conditions.conditions import IDEAL, Conditions
+from sms_handover.conditions.fingerprint import fingerprint
 from sms_handover.conditions.joint_values import CommandErrors
 from sms_handover.conditions.random_streams import RandomStreams
 from sms_handover.errors import ConfigurationError
@@ -10,18 +13,25 @@ from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.command_path import CommandPath, CommandsOnTheWay
 from sms_handover.plant.conditioned_stepper import ConditionedStepper, Resistance
 from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics
-from sms_handover.plant.external_wrenches import NO_ACCOUNT, Companion, ExternalAccount
+from sms_handover.plant.external_wrenches import NO_ACCOUNT, ExternalAccount, sum_over
 from sms_handover.plant.integrators import Tableau
 from sms_handover.plant.joint_friction import JointFriction
 from sms_handover.plant.motor_torque import MotorTorque
-from sms_handover.types import Array
+from sms_handover.plant.rigid_deputy import RigidDeputy
+from sms_handover.types import Array, BaseWrench
 from sms_handover.units import ns_to_seconds, seconds_to_ns
+
+_NO_FORCE = np.zeros(3)  # N
 
 
 @dataclass(frozen=True, eq=False)
 class EffectsState:
-    """What the effects carry from tick to tick; their noise follows from seed and tick."""
+    """What the effects carry from tick to tick; their noise follows from seed and tick.
 
+    ``conditions`` is the fingerprint of those that they are of.
+    """
+
+    conditions: str
     commands: CommandsOnTheWay | None
     external: ExternalAccount
 
@@ -39,23 +49,28 @@ class PlantEffects:
         self._h = ns_to_seconds(tick_ns)
         self._delay = _in_ticks(conditions.command or CommandErrors(), tick_ns)
         friction = JointFriction(conditions.friction, self._h) if conditions.friction else None
-        self._resistance = Resistance(friction, tuple(conditions.wrenches.values()))
+        self._on_deputy = tuple(conditions.deputy_wrenches.values())
+        self._resistance = Resistance(friction, tuple(conditions.wrenches.values()), self._on_deputy)
+        self.has_moved_deputy = False  # in the latest tick, by a wrench
+        self._fingerprint = fingerprint(conditions)
         self._stepper: ConditionedStepper | None = None
         self._path: CommandPath | None = None
         self._motor: MotorTorque | None = None
         self.external = NO_ACCOUNT
+        self.asked: BaseWrench | None = None  # the wrench that was asked for in the latest tick
         self.seed(seed)
 
     @property
-    def has_wrenches(self) -> bool:
-        """Whether wrenches from outside act."""
-        return bool(self._resistance.wrenches)
+    def given(self) -> ExternalAccount | None:
+        """What wrenches from outside have given, None where conditions have none and none was asked for."""
+        has_any = self._resistance.wrenches or self._on_deputy or self.external is not NO_ACCOUNT
+        return self.external if has_any else None
 
     def reset(self) -> None:
         """Go back to the start of a run."""
         if self._path:
             self._path.reset()
-        self.external = NO_ACCOUNT
+        self.external, self.asked = NO_ACCOUNT, None
 
     def seed(self, seed: int) -> None:
         """Let every random stream follow from a seed, from the start of a run on."""
@@ -69,24 +84,35 @@ class PlantEffects:
     @property
     def state(self) -> EffectsState:
         """What the later motion depends on besides seed and tick."""
-        return EffectsState(self._path.state if self._path else None, self.external)
+        commands = self._path.state if self._path else None
+        return EffectsState(self._fingerprint, commands, self.external)
 
-    def restore(self, state: EffectsState) -> None:
-        """Go back to a former :attr:`state`; raises ConfigurationError if it is of other conditions."""
-        if (state.commands is None) != (self._path is None):
-            raise ConfigurationError("the snapshot is of other conditions: its commands take another way")
+    def restore(self, state: EffectsState | None) -> None:
+        """Go back to a former :attr:`state`, None where there were no effects.
+
+        Raises ConfigurationError if it is of other conditions.
+        """
+        state = state or EffectsState(fingerprint(IDEAL), None, NO_ACCOUNT)
+        if state.conditions != self._fingerprint:
+            raise ConfigurationError(
+                "the snapshot is of a run under other conditions, must be of these: give --conditions and "
+                "-p conditions... as in its run"
+            )
         if self._path and state.commands:
             self._path.state = state.commands
-        self.external = state.external
+        nothing = not (state.external.work or np.any(state.external.linear_impulse))
+        nothing = nothing and not np.any(state.external.angular_impulse)
+        self.external, self.asked = NO_ACCOUNT if nothing else state.external, None
 
     def dynamics(self, inner: MakeDynamics, tableau: Tableau) -> MakeDynamics:
         """Return what makes dynamics with these effects out of others."""
-        resistance = self._resistance
-        if not (resistance.friction or resistance.wrenches):
-            return inner
 
         def make(robot: RobotModel) -> PlantDynamics:
             bare = inner(robot)
+            resistance, values = self._resistance, self._conditions.friction
+            if robot.springs and values:
+                friction = JointFriction(values.with_free(len(robot.springs)), self._h)
+                resistance = replace(resistance, friction=friction)
             stepper = ConditionedStepper(robot, resistance, bare.stepper, tableau, self._h)
             return PlantDynamics(stepper, bare.kinematics)
 
@@ -97,20 +123,28 @@ class PlantEffects:
         arrived = self._path.arriving(tick, command) if self._path else command
         return self._motor.given(tick, arrived) if self._motor else arrived
 
-    def begins(self, tick: int, stepper: object) -> None:
-        """Tell the stepper of the tick when it begins."""
+    def begins(self, tick: int, stepper: object, asked: BaseWrench | None) -> None:
+        """Tell the stepper of the tick when it begins, and what wrench on the base is asked for in it."""
         self._stepper = stepper if isinstance(stepper, ConditionedStepper) else None
+        self.asked, self._start_s = asked, ns_to_seconds(tick * self._tick_ns)
         if self._stepper:
-            self._stepper.start_s = ns_to_seconds(tick * self._tick_ns)
+            self._stepper.start_s, self._stepper.asked = self._start_s, asked
 
-    def settle(self, companion: Companion | None) -> float:
+    def settle(self, deputy: RigidDeputy | None) -> float:
         """Book what wrenches have given in the tick, and return what friction has taken, in J.
 
-        A deputy with mass that floats is the ``companion``, as it was when the tick began.
+        A ``deputy`` with mass that floats is moved over the tick if wrenches act on it.
         """
         if self._stepper is None:
             return 0.0
-        self.external = self._stepper.given(self.external, companion)
+        pushed = None
+        if deputy and self._on_deputy:
+            pushed = sum_over(self._on_deputy, self._start_s, self._h, deputy.body)
+        beside = deputy.as_companion(_NO_FORCE if pushed is None else pushed.force) if deputy else None
+        self.external = self._stepper.given(self.external, beside)
+        self.has_moved_deputy = bool(pushed)
+        if deputy and pushed:
+            self.external = deputy.drift_under(pushed, self.external, self._stepper.as_companion)
         return self._stepper.lost
 
 

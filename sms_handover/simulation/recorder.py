@@ -13,13 +13,14 @@ from sms_handover.plan_report import PlannedPaths, PlanReport
 from sms_handover.run_data import MeasuredRows, RunData
 from sms_handover.simulation.loop import Period, Ticks
 from sms_handover.simulation.quiet_periods import QuietPeriods
-from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, TaskPhase, TickRows
+from sms_handover.types import BASE_NQ, BASE_NV, Array, BaseWrench, GraspEvent, TaskPhase, TickRows
 
 _BY_PERIOD = (
     *("reference_position", "reference_velocity", "deputy_pose", "deputy_twist"),
     *("linear_momentum", "angular_momentum", "kinetic_energy", "work", "external_work", "lost"),
 )
 _NONE = np.zeros(3)  # [N s], [N m s]
+_NO_PANELS = np.zeros(0)
 _NOT_ASKED = -1  # in place of a status where inverse kinematics was not asked
 _GROWTH = 1.5  # [-] of the room for rows, where a run is longer than it was told
 
@@ -30,9 +31,15 @@ class RunRecorder:
     Of a period only numbers, phase and events are kept, so that a long run stays small.
     """
 
-    def __init__(self, joint_names: tuple[str, ...], arms: tuple[str, ...], ticks: int = 0) -> None:
+    def __init__(
+        self,
+        joint_names: tuple[str, ...],
+        arms: tuple[str, ...],
+        ticks: int = 0,
+        panel_names: tuple[str, ...] = (),
+    ) -> None:
         """Start without a row, with room for so many ticks; for more it grows."""
-        self._joint_names, self._arms = joint_names, arms
+        self._joint_names, self._arms, self._panel_names = joint_names, arms, panel_names
         n = len(joint_names)
         self._ends = np.cumsum([BASE_NQ + n, BASE_NV + n, n, n]).tolist()
         self._table = np.empty((ticks, self._ends[-1]))
@@ -91,7 +98,7 @@ class RunRecorder:
         """Add what a reference period begins with."""
         reference, conserved, status = period.reference, period.conserved, period.ik_status
         given = period.external_impulse
-        deputy = pose_row(period.deputy.deputy_in_world)
+        panels, deputy = period.panels, pose_row(period.deputy.deputy_in_world)
         row = {
             "reference_ns": reference.stamp_ns,
             "reference_position": reference.position,
@@ -104,6 +111,9 @@ class RunRecorder:
             "work": period.work,
             "external_work": period.external_work,
             "lost": period.lost,
+            "elastic_energy": panels.energy if panels else 0.0,
+            "panel_position": panels.angle if panels else _NO_PANELS,
+            "panel_velocity": panels.rate if panels else _NO_PANELS,
             "linear_impulse": _NONE if given is None else given.linear_impulse,
             "angular_impulse": _NONE if given is None else given.angular_impulse,
             "ik_status": CONSTANTS[status] if status else _NOT_ASKED,
@@ -127,6 +137,9 @@ class RunRecorder:
         self._periods["reference_ns"].append(rows.stamp_ns)
         for name in ("linear_impulse", "angular_impulse"):  # in C nothing acts from outside
             self._periods[name].append(np.zeros((len(rows.stamp_ns), 3)))
+        self._periods["elastic_energy"].append(np.zeros(len(rows.stamp_ns)))  # nor do panels swing
+        for name in ("panel_position", "panel_velocity"):
+            self._periods[name].append(np.zeros((len(rows.stamp_ns), 0)))
         status = [CONSTANTS[status] if status else _NOT_ASKED for status in rows.ik_status]
         self._periods["ik_status"].append(np.array(status))
         for arm in self._arms:
@@ -134,8 +147,8 @@ class RunRecorder:
             self._tool_pose[arm].append(rows.tool_pose[arm])
         self._phases.extend(quiet.phases)
 
-    def data(self) -> RunData:
-        """Return the run so far."""
+    def data(self, base_wrenches: tuple[BaseWrench, ...] = ()) -> RunData:
+        """Return the run so far; ``base_wrenches`` are those that others asked for and that acted."""
         rows, (nq, nv, acted, _) = self._table[: self._count], self._ends
         return RunData(
             joint_names=self._joint_names,
@@ -153,6 +166,8 @@ class RunRecorder:
             grasp_events=tuple(self._events),
             run_events=tuple(self._decisions),
             plans=tuple(self._plans),
+            base_wrenches=base_wrenches,
+            panel_names=self._panel_names,
             planned_paths=tuple(self._paths),
             measured=self._measured_rows(),
             **{name: np.concatenate(rows) for name, rows in self._periods.items()},

@@ -29,13 +29,15 @@ from sms_handover.control.stability import check_stability
 from sms_handover.errors import ConfigurationError, ScheduleError
 from sms_handover.ik.levenberg_marquardt import FindJoints, find_joints
 from sms_handover.ik.parameters import IkParameters
+from sms_handover.model.poses import se3_of
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics, pinocchio_dynamics
 from sms_handover.plant.effects import PlantEffects
-from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
+from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.plant.integrators import TABLEAUS, Tableau
 from sms_handover.plant.joint_limits import ENFORCE
 from sms_handover.plant.parameters import PlantParameters
+from sms_handover.plant.plant_state import InitialState
 from sms_handover.plant.sensed_plant import SensedPlant
 from sms_handover.simulation.near_pairs import NearPairs
 from sms_handover.simulation.parameters import COMPILED, MEASURED, TRUE, CommonParameters
@@ -96,7 +98,14 @@ def make_dynamics(dynamics: str, tableau: Tableau, h: float) -> MakeDynamics:
     """Return what makes the dynamics of the plant, by Pinocchio or compiled."""
     if dynamics != COMPILED:
         return pinocchio_dynamics(tableau, h)
-    return lambda robot: PlantDynamics(CompiledStepper(robot, tableau, h), CompiledKinematics(robot))
+    by_pinocchio = pinocchio_dynamics(tableau, h)
+
+    def make(robot: RobotModel) -> PlantDynamics:
+        if robot.springs:  # C knows of no springs
+            return by_pinocchio(robot)
+        return PlantDynamics(CompiledStepper(robot, tableau, h), CompiledKinematics(robot))
+
+    return make
 
 
 def make_generator(
@@ -231,7 +240,8 @@ def make_runner(
     if not has_all or not CompiledTicks.fits(plant, controller, known):
         _LOG.warning(
             "ticks are carried out by Python: C has only laws nmpc and pid without compensation, joints that "
-            "are alike in truth and model, limits that are not enforced, and ideal conditions"
+            "are alike in truth and model, limits that are not enforced, panels that are locked, and ideal "
+            "conditions"
         )
         return by_python
     return CompiledTicks(plant, controller, known, parameters.integrator, common.tick_ns)
@@ -243,10 +253,19 @@ def longest_reference_ns(common: CommonParameters, parameters: ControllerParamet
 
 
 def _check_deputy_twist(schedule: Schedule, h: float) -> None:
-    """Raise ScheduleError where a deputy turns too far in one tick of ``h`` s for its integration."""
-    rate = float(np.linalg.norm(schedule.deputy.twist_in_world.angular))
+    """Raise ScheduleError where a deputy may turn too far in one tick of ``h`` s for its integration.
+
+    A body that tumbles freely turns at most with |L| / I_min, with I_min its least moment of inertia.
+    """
+    deputy = schedule.deputy
+    rate = float(np.linalg.norm(deputy.twist_in_world.angular))
+    if deputy.inertia is not None:
+        moments = np.array(deputy.inertia.inertia)
+        turn = se3_of(deputy.deputy_in_world).rotation.T @ deputy.twist_in_world.angular
+        rate = max(rate, float(np.linalg.norm(moments @ turn) / np.linalg.eigvalsh(moments)[0]))
     if rate * h > _MOST_TURN:
         raise ScheduleError(
-            f"deputy.twist_in_world turns it at {rate:g} rad/s, must be at most {_MOST_TURN / h:g} rad/s, "
-            f"{_MOST_TURN:g} rad in a tick of {h:g} s; use a shorter tick or a slower deputy"
+            f"deputy.twist_in_world lets it turn at up to {rate:g} rad/s, must be at most "
+            f"{_MOST_TURN / h:g} rad/s, {_MOST_TURN:g} rad in a tick of {h:g} s; use a shorter tick or a "
+            "slower deputy"
         )

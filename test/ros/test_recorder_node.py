@@ -142,6 +142,8 @@ def test_every_topic_of_the_graph_is_there_with_every_message(bench: Bench) -> N
     info = recorded.info
     counts = {Rate.TICK: TICKS, Rate.REFERENCE: PERIODS, Rate.CLOCK: (TICKS - 1) // 10 + 1}
     for topic in TOPICS:
+        if topic.is_from_outside:
+            continue  # what the plant makes of it is recorded
         found = info.topics[topic.name if topic.name.startswith("/") else f"/{topic.name}"]
         assert (found.type, found.encoding, found.schema_encoding) == (topic.type, "cdr", "ros2msg")
         assert found.type_hash.startswith("RIHS01_")

@@ -71,6 +71,8 @@ def test_no_message_is_missing(bag: Path) -> None:
     assert ledger is not None and ledger.complete
     accounts = {account.name: account for account in ledger.topics}
     for topic in TOPICS:
+        if topic.is_from_outside:
+            continue  # what the plant makes of it is recorded
         account = accounts[f"/{topic.name.lstrip('/')}"]
         if topic.rate in COUNTS:
             assert account.received == account.published == COUNTS[topic.rate] * len(topic.publishers), topic

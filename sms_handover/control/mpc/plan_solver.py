@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from sms_handover.control.mpc.derivatives import (
     COMPILED,
     PINOCCHIO,
@@ -11,6 +13,7 @@ from sms_handover.control.mpc.derivatives import (
 from sms_handover.control.mpc.parameters import MpcGains
 from sms_handover.control.mpc.plan_problem import PlanProblem
 from sms_handover.control.mpc.planner import Planner, Step
+from sms_handover.control.mpc.quadratic_program import worst_excess
 from sms_handover.control.protocol import Distances
 from sms_handover.errors import ConfigurationError
 from sms_handover.model.deputy import DeputyDescription
@@ -42,6 +45,18 @@ class PlanSolver:
 
     def solve(self, problem: PlanProblem) -> Step:
         """Return one iteration."""
+        planner = self._planner(problem)
+        return planner.step(problem.start, problem.accelerations, problem.targets, shown=problem.is_shown)
+
+    def exceeded(self, problem: PlanProblem) -> tuple[float, str]:
+        """Return by how much the worst soft limit is exceeded without a change, and its row, '' for none."""
+        rows = (
+            self._planner(problem).program(problem.start, problem.accelerations, problem.targets).constraints
+        )
+        return worst_excess(rows, np.zeros(problem.accelerations.size), soft=True)
+
+    def _planner(self, problem: PlanProblem) -> Planner:
+        """Return the planner of a problem."""
         made_for = problem.grip, problem.initial_rotation.tobytes()
         if made_for != self._made_for:
             self._made_for = made_for
@@ -54,5 +69,4 @@ class PlanSolver:
             if derivatives is None:
                 raise ConfigurationError("linearisation 'compiled' of control law 'mpc' is not there")
             self._planners[gains] = Planner(robot, gains, self._distances, initial, derivatives)
-        planner = self._planners[gains]
-        return planner.step(problem.start, problem.accelerations, problem.targets, shown=problem.is_shown)
+        return self._planners[gains]

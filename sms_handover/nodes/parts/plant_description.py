@@ -10,6 +10,7 @@ from sms_handover.messages.message_types import MessageTypes
 from sms_handover.messages.transforms import transforms_cdr
 from sms_handover.model.deputy import DeputyDescription
 from sms_handover.model.link_tree import LinkTree
+from sms_handover.model.moving_panels import with_moving_panels
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.nodes.parts.marker import deputy_marker
 from sms_handover.ros.node.endpoints import CountedPublisher
@@ -23,7 +24,7 @@ class PlantDescription:
     ) -> None:
         """Make the publishers; ``publisher`` returns the one of a topic."""
         grasps = [(DEPUTY, grasp_frame(name), pose) for name, pose in deputy.grasp_frames.items()]
-        fixed = [*LinkTree(robot).fixed, *grasps]
+        fixed = [*LinkTree(with_moving_panels(robot)).fixed, *grasps]
         self._outputs = (
             (publisher(ROBOT_DESCRIPTION), String(data=robot.urdf)),
             (publisher(DEPUTY_MARKER), deputy_marker(deputy.size)),

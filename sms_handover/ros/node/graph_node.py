@@ -133,7 +133,6 @@ class GraphNode(LifecycleNode, Generic[P]):
         topics = graph_topics(
             self.robot.arms,
             clearance=self.common.measures_clearance,
-            wrenches=bool(world.conditions.wrenches),
             sensors=[sensor_topic(name) for name in world.conditions.sensors],
             measured=self.common.uses_measurements,
         )
