@@ -178,14 +178,20 @@ def _of_conditions(world: World, steps: Sequence[str]) -> Any:
     """Return a value of the conditions; of one that every joint has, that of the first."""
     if steps[0] == "model_error":
         return getattr(getattr(world.model_error, steps[1]), steps[2])
+    conditions = world.conditions
+    if steps[0] == "wrenches":
+        model: Any = {**conditions.wrenches, **conditions.deputy_wrenches}[steps[1]]
+        return _entry(getattr(model if hasattr(model, steps[3]) else model.orbit, steps[3]), steps[4:])
     if steps[0] == "sensors":
-        values, rest = world.conditions.sensors[steps[1]], steps[2:]
-    elif steps[0] in ("friction", "torque", "command"):
-        values, rest = getattr(world.conditions, steps[0]), steps[1:]
-    else:
+        return _entry(getattr(conditions.sensors[steps[1]], steps[2]), steps[3:] or "0")
+    if steps[0] not in ("friction", "torque", "command"):
         raise KeyError(steps[0])
-    value = getattr(values, rest[0])
-    return float(value[int(rest[1]) if len(rest) > 1 else 0]) if isinstance(value, np.ndarray) else value
+    return _entry(getattr(getattr(conditions, steps[0]), steps[1]), steps[2:] or "0")
+
+
+def _entry(value: Any, steps: Sequence[str]) -> Any:
+    """Return an entry of an array, or a value that is none."""
+    return float(value[int(steps[0])]) if isinstance(value, np.ndarray) else value
 
 
 def _of_schedule(world: World, steps: Sequence[str]) -> Any:
