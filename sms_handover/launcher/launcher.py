@@ -128,7 +128,7 @@ def joined_graph(plan: LaunchPlan, name: str) -> Iterator[tuple[Node, Executor]]
     os.environ.setdefault(_LOG_FOLDER, str(plan.log_folder / "ros"))  # its default needs a HOME
     os.environ.update(plan.scope.environment)
     try:
-        rclpy.init(domain_id=plan.domain, signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=[], domain_id=plan.domain, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # such as no thread or no memory left
         raise GraphError(f"ROS cannot be started: {error}") from error
     node = Node(name, start_parameter_services=False, enable_rosout=False)

@@ -1268,6 +1268,13 @@ BREAKS: tuple[Break, ...] = (
         "mpc",
     ),
     _core(
+        "a preview that begins where tools were before joints led them",
+        "trajectory/preview",
+        "tools = {**self._robot.tools_at(np.concatenate([self._base, leg.ends])), **leg.goals}",
+        "tools = {**leg.tools, **leg.goals}",
+        "balancer",
+    ),
+    _core(
         "a plan made for the state of now",
         "control/mpc/controller",
         "now, later = plan.at(stamp_ns), plan.at(begin_ns)",
