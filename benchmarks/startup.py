@@ -86,8 +86,8 @@ def main() -> None:
             name="startup",
             question="How long until it answers?",
             notes=[
-                "Whole processes, from their start to their end or to the first line of progress. The graph is "
-                "allowed 2 s to its first tick."
+                "Whole processes, from their start to their end or to the first line of progress. Allowed "
+                "are 2 s to the first tick of the graph."
             ],
             tables=[import_table(), first_tick_table()],
         )
