@@ -15,13 +15,14 @@ SITE := build/docs/html
 
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint .ci/constraints.txt
+OPTIMA = OPENBLAS_NUM_THREADS=1 $(VENV)-crocoddyl/bin/python -m pytest -q -p no:cacheprovider test/verification/test_crocoddyl.py
 MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evidence $(MEASURED)/evidence.json
 
 # The environment stands alone: what a sourced ROS workspace or another environment exports must not leak in.
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover figures report simulate test verify measure bench docs acceptance screenshots faults lowest cycles fuzz hostile soak reference clearance geometries masses effects scenarios engines evidence campaign balancer lint install colcon clean
+.PHONY: help handover figures report simulate test verify measure bench docs acceptance screenshots faults lowest cycles fuzz hostile soak reference clearance geometries crocoddyl masses effects scenarios engines evidence campaign balancer lint install colcon clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -43,10 +44,11 @@ simulate: install  ## the same handover in one process, without DDS or a recordi
 test: lint  ## check style and types, then run every test but those of verify in TEST_WORKERS processes
 	$(BIN)/python -m pytest --numprocesses $(TEST_WORKERS) --dist loadfile --timeout $(TEST_SECONDS) --durations 20
 
-verify: $(VENV)/.verify  ## measure against independent answers, break every law on purpose, write docs/verification.md
+verify: $(VENV)/.verify $(VENV)-crocoddyl/.crocoddyl  ## measure against independent answers, break every law on purpose, write docs/verification.md
 	@mkdir -p $(MEASURED)
 	status=0; \
 	$(MEASURE) || status=1; \
+	$(OPTIMA) || status=1; \
 	$(BIN)/python test/verification/mutations.py --output $(MEASURED)/breaks.json || status=1; \
 	$(BIN)/python test/verification/report.py $(MEASURED)/evidence.json --breaks $(MEASURED)/breaks.json || status=1; \
 	exit $$status
@@ -119,6 +121,9 @@ engines: $(VENV)-basilisk/.engines  ## replay shipped scenarios (SCENARIOS, or a
 	OPENBLAS_NUM_THREADS=1 $(VENV)-basilisk/bin/python -m docs.second_engine $(SCENARIOS)
 	OPENBLAS_NUM_THREADS=1 $(VENV)-basilisk/bin/python -m pytest -q -p no:cacheprovider test/verification/test_second_engine.py -k basilisk
 
+crocoddyl: $(VENV)-crocoddyl/.crocoddyl  ## compare optimal plans of mpc without limits with those of Crocoddyl
+	$(OPTIMA)
+
 reference: install  ## write the pages of docs/ that list what is in the code
 	$(BIN)/python -m docs.reference
 
@@ -133,7 +138,7 @@ colcon:  ## build the package as a ROS workspace does, with colcon, and list its
 	PYTHON="$(PYTHON)" .ci/colcon
 
 clean:  ## remove the environment and everything built; recordings stay
-	rm -rf $(VENV) $(LOWEST) $(VENV)-basilisk build dist docs/api *.egg-info interfaces*/build interfaces*/*.egg-info .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) $(LOWEST) $(VENV)-basilisk $(VENV)-crocoddyl build dist docs/api *.egg-info interfaces*/build interfaces*/*.egg-info .mypy_cache .pytest_cache .ruff_cache
 
 # Stamps: each holds until a file it depends on changes.
 INTERFACES := $(wildcard interfaces/*.txt interfaces/*.cmake interfaces/*.xml interfaces/*.py interfaces/*.toml) \
@@ -178,6 +183,11 @@ $(VENV)/.verify: $(VENV)/.test
 $(VENV)-basilisk/.engines: $(METADATA) .ci/basilisk.txt
 	$(PYTHON) -m venv $(VENV)-basilisk
 	$(VENV)-basilisk/bin/python -m pip install --quiet --disable-pip-version-check --constraint .ci/basilisk.txt --editable '.[basilisk,mpc,mujoco]' 'pytest>=8.4'
+	@touch $@
+
+$(VENV)-crocoddyl/.crocoddyl: $(METADATA)
+	$(PYTHON) -m venv $(VENV)-crocoddyl
+	$(VENV)-crocoddyl/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[crocoddyl,mpc]' 'pytest>=8.4'
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.test

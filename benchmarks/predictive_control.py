@@ -140,8 +140,8 @@ def main() -> None:
             notes=[
                 f"Processor time of one iteration at each of the first {STATES} reference periods of "
                 "scenario `tight`, with the base's rotation limited too; the shortest of some counts. "
-                "Derivatives are Pinocchio's, of dynamics, tools and distances; the column before has those of "
-                "dynamics alone. The program is DAQP with its checks. "
+                "Derivatives are Pinocchio's, of dynamics, tools and distances; the column before has those "
+                "of dynamics alone. The program is DAQP with its checks. "
                 f"Compared: {versions(('pin', 'daqp', 'numpy'))}.",
             ],
             values=values,

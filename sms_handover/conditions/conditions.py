@@ -69,11 +69,15 @@ def conditions_of(content: YamlMapping, robot: RobotModel) -> Conditions:
     of rotors that the robot has not.
     """
     root = Section(content, Path(), spec=CONDITIONS_FIELDS)
+    on_base, on_deputy = (
+        _wrenches(root.section("wrenches"), body) if "wrenches" in root else {} for body in BODIES
+    )
     conditions = Conditions(
         _friction(root, robot.n_joints),
         _torque(root, robot.n_joints),
         _command(root),
-        *(_wrenches(root.section("wrenches"), body) if "wrenches" in root else {} for body in BODIES),
+        on_base,
+        on_deputy,
         sensors_of(root.section("sensors"), robot.n_joints) if "sensors" in root else {},
     )
     _require_rotors(root, conditions, robot)

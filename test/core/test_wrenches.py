@@ -75,7 +75,7 @@ def test_momentum_and_energy_change_by_what_wrenches_give_and_by_nothing_else() 
         assert np.abs(gained - given).max() < 1e-9 * size
 
 
-_ON_DEPUTY = {
+_ON_DEPUTY: dict[str, dict[str, Any]] = {
     "push": {"constant": {"force": [0.3, -0.2, 0.1], "torque": [0.01, 0.02, -0.03], "point": [0.1, 0.05, 0]}},
     "turn": {"constant": {"force": [0, 0.5, 0], "torque": [0, 0, 0.02], "axes": "body"}},
     "told": {"history": {"rows": [[0, 0.1, 0, 0, 0, 0, 0.01], [1, 0, 0.3, 0, 0.02, 0, 0]]}},

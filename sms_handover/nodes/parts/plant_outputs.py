@@ -94,11 +94,11 @@ class PlantOutputs:
     def _publish_truth(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
         """Publish the state as it is."""
         publish = self._publish
-        state, panels = (plant.q, plant.v, plant.joint_effort), plant.panels
-        if panels:
+        q, v, effort = plant.q, plant.v, plant.joint_effort
+        if panels := plant.panels:
             beside = (panels.angle, panels.rate, panels.torque)
-            state = tuple(np.concatenate(pair) for pair in zip(state, beside, strict=True))
-        joints, odometry = self._state_codec.pack_arrays(plant.stamp_ns, *state)
+            q, v, effort = map(np.concatenate, zip((q, v, effort), beside, strict=True))
+        joints, odometry = self._state_codec.pack_arrays(plant.stamp_ns, q, v, effort)
         if with_reference and self._lockstep:
             self._publish_sample(plant, joints, odometry)
         publish[JOINT_STATES](joints)
