@@ -96,7 +96,8 @@ def cases() -> Iterator[tuple[str, str, Values]]:
     for law in ("nmpc", "mpc"):
         for share in SHARES:
             for option, values in OPTIONS.items():
-                run: dict[str, object] = {"law": law, "common.tick": TICK, "common.duration": GRASPED, "seed": 1}
+                run: dict[str, object] = {"law": law, "common.tick": TICK}
+                run |= {"common.duration": GRASPED, "seed": 1}
                 opened = {"plant.grasp_position_tolerance": 10.0, "plant.grasp_angle_tolerance": 3.2}
                 yield (
                     f"{law} {share:g} {option}",
