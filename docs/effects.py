@@ -126,7 +126,7 @@ def effect_of(name: str, law: str) -> Effect:
     return Effect(
         tuple(event.position_error * MM_PER_M for event in events) or (nan,),
         tuple(event.angle_error * DEG_PER_RAD for event in events) or (nan,),
-        float(np.nanmax(base_rotation(run).values)) * DEG_PER_RAD,
+        float(np.nanmax(np.linalg.norm(base_rotation(run).values, axis=1))) * DEG_PER_RAD,
     )
 
 
