@@ -25,6 +25,7 @@ from sms_handover.graph.services import SERVICES
 from sms_handover.graph.topics import CONTROLLER, SENSOR_TYPES, graph_topics
 from sms_handover.ros.launching.launch_arguments import ARGUMENTS
 from sms_handover.ros.reference.interfaces import COMMON_GROUP, OWN_GROUPS, groups_of
+from sms_handover.simulation.parameters import CommonParameters
 from sms_handover.simulation.scenario import load_scenario
 
 from .core.laws import offer
@@ -110,7 +111,7 @@ def check_ours(words: list[str]) -> None:
         if node == CONTROLLER and getattr(options, "own_controller", None):
             cls = TaskSpaceGains  # the pages start our example
         elif node == CONTROLLER and options.controller:
-            cls = parameters_with(law_named(options.controller))
+            cls = parameters_with(law_named(options.controller), CommonParameters)
         require([name], [item.name for item in fields(cls)], f"parameter of {node}")
 
 

@@ -240,7 +240,8 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
         name = self.get_parameter(LAW).value if self.has_parameter(LAW) else scenario.get(LAW)
         if name is None:
             return group
-        return parameters_with(law_named(str(name), f"{CONTROLLER}: parameter {LAW!r}"))
+        law = law_named(str(name), f"{CONTROLLER}: parameter {LAW!r}")
+        return parameters_with(law, type(self.common))
 
     def prepare(self) -> None:
         """Set up the law; raises UnstableLoopError if its gains cannot work at this tick."""

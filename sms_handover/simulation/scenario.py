@@ -115,7 +115,7 @@ def load_parameters(
     else:
         values, places = given(CONTROLLER, CONTROLLER)
         law = law_named(str(values["law"]), f"{places.get('law', CONTROLLER)}: parameter 'law'")
-        controller = build(parameters_with(law), values, CONTROLLER, places)
+        controller = build(parameters_with(law, CommonParameters), values, CONTROLLER, places)
     return ParameterSet(
         common=common,
         plant=group(PlantParameters, PLANT, PLANT),
