@@ -41,7 +41,7 @@ def dynamics_source(bodies: Sequence[Body], tools: Sequence[Tool], schemes: Mapp
     joints = len(bodies) - 1
     by = _acceleration(bodies)
     angles, v = ca.SX.sym("angles", joints), ca.SX.sym("v", BASE_NV + joints)
-    numbers, known = _with_parameters(bodies)
+    numbers, known = with_parameters(bodies)
     resisted = ResistedFunctions(angles, v, numbers, known)
     functions = [
         *(step_function(step_name(n), by, scheme, joints, goes_on=False) for n, scheme in schemes.items()),
