@@ -54,7 +54,9 @@ class RunData:
     where none was asked. Bags of older versions have no deputy twist (NaN), and their work is less what
     joint stops have taken. ``plans`` has the reports of a predictive law, one per solve, and
     ``planned_paths`` those of the tools, of every fifth; ``base_wrenches`` what others have asked for and
-    acted, each with the stamp of its tick; ``measured`` is None where no sensor was simulated.
+    acted, each with the stamp of its tick; ``measured`` is None where no sensor was simulated. ``applied`` is
+    JSON of what acted in the plant, as it was read back from it: conditions and inertias; '' in bags of older
+    versions.
     """
 
     joint_names: tuple[str, ...]
@@ -91,6 +93,7 @@ class RunData:
     plans: tuple[PlanReport, ...] = ()
     base_wrenches: tuple[BaseWrench, ...] = ()
     panel_names: tuple[str, ...] = ()
+    applied: str = ""
     planned_paths: tuple[PlannedPaths, ...] = ()
     measured: MeasuredRows | None = None
 

@@ -111,6 +111,7 @@ IK_STATUS = "ik/status"
 MPC_STATUS = "mpc/status"  # only where the law solves a program as it goes on
 PLANNED_PATHS = "mpc/planned_paths"  # markers, for viewers
 ROBOT_DESCRIPTION = "robot_description"
+APPLIED_VALUES = "applied_values"
 DEPUTY_MARKER = "deputy/marker"
 RUN_STATE = "run/state"
 RUN_READY = "run/ready"
@@ -200,6 +201,7 @@ def graph_topics(
         Topic(MPC_STATUS, f"{_OURS}/MpcStatus", (CONTROLLER,), (), Rate.SOLVE),
         Topic(PLANNED_PATHS, "visualization_msgs/msg/MarkerArray", (CONTROLLER,), (), Rate.SHOWN),
         Topic(ROBOT_DESCRIPTION, text, (PLANT,), (), Rate.CHANGE),
+        Topic(APPLIED_VALUES, text, (PLANT,), (), Rate.CHANGE),
         Topic(TF, TF_TYPE, (PLANT, TRAJECTORY), (), Rate.REFERENCE),
         Topic(TF_STATIC, TF_TYPE, (PLANT,), (), Rate.CHANGE),
         Topic(DEPUTY_MARKER, "visualization_msgs/msg/Marker", (PLANT,), (), Rate.CHANGE),

@@ -84,9 +84,10 @@ class PlantNode(GraphNode[PlantParameters]):
         self._reconfigured = self.runs > 0
         self._wait_for_others()
         self._make_endpoints()
-        self._clearance = PlantClearance(self.robot, schedule, self.common, self.endpoints.publisher)
-        self._description = PlantDescription(self.robot, schedule.deputy, self.endpoints.publisher)
-        self._transforms = PlantTransforms(self.robot, self.endpoints.publisher)
+        publisher = self.endpoints.publisher
+        self._clearance = PlantClearance(self.robot, schedule, self.common, publisher)
+        self._description = PlantDescription(self._plant, self.robot, schedule.deputy, publisher)
+        self._transforms = PlantTransforms(self.robot, publisher)
         self.create_timer(_TIMING_PERIOD_S, self._publish_timing)
         if self.lockstep:
             self.create_timer(self.parameters.resend_after, self._resend)

@@ -60,6 +60,16 @@ class PlantEffects:
         self.seed(seed)
 
     @property
+    def names(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """The names of the wrenches on the base, and of those on the deputy."""
+        return tuple(self._conditions.wrenches), tuple(self._conditions.deputy_wrenches)
+
+    @property
+    def delay_s(self) -> float:
+        """How long a command is on its way, in s: the ticks that the path has."""
+        return len(self.path.state.waiting) * self._h if self.path else 0.0
+
+    @property
     def given(self) -> ExternalAccount | None:
         """What wrenches from outside have given, None where conditions have none and none was asked for."""
         has_any = self.resistance.wrenches or self.on_deputy or self._was_asked

@@ -24,6 +24,7 @@ from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import CONTROLLER
 from sms_handover.model.conserved import ConservedQuantities
 from sms_handover.plan_report import PlannedPaths, PlanReport
+from sms_handover.plant.applied_values import applied_text
 from sms_handover.plant.arm_part import PanelState
 from sms_handover.plant.external_wrenches import ExternalAccount
 from sms_handover.plant.sensed_plant import KnownState, SensedPlant, known_of
@@ -247,6 +248,11 @@ class Loop:
     def base_wrenches(self) -> tuple[BaseWrench, ...]:
         """The wrenches that others have asked for and that have acted so far."""
         return tuple(w for w in self._plant.base_wrenches if w.stamp_ns < self._plant.stamp_ns)
+
+    @property
+    def applied(self) -> str:
+        """What acts in the plant, read back from it, as JSON."""
+        return applied_text(self._plant)
 
     @property
     def controller(self) -> Controller:

@@ -146,8 +146,8 @@ class RunRecorder:
             self._tool_pose[arm].append(rows.tool_pose[arm])
         self._phases.extend(quiet.phases)
 
-    def data(self, base_wrenches: tuple[BaseWrench, ...] = ()) -> RunData:
-        """Return the run so far; ``base_wrenches`` are those that others asked for and that acted."""
+    def data(self, base_wrenches: tuple[BaseWrench, ...] = (), applied: str = "") -> RunData:
+        """Return the run so far, with the wrenches that others asked for, and what acts in the plant."""
         rows, (nq, nv, acted, _) = self._table[: self._count], self._ends
         return RunData(
             joint_names=self._joint_names,
@@ -167,6 +167,7 @@ class RunRecorder:
             plans=tuple(self._plans),
             base_wrenches=base_wrenches,
             panel_names=self._panel_names,
+            applied=applied,
             planned_paths=tuple(self._paths),
             measured=self._measured_rows(),
             **{name: np.concatenate(rows) for name, rows in self._periods.items()},

@@ -35,4 +35,4 @@ def simulate(
         if progress:
             for phase in ticks.phases:
                 progress(phase.stamp_ns, phase)
-    return recorder.data(loop.base_wrenches)
+    return recorder.data(loop.base_wrenches, loop.applied)

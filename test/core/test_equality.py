@@ -31,7 +31,7 @@ OLD = Path(__file__).parent.parent / "data" / "first_edition" / "nmpc"
 ARRAYS = [item.name for item in fields(RunData) if isinstance(getattr(made_up_run(3), item.name), np.ndarray)]
 PER_ARM = ("target_pose", "tool_pose")
 EVENTS = ("grasp_events", "run_events", "plans", "base_wrenches")
-TEXTS = ("joint_names", "arms", "phases", "panel_names", "planned_paths", "measured", *EVENTS)
+TEXTS = ("joint_names", "arms", "phases", "panel_names", "planned_paths", "measured", "applied", *EVENTS)
 
 
 @pytest.fixture

@@ -1154,6 +1154,13 @@ BREAKS: tuple[Break, ...] = (
         "wrenches",
     ),
     _core(
+        "offset of a torque set and not applied",
+        "plant/motor_torque",
+        "1.0 + errors.gain, errors.offset, errors.step",
+        "1.0 + errors.gain, 0.0 * errors.offset, errors.step",
+        "conditions",
+    ),
+    _core(
         "spring that pushes away from rest",
         "model/springs",
         "-self.stiffness * q[-count:]",

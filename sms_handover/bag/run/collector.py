@@ -72,6 +72,7 @@ class RunCollector:
         self.run_events: list[RunEvent] = []
         self.plans: list[PlanReport] = []
         self.base_wrenches: list[BaseWrench] = []
+        self.applied = ""
         self.planned_paths: list[PlannedPaths] = []
         self._first_ns: int | None = None
         self._newest_ns = 0
@@ -82,6 +83,7 @@ class RunCollector:
             topics.TASK_PHASE: lambda message: self.phases.append(task_phase(message)),
             topics.GRASP_EVENT: lambda message: self.events.append(grasp_event(message)),
             topics.RUN_EVENTS: lambda message: self.run_events.append(run_event(message)),
+            topics.APPLIED_VALUES: self._take_applied,
             topics.APPLIED_BASE_WRENCH: lambda message: self.base_wrenches.append(base_wrench(message)),
             topics.MPC_STATUS: lambda message: self.plans.append(plan_report(message)),
             topics.PLANNED_PATHS: lambda message: self.planned_paths.append(planned_paths(message)),
@@ -97,6 +99,10 @@ class RunCollector:
         by_name = {self.full_name(name): taker for name, taker in takers.items()}
         for message in read_messages(self.info.path, by_name):
             by_name[message.topic](message.data)
+
+    def _take_applied(self, message: Any) -> None:
+        """Take what acts in the plant; a run after a reset tells it again."""
+        self.applied = str(message.data)
 
     def _take_state(self, data: bytes) -> None:
         """Take a joint state; one that begins a new run, after a reset, drops the events so far."""

@@ -97,6 +97,7 @@ def _assemble(collector: RunCollector) -> RunData:
         panel_position=angles,
         panel_velocity=joint(topics.JOINT_STATES, VELOCITY, panel_names).at(periods),
         panel_names=panel_names,
+        applied=collector.applied,
         linear_impulse=impulse(topics.LINEAR_IMPULSE),
         angular_impulse=impulse(topics.ANGULAR_IMPULSE),
         ik_status=np.nan_to_num(rows(topics.IK_STATUS)[:, 0], nan=_NO_IK).astype(np.int64),

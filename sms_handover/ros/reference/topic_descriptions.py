@@ -35,6 +35,7 @@ _CONTENTS = {
     topics.MPC_STATUS: "what came of a solve: status, rows that bind, slack, times [s]; only under law mpc",
     topics.PLANNED_PATHS: "where the tools go by the plan in use, a line per arm; only under law mpc",
     topics.ROBOT_DESCRIPTION: "URDF of the robot",
+    topics.APPLIED_VALUES: "JSON of conditions and inertias, read back from the plant",
     topics.TF: "every moving link in its parent [m], and in world base_link, deputy and targets",
     topics.TF_STATIC: "every link that does not move in its parent [m], and the grasp frames in deputy",
     topics.RUN_STATE: "whether the run waits, runs, pauses or is over",
