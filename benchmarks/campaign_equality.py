@@ -226,19 +226,19 @@ def kill(trial: Trial, kills: int) -> Counter[str]:
 
 def killed_one(child: "subprocess.Popen[bytes]", random_: random.Random) -> str:
     """Kill the driver, a worker, or a process of cases, as it comes; return what, '' if there is none."""
-    below = psutil.Process(child.pid).children(recursive=True)
     named = {WORKER: "spawn_main", CASES: "case_main"}
     what = random_.choice([DRIVER, WORKER, CASES])
-    if what == DRIVER:
-        child.kill()
-        child.wait()
-        psutil.wait_procs(below, _GONE_S)
-        return DRIVER
     try:
+        below = psutil.Process(child.pid).children(recursive=True)
+        if what == DRIVER:
+            child.kill()
+            child.wait()
+            psutil.wait_procs(below, _GONE_S)
+            return DRIVER
         chosen = [one for one in below if any(named[what] in word for word in one.cmdline())]
         if chosen:
             random_.choice(chosen).kill()
-    except psutil.Error:
+    except psutil.Error:  # it ended by itself just now
         return ""
     return what if chosen else ""
 

@@ -142,7 +142,7 @@ def main() -> None:
                 "scenario `tight`, with the base's rotation limited too; the shortest of some counts. "
                 "Derivatives are Pinocchio's, of dynamics, tools and distances; the column before has those "
                 "of dynamics alone. The program is DAQP with its checks. "
-                f"Compared: {versions(('pin', 'daqp', 'numpy'))}.",
+                f"Compared: {versions(('pin', 'daqp', 'casadi', 'numpy'))}.",
             ],
             values=values,
         )

@@ -52,9 +52,9 @@ class RunData:
     ``panel_names``. ``linear_impulse`` (M, 3) N s and ``angular_impulse`` (M, 3) N m s are what those have
     added to the momenta, 0 where there were none; ``ik_status`` (M,) the number of the IkStatus message, -1
     where none was asked. Bags of older versions have no deputy twist (NaN), and their work is less what
-    joint stops have taken. ``plans`` has the reports of a predictive law, one per solve, ``base_wrenches``
-    what others have asked for and acted, each with the stamp of its tick; ``measured`` is None where no
-    sensor was simulated.
+    joint stops have taken. ``plans`` has the reports of a predictive law, one per solve, and
+    ``planned_paths`` those of the tools, of every fifth; ``base_wrenches`` what others have asked for and
+    acted, each with the stamp of its tick; ``measured`` is None where no sensor was simulated.
     """
 
     joint_names: tuple[str, ...]

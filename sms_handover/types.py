@@ -177,8 +177,8 @@ class PeriodRows:
 
     Stamps (k,) ns; references (k, n) rad and rad/s; poses (k, 7) of targets and tools by arm, and of the
     deputy, whose twist (k, 6) is in its own axes; momenta (k, 3); kinetic energy, and since the start work of
-    the joints, work of wrenches from outside and what became heat (k,) J; the status of inverse kinematics,
-    None where it was not asked.
+    the joints, work of wrenches from outside and what became heat (k,) J, and the impulses of those wrenches
+    (k, 3); the status of inverse kinematics, None where it was not asked.
     """
 
     stamp_ns: npt.NDArray[np.int64]
@@ -194,6 +194,8 @@ class PeriodRows:
     work: Array
     external_work: Array
     lost: Array
+    linear_impulse: Array
+    angular_impulse: Array
     ik_status: tuple["IkStatus | None", ...]
 
 

@@ -48,22 +48,30 @@ class NativeFunction:
     Arguments are addresses of arrays, or whole numbers. The GIL is not released.
     """
 
-    def __init__(self, library: Path, name: str, kinds: Sequence[type]) -> None:
+    def __init__(self, library: Path, name: str, kinds: Sequence[type], other: Path | None = None) -> None:
         """Load the library; raises ConfigurationError if it has no such function.
 
-        ``kinds`` are the types of the arguments before the work space: ``ctypes.c_void_p`` or ``c_long``.
+        ``kinds`` are the types of the arguments before the work space: ``ctypes.c_void_p`` or ``c_long``. The
+        work space is enough for functions of an ``other`` library too, whose addresses may be passed on.
         """
         self._call = _loaded(library, name)
         self._call.argtypes = [*kinds, ctypes.c_void_p]
         self._call.restype = ctypes.c_long
-        size = ctypes.c_longlong.in_dll(ctypes.PyDLL(str(library)), WORK_SIZE).value
-        self._kept = np.zeros(size)
+        sizes = [ctypes.c_longlong.in_dll(_opened(path), WORK_SIZE) for path in (library, other or library)]
+        self._kept = np.zeros(max(size.value for size in sizes))
         self._work = self._kept.ctypes.data
 
     def __call__(self, *arguments: int | None) -> int:
         """Call the function; what it returns means nothing where it is void."""
         found: int = self._call(*arguments, self._work)
         return found
+
+
+def address_of(library: Path, name: str) -> int:
+    """Return where a function of a library is, to be passed on; raises ConfigurationError."""
+    address = ctypes.cast(_loaded(library, name), ctypes.c_void_p).value
+    assert address is not None
+    return address
 
 
 def _loaded(library: Path, name: str) -> Any:

@@ -3,6 +3,8 @@
 COMPUTED_TORQUE, PREPARED_TORQUE = "sms_computed_torque", "sms_prepared_torque"
 TOOLS, TOOL_JACOBIANS = "sms_tools", "sms_tool_jacobians"
 MOTION, CONSERVED = "sms_motion", "sms_conserved"
+INERTIA, FACTORS, HELD = "sms_inertia", "sms_factors", "sms_held"
+OBSERVE, RESISTED_STEP, SETTLE = "sms_observe", "sms_resisted_step", "sms_settle"
 TICKS, WORK_SIZE = "sms_ticks", "sms_work_size"  # the loop, and the numbers that it needs room for
 
 
@@ -17,6 +19,11 @@ def rest_name(scheme: str) -> str:
 def loaded_name(arm: int) -> str:
     """Return the name of the law's function where truth and model differ in what an arm carries alone."""
     return f"sms_loaded_torque_{arm}"
+
+
+def held_name(scheme: str) -> str:
+    """Return the name of the function that steps by a scheme from the acceleration of its first stage on."""
+    return f"sms_held_{scheme}"
 
 
 def step_name(scheme: str) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from sms_handover.compiled.c_function import NativeFunction
+from sms_handover.compiled.effects import GIVEN
 from sms_handover.compiled.inverse_kinematics import STATUSES, ik_settings
 from sms_handover.compiled.kinematics import (
     CONSERVED_SIZE,
@@ -49,7 +50,8 @@ class CompiledPeriods:
         self._layout = _period(n, arms)
         pointer, number = ctypes.c_void_p, ctypes.c_long
         kinds = (pointer, number, *[pointer] * 5, number, number)
-        self._call = NativeFunction(dynamics_library(known), PERIODS, kinds)
+        libraries = dynamics_library(known), dynamics_library(ticks.plant.robot)
+        self._call = NativeFunction(libraries[0], PERIODS, kinds, libraries[1])
 
     def run(
         self,
@@ -72,7 +74,7 @@ class CompiledPeriods:
         periods, progress = np.zeros(count, self._layout), np.ascontiguousarray(course.progress)
         ticks = self._ticks
         rows = (room or ticks.room)(count * self._per_period)
-        ticks.take_over()
+        ticks.take_over(count * self._per_period)
         given = tuple(array.ctypes.data for array in (self._settings, quiet, progress, periods, rows))
         done = self._call(*ticks.address, *given, count, self._per_period)
         steps = done * self._per_period
@@ -106,6 +108,7 @@ class CompiledPeriods:
     def _rows(self, periods: Any, ticks: TickRows) -> PeriodRows:
         """Return periods by name."""
         plant, conserved = self._ticks.plant, periods["conserved"]
+        resisted = plant.effects is not None
         if isinstance(plant.deputy_body, RigidDeputy) and not plant.deputy_body.holder:
             for sums in conserved:
                 sums[:] = sums_of(plant.with_deputy(quantities_of(np.array(sums))))
@@ -121,8 +124,10 @@ class CompiledPeriods:
             angular_momentum=conserved[:, 3:6],
             kinetic_energy=conserved[:, 9],
             work=periods["work"],
-            external_work=np.full(len(periods), plant.external_work),
-            lost=np.full(len(periods), plant.losses),
+            external_work=periods["given"][:, 6] if resisted else np.full(len(periods), plant.external_work),
+            lost=periods["lost"] if resisted else np.full(len(periods), plant.losses),
+            linear_impulse=periods["given"][:, :3],
+            angular_impulse=periods["given"][:, 3:6],
             ik_status=tuple(None if k < 0 else STATUSES[k] for k in periods["status"].astype(int).tolist()),
         )
 
@@ -147,6 +152,8 @@ def _period(joints: int, arms: int) -> Any:
         "deputy_twist": TWIST,
         "conserved": CONSERVED_SIZE,
         "work": (),
+        "lost": (),
+        "given": GIVEN,
         "status": (),
     }
     return np.dtype([(name, "f8", shape) for name, shape in reals.items()])

@@ -57,7 +57,7 @@ class RigidBodies:
         A base at rest would need the wrench f_b; without it the base accelerates by a_b = -H_b^-1 f_b, and
         u = H_m q_m'' + c_m + H_mb a_b. H and c are those of :meth:`acceleration`, so that both share them.
         """
-        matrix, wanted = self._inertia_matrix(), _elements(joint_acceleration)
+        matrix, wanted = self.inertia_matrix(), _elements(joint_acceleration)
         forces = _elements(self.bias())
         for row, entries in enumerate(matrix):
             forces[row] = forces[row] + _product(entries[BASE_NV:], wanted)
@@ -67,7 +67,7 @@ class RigidBodies:
 
     def acceleration(self, force: Expression) -> Expression:
         """Return v' (6 + n,) under a wrench on the base and joint efforts (6 + n,), from H v' = f - c."""
-        return substituted(factored(self._inertia_matrix()), force - self.bias())
+        return substituted(factored(self.inertia_matrix()), force - self.bias())
 
     def bias(self) -> Expression:
         """Return c (6 + n,)."""
@@ -80,7 +80,7 @@ class RigidBodies:
 
     def inertia_factors(self) -> "Factors":
         """Return the factors of H."""
-        return factored(self._inertia_matrix())
+        return factored(self.inertia_matrix())
 
     def articulated_acceleration(self, force: Expression) -> Expression:
         """Return the same by the articulated-body algorithm, with fewer operations than by H.
@@ -134,7 +134,7 @@ class RigidBodies:
 
     def base_twists(self) -> list[Expression]:
         """Return -H_b^-1 H_bm by columns: the twist (6,) of the base per joint rate at zero momentum."""
-        matrix, factors = self._inertia_matrix(), factored(self._base_inertia())
+        matrix, factors = self.inertia_matrix(), factored(self._base_inertia())
         columns = zip(*(row[BASE_NV:] for row in matrix[:BASE_NV]), strict=True)
         return [substituted(factors, -ca.vertcat(*column)) for column in columns]
 
@@ -158,6 +158,17 @@ class RigidBodies:
             parent, passed = self._bodies[index].parent, self._passed_on(index, *momenta[index])
             momenta[parent] = (momenta[parent][0] + passed[0], momenta[parent][1] + passed[1])
         return momenta[0]
+
+    def as_one_body(self) -> Expression:
+        """Return mass, first moment (3), inertia xx xy xz yy yz zz about the origin, and momentum P (13,).
+
+        All in axes of the base, with joints locked; P is the linear momentum.
+        """
+        whole, matrix = self._composites[0], self.inertia_matrix()
+        v = [*_elements(ca.vertcat(*self._twists[0])), *self._rates]
+        momentum = [_product(matrix[row], v) for row in range(3)]
+        inertia = (whole.inertia[i, j] for i in range(3) for j in range(i, 3))
+        return ca.vertcat(whole.mass, whole.first_moment, *inertia, *momentum)
 
     def kinetic_energy(self) -> Expression:
         """Return the kinetic energy in J, with that of the rotors."""
@@ -252,7 +263,7 @@ class RigidBodies:
         matrix = ca.blockcat([[whole.mass * ca.SX.eye(3), -skew], [skew, whole.inertia]])
         return [_elements(matrix[row, :]) for row in range(BASE_NV)]
 
-    def _inertia_matrix(self) -> list[list[Expression]]:
+    def inertia_matrix(self) -> list[list[Expression]]:
         """Return H (6 + n, 6 + n) by composite rigid bodies; 0.0 where neither joint carries the other."""
         size = BASE_NV + len(self._bodies) - 1
         matrix: list[list[Expression]] = [[0.0] * size for _ in range(size)]
@@ -292,7 +303,7 @@ def factored(matrix: list[list[Expression]]) -> Factors:
     inverse = [0.0] * size
     for k in range(size - 1, -1, -1):
         inverse[k] = 1.0 / left[k][k]
-        linked = [j for j in range(k) if not _is_zero(left[k][j])]
+        linked = [j for j in range(k) if not is_zero(left[k][j])]
         for i in linked:
             lower[k][i] = left[k][i] * inverse[k]
             for j in linked:
@@ -319,12 +330,12 @@ def _product(row: Sequence[Expression], vector: Sequence[Expression]) -> Express
     """Return the sum of products, without those that are zero for every configuration."""
     total = ca.SX(0.0)
     for entry, value in zip(row, vector, strict=True):
-        if not _is_zero(entry):
+        if not is_zero(entry):
             total += entry * value
     return total
 
 
-def _is_zero(value: Expression) -> bool:
+def is_zero(value: Expression) -> bool:
     """Whether an entry is zero for every configuration."""
     return bool(ca.SX(value).is_zero())
 

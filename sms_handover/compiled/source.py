@@ -8,9 +8,17 @@ from typing import Any
 import casadi
 
 from sms_handover.compiled.kinematics_functions import kinematics_functions
-from sms_handover.compiled.names import COMPUTED_TORQUE, PREPARED_TORQUE, loaded_name, rest_name, step_name
+from sms_handover.compiled.names import (
+    COMPUTED_TORQUE,
+    PREPARED_TORQUE,
+    held_name,
+    loaded_name,
+    rest_name,
+    step_name,
+)
+from sms_handover.compiled.resisted_functions import ResistedFunctions
 from sms_handover.compiled.rigid_bodies import Factors, RigidBodies, substituted
-from sms_handover.compiled.step import Acceleration, step_function
+from sms_handover.compiled.step import Acceleration, held_step_function, step_function
 from sms_handover.compiled.tree import PER_BODY, Body, Tool
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV
 from sms_handover.plant.integrators import Tableau
@@ -18,10 +26,10 @@ from sms_handover.plant.integrators import Tableau
 ca: Any = casadi  # its type hints are incomplete
 
 _NATIVE = Path(__file__).parent / "native"
-# Each may use those before it.
 _NATIVE_FILES = (
-    "ticks",
     "poses",
+    "effects",
+    "ticks",
     "inverse_kinematics",
     "tool_motion",
     "periods",
@@ -33,25 +41,34 @@ def dynamics_source(bodies: Sequence[Body], tools: Sequence[Tool], schemes: Mapp
     joints = len(bodies) - 1
     by = _acceleration(bodies)
     angles, v = ca.SX.sym("angles", joints), ca.SX.sym("v", BASE_NV + joints)
+    numbers, known = _with_parameters(bodies)
+    resisted = ResistedFunctions(angles, v, numbers, known)
     functions = [
         *(step_function(step_name(n), by, scheme, joints, goes_on=False) for n, scheme in schemes.items()),
         *(step_function(rest_name(n), by, scheme, joints, goes_on=True) for n, scheme in schemes.items()),
         _computed_torque(bodies),
         _computed_torque(bodies, by),
         *(_loaded_torque(bodies, arm, tool.body) for arm, tool in enumerate(tools)),
-        *kinematics_functions(tools, angles, v, *with_parameters(bodies)),
+        *resisted.functions,
+        *(held_step_function(held_name(n), by, scheme, joints) for n, scheme in schemes.items()),
+        *kinematics_functions(tools, angles, v, numbers, known),
     ]
     generator = ca.CodeGenerator("dynamics", {"with_header": False})
     for function in functions:
         generator.add(function)
     definitions = {
         "N": joints,
-        "PARAMETERS": PER_BODY * len(bodies),
+        "NQ": BASE_NQ + joints,
+        "NV": BASE_NV + joints,
         "ARGUMENTS": max(max(function.sz_arg(), function.sz_res()) for function in functions),
         "WORK": max(1, *(function.sz_w() for function in functions)),
         "STEPS": f"{{{', '.join(map(step_name, schemes))}}}",
         "RESTS": f"{{{', '.join(map(rest_name, schemes))}}}",
         "KEPT": by.kept,
+        "HELD_STEPS": f"{{{', '.join(map(held_name, schemes))}}}",
+        "NUMBERS": resisted.numbers,
+        "FACTORS": resisted.factors,
+        "DIAGONAL": f"{{{', '.join(map(str, resisted.diagonal))}}}",
         "PER_BODY": PER_BODY,
         "LOADED": f"{{{', '.join(loaded_name(arm) for arm in range(len(tools)))}}}",
         "TOOL_BODIES": f"{{{', '.join(str(tool.body) for tool in tools)}}}",
@@ -62,7 +79,8 @@ def dynamics_source(bodies: Sequence[Body], tools: Sequence[Tool], schemes: Mapp
     }
     lines = [f"#define {name} {value}" for name, value in definitions.items()]
     native = [(_NATIVE / f"{name}.c").read_text(encoding="ascii") for name in _NATIVE_FILES]
-    return "\n".join((own_sine_cosine(), generator.dump(), *lines, *native))
+    exponential = (_NATIVE / "exponential.c").read_text(encoding="ascii")
+    return "\n".join((own_sine_cosine(), exponential, generator.dump(), *lines, *native))
 
 
 def own_sine_cosine() -> str:

@@ -54,14 +54,58 @@ def step_function(name: str, by: Acceleration, tableau: Tableau, joints: int, *,
             of_state = kept if goes_on else by.inertia(*turn, velocity, parameters)
             accelerations.append(by.first(of_state, force))
         velocities.append(velocity)
+    given = [q, v, force, parameters, h, *([kept] if goes_on else [])]
+    return ca.Function(name, given, _end(q, v, h, tableau, velocities, accelerations))
+
+
+def _end(q: Any, v: Any, h: Any, tableau: Tableau, velocities: list[Any], accelerations: list[Any]) -> Any:
+    """Return q and v at the end of a step, from those of its stages."""
     pose, angles = q[:BASE_NQ], q[BASE_NQ:]
     move = _move()
     for row in tableau.b:
         motion = h * _sum(row, velocities)
         pose, angles = move(pose, motion[:BASE_NV]), angles + motion[BASE_NV:]
     total = [sum(weights) for weights in zip(*tableau.b, strict=True)]
-    given = [q, v, force, parameters, h, *([kept] if goes_on else [])]
-    return ca.Function(name, given, [ca.vertcat(pose, angles), v + h * _sum(total, accelerations)])
+    return [ca.vertcat(pose, angles), v + h * _sum(total, accelerations)]
+
+
+def held_step_function(name: str, by: Acceleration, tableau: Tableau, joints: int) -> Any:
+    """Return (q, v, f, p, h, v') -> (q, v) after a step with the acceleration of its first stage given.
+
+    The wrench on the base of the force f (6 + n,) is given in axes of the base at the start, and held in
+    those of the world: at a stage it is exp(-theta) f by a series in the turn theta of the base, to order 4.
+    """
+    q, v = ca.MX.sym("q", BASE_NQ + joints), ca.MX.sym("v", BASE_NV + joints)
+    force, h = ca.MX.sym("f", BASE_NV + joints), ca.MX.sym("h")
+    parameters = ca.MX.sym("p", PER_BODY * (joints + 1))
+    first = ca.MX.sym("a", BASE_NV + joints)
+    turned_back = _turned_back()
+    velocities, accelerations, wrenches = [v], [first], [force[:BASE_NV]]
+    for row, origin in zip(tableau.a[1:], tableau.origins[1:], strict=True):
+        at = q[BASE_NQ:] + h * _sum(row, [velocity[BASE_NV:] for velocity in velocities])
+        velocity = v + h * _sum(row, accelerations)
+        before = (*tableau.a[origin], *[0.0] * len(row))
+        weights = [own - theirs for own, theirs in zip(row, before, strict=False)]
+        turn = h * _sum(weights, [velocity[3:BASE_NV] for velocity in velocities])
+        wrenches.append(turned_back(wrenches[origin], turn))
+        here = ca.vertcat(wrenches[-1], force[BASE_NV:])
+        accelerations.append(by.later(ca.cos(at), ca.sin(at), velocity, here, parameters))
+        velocities.append(velocity)
+    results = _end(q, v, h, tableau, velocities, accelerations)
+    return ca.Function(name, [q, v, force, parameters, h, first], results)
+
+
+def _turned_back() -> Any:
+    """Return (wrench, turn) -> the wrench (6,) in axes that have turned: exp(-theta) by its series."""
+    wrench, turn = ca.SX.sym("wrench", BASE_NV), ca.SX.sym("turn", 3)
+    found = []
+    for part in (wrench[:3], wrench[3:]):
+        term = total = part
+        for order in range(1, 5):
+            term = ca.cross(term, turn) / order
+            total = total + term
+        found.append(total)
+    return ca.Function("turned_back", [wrench, turn], [ca.cse(ca.vertcat(*found))])
 
 
 def _sum(weights: Any, values: list[Any]) -> Any:

@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from sms_handover.compiled.c_function import NativeFunction
+from sms_handover.compiled.c_function import NativeFunction, address_of
+from sms_handover.compiled.effects import TickEffects
 from sms_handover.compiled.library import dynamics_library
-from sms_handover.compiled.names import TICKS
+from sms_handover.compiled.names import COMPUTED_TORQUE, OBSERVE, TICKS
 from sms_handover.compiled.tree import PER_BODY, body_tree, inertial_parameters, tools_of
+from sms_handover.compiled.wrench_table import WrenchTable
 from sms_handover.control.compensation import CompensatedTorque
 from sms_handover.control.controller import JointController
 from sms_handover.control.nmpc import NmpcLaw
@@ -19,11 +21,20 @@ from sms_handover.control.protocol import Controller
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.plant.integrators import TABLEAUS
+from sms_handover.plant.sensed_plant import SensedPlant
 from sms_handover.types import Array, TickRows, frozen
 from sms_handover.units import ns_to_seconds
 
 _LAWS: Mapping[type, int] = MappingProxyType({NmpcLaw: 0, PidLaw: 1})  # as in native/ticks.c
 _UNBOUNDED_NS = -1  # in place of the longest age of a reference
+# Functions of the two libraries by their fields, and whether they are those of the model.
+_FUNCTIONS: Mapping[str, tuple[str, bool]] = MappingProxyType(
+    {
+        "law_of_model": (COMPUTED_TORQUE, True),
+        "ticks_of_truth": (TICKS, False),
+        "observe_truth": (OBSERVE, False),
+    }
+)
 _NO_ARM = -1  # in place of the number of the one in whose load truth and model differ
 
 
@@ -36,16 +47,27 @@ class CompiledTicks:
     """
 
     @staticmethod
-    def fits(plant: FreeFloatingPlant, controller: Controller, known: RobotModel) -> bool:
-        """Whether a controller is one of our joint laws, with a robot that has its joints where they are.
-
-        A law that compensates for what its model does not know is left to Python.
-        """
+    def obstacle(plant: FreeFloatingPlant, controller: Controller, known: RobotModel) -> str:
+        """Return what C does not have of plant, controller and robot as it is known, '' for nothing."""
         if not isinstance(controller, JointController) or type(controller.law) not in _LAWS:
-            return False
-        law = controller.law
-        compensates = isinstance(law, NmpcLaw) and isinstance(law.efforts, CompensatedTorque)
-        return not compensates and dynamics_library(known) == dynamics_library(plant.robot)
+            return "a law other than nmpc and pid"
+        if isinstance(controller.law, NmpcLaw) and isinstance(controller.law.efforts, CompensatedTorque):
+            return "a law that compensates for what its model does not know"
+        if isinstance(plant, SensedPlant):
+            return "sensors"
+        if plant.enforces_limits:
+            return "enforced joint limits"
+        if plant.effects and not WrenchTable.knows(plant.effects.resistance.wrenches):
+            return "a wrench of this kind"
+        if plant.effects and plant.effects.on_deputy:
+            return "wrenches on the deputy"
+        if any(plant.base_wrenches):
+            return "wrenches from a topic"
+        if plant.robot.description.flexible_panels:
+            return "panels that swing"
+        if (known.joint_names, known.arms) != (plant.robot.joint_names, plant.robot.arms):
+            return "a model with other joints than the truth"
+        return ""
 
     def __init__(
         self, plant: FreeFloatingPlant, controller: Controller, known: RobotModel, scheme: str, tick_ns: int
@@ -69,9 +91,16 @@ class CompiledTicks:
         }
         for name, value in constant.items():
             self._at[name][...] = value
+        effects = plant.effects
+        self._effects = TickEffects(effects, true.n_joints, tick_ns) if effects else None
+        self._at["effects"][...] = self._effects.address if self._effects else 0
         pointer, number = ctypes.c_void_p, ctypes.c_long
         kinds = (pointer, number, pointer, number, number)
-        self._call = NativeFunction(dynamics_library(true), TICKS, kinds)
+        libraries = dynamics_library(true), dynamics_library(known)
+        self._call = NativeFunction(libraries[0], TICKS, kinds, libraries[1])
+        self._apart = libraries[0] != libraries[1]
+        for name, (function, of_model) in _FUNCTIONS.items():
+            self._at[name][...] = address_of(libraries[of_model], function)
         self._tool_bodies = [tool.body for tool in tools_of(true)]
         self._use(true, known)
         n = true.n_joints
@@ -81,17 +110,19 @@ class CompiledTicks:
         """Carry out ``ticks`` ticks, of which the first ``steps`` are integrated."""
         plant, first_ns, rows = self.plant, self.plant.stamp_ns, self.room(ticks)
         done = 1 if plant.jumps or self._controller.has_news else 0
-        if done:
-            self._by_python(rows[0], integrated=steps > 0)
+        if plant.external_impulse and plant.companion and not plant.deputy_body.rests:
+            done = ticks  # what floats beside the robot moves the centre that angular impulse is about
+        for tick in range(done):
+            self._by_python(rows[tick], integrated=tick < steps)
         if done < ticks:
             left = steps - done
-            self.take_over()
+            self.take_over(left)
             self._call(*self.address, rows[done:].ctypes.data, ticks - done, left)
             self.give_back(left)
         return self.rows_of(rows, first_ns)
 
     def _by_python(self, row: Array, *, integrated: bool) -> None:
-        """Carry out a tick in which a payload changes."""
+        """Carry out a tick in which a payload changes, or one that C has not."""
         plant = self.plant
         effort = self._controller.effort(plant.stamp_ns, plant.q, plant.v)
         np.concatenate((plant.q, plant.v, plant.joint_effort, effort), out=row)
@@ -102,8 +133,14 @@ class CompiledTicks:
         """Pass on the inertial parameters of the robot in truth, and as it is known."""
         self._robots = true, known
         ours, theirs = (inertial_parameters(body_tree(robot)) for robot in (true, known))
-        self._at["true_parameters"][:], self._at["known_parameters"][:] = ours, theirs
+        self._parameters = ours, theirs
+        self._at["true_parameters"][...], self._at["known_parameters"][...] = (
+            ours.ctypes.data,
+            theirs.ctypes.data,
+        )
         different = np.flatnonzero(np.any((ours != theirs).reshape(-1, PER_BODY), axis=1)).tolist()
+        if self._apart:
+            different = list(range(len(ours)))
         self._at["one_robot"][...] = not different
         arms = [arm for arm, body in enumerate(self._tool_bodies) if [body] == different]
         self._at["loaded"][...] = arms[0] if arms else _NO_ARM
@@ -124,8 +161,8 @@ class CompiledTicks:
         stamps = np.arange(first_ns, first_ns + len(rows) * tick_ns, tick_ns)
         return TickRows(stamps, rows[:, :nq], rows[:, nq:nv], rows[:, nv:acted], rows[:, acted:])
 
-    def take_over(self) -> None:
-        """Take the state of plant and controller."""
+    def take_over(self, steps: int) -> None:
+        """Take the state of plant and controller, of which ``steps`` ticks are to be integrated."""
         plant, controller, at = self.plant, self._controller, self._at
         controller.heed_news(plant.stamp_ns)
         law, track, robots = controller.law, controller.track, (plant.loaded_robot, controller.robot)
@@ -142,26 +179,29 @@ class CompiledTicks:
         elif isinstance(law, NmpcLaw):
             at["gains"][:2] = law.feedback[:, 0]
         at["saturated"][:] = 0
+        if self._effects:
+            self._effects.take_over(plant.tick, steps, plant.losses, plant.companion)
 
     def give_back(self, steps: int) -> None:
         """Give plant and controller the state that the ticks have led to."""
         plant, law, at = self.plant, self._controller.law, self._at
         q, v, effort = (frozen(at[name].copy()) for name in ("q", "v", "effort"))
-        plant.adopt(steps, q, v, effort, float(at["work"]), at["saturated"])
+        losses = self._effects.give_back() if self._effects else plant.losses
+        plant.adopt(steps, q, v, effort, float(at["work"]), losses, at["saturated"])
         if isinstance(law, PidLaw):
             law.restore(at["integral"])
 
 
 def _layout(joints: int) -> np.dtype[Any]:
     """Return the fields of ``ticks_t`` in native/ticks.c."""
-    nq, nv, parameters = BASE_NQ + joints, BASE_NV + joints, PER_BODY * (joints + 1)
+    nq, nv = BASE_NQ + joints, BASE_NV + joints
     reals = {
         **{"q": nq, "v": nv, "effort": joints, "motion": (3, joints), "gains": 3, "integral": joints},
         **{"limit": joints, "true_limit": joints, "tick_s": (), "work": ()},
-        **{"true_parameters": parameters, "known_parameters": parameters},
     }
     names = ("stamp_ns", "reference_ns", "longest_ns", "tick_ns", "law", "one_robot", "loaded")
-    counts = {name: () for name in names}
+    pointers = ("true_parameters", "known_parameters", "effects", *_FUNCTIONS)
+    counts = {name: () for name in (*names, *pointers)}
     fields: list[tuple[str, str, Any]] = [(name, "f8", shape) for name, shape in reals.items()]
     fields += [(name, "i8", shape) for name, shape in counts.items()]
     return np.dtype([*fields, ("saturated", "i8", joints)])

@@ -1,5 +1,6 @@
 """Random streams: one for each model, which no other model, law, worker or wall clock moves."""
 
+from collections.abc import Iterable, Iterator
 from hashlib import sha256
 
 import numpy as np
@@ -58,6 +59,28 @@ class TickNoise:
         self._draw(tick)
         row: Array = self._uniform[tick % _BLOCK]
         return row
+
+    def normals(self, first: int, ticks: int) -> Array:
+        """Return the standard normal numbers (ticks, size) of ticks from a first one on."""
+        return self._joined(self._normal[rows] for rows in self._blocks(first, ticks))
+
+    def uniforms(self, first: int, ticks: int) -> Array:
+        """Return the numbers (ticks, size) in [0, 1) of ticks from a first one on."""
+        return self._joined(self._uniform[rows] for rows in self._blocks(first, ticks))
+
+    def _joined(self, parts: Iterable[Array]) -> Array:
+        """Return the rows of some blocks as one array."""
+        return np.concatenate([np.empty((0, self._size)), *parts])
+
+    def _blocks(self, first: int, ticks: int) -> Iterator[slice]:
+        """Draw the blocks of some ticks one after the other, and yield which rows of each are theirs."""
+        tick, end = first, first + ticks
+        while tick < end:
+            self._draw(tick)
+            start = tick % _BLOCK
+            stop = min(_BLOCK, start + end - tick)
+            yield slice(start, stop)
+            tick += stop - start
 
     def _draw(self, tick: int) -> None:
         """Draw the block of a tick, unless it is there."""

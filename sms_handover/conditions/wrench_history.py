@@ -35,7 +35,10 @@ class WrenchHistory:
 
     def over(self, start_s: float, tick_s: float, body: BodyAtInstant) -> Wrench:
         """Return the wrench over a tick."""
-        middle_s = start_s + 0.5 * tick_s
-        times = self.rows[:, 0]
-        row = np.array([np.interp(middle_s, times, c, left=0.0, right=0.0) for c in self.rows.T[1:]])
+        (row,) = self.at(np.array([start_s + 0.5 * tick_s]))
         return at_point(row[:3], row[3:], _CENTRE, body.rotation if self.axes == BODY else _UPRIGHT)
+
+    def at(self, times_s: Array) -> Array:
+        """Return forces and torques (k, 6) at some times (k,)."""
+        times, columns = self.rows[:, 0], self.rows.T[1:]
+        return np.column_stack([np.interp(times_s, times, c, left=0.0, right=0.0) for c in columns])

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from sms_handover.conditions.random_streams import RandomStreams, TickNoise
 from sms_handover.types import Array, freeze, read_only
@@ -38,10 +39,20 @@ class CommandPath:
         """Go back to the start of a run."""
         self.state = CommandsOnTheWay((self._rest,) * self._delay, self._rest)
 
+    def losses(self, first: int, ticks: int) -> npt.NDArray[np.bool_]:
+        """Return whether the commands (ticks,) of some ticks from a first one on get lost."""
+        if not self._dropped:
+            return np.zeros(ticks, dtype=np.bool_)
+        return self._losses.uniforms(first, ticks)[:, 0] < self._dropped
+
+    def hold(self, waiting: Array, held: Array) -> None:
+        """Go on with commands on their way (delay, n), the oldest first, and that which the motors have."""
+        self.state = CommandsOnTheWay(tuple(map(read_only, waiting)), held)
+
     def arriving(self, tick: int, command: Array) -> Array:
         """Send the command (n,) N m of a tick, and return what the motors have in it."""
         line = (*self.state.waiting, command)
-        lost = bool(self._losses.uniform(tick)[0] < self._dropped)
+        lost = bool(self.losses(tick, 1)[0])
         held = self.state.held if lost else line[0]
         self.state = CommandsOnTheWay(line[1:], held)
         return held

@@ -1,5 +1,6 @@
 """Conditioned stepper: steps of the robot under friction and under wrenches from outside."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -8,6 +9,7 @@ import numpy as np
 from sms_handover.conditions.wrench import WrenchModel
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.external_wrenches import (
+    NO_FORCE,
     Acting,
     Companion,
     ExternalAccount,
@@ -19,8 +21,7 @@ from sms_handover.plant.joint_friction import JointFriction
 from sms_handover.plant.outside_wrenches import OutsideWrenches
 from sms_handover.plant.stepper import Stepper
 from sms_handover.types import Array, BaseWrench, frozen
-
-_NO_FORCE = np.zeros(3)  # N
+from sms_handover.units import ns_to_seconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,12 +33,32 @@ class Resistance:
     deputy_wrenches: Sequence[WrenchModel] = ()
 
 
-class ConditionedStepper:
+class ResistedStepper(ABC):
+    """Steps in which something acts beside the motors, and what came of the latest one."""
+
+    @abstractmethod
+    def begin(self, start_ns: int, asked: BaseWrench | None = None) -> None:
+        """Tell when the next step begins, and which wrench on the base others ask for in it."""
+
+    @abstractmethod
+    def step(self, q: Array, v: Array, effort: Array) -> tuple[Array, Array]:
+        """Return q (7 + n,) and v (6 + n,) after a step under joint efforts (n,), as read-only arrays."""
+
+    @property
+    @abstractmethod
+    def lost(self) -> float:
+        """Energy in J that friction has taken in the latest step: -tau . dq, exact as tau is held."""
+
+    @abstractmethod
+    def given(self, before: ExternalAccount, companion: Companion | None = None) -> ExternalAccount:
+        """Return an account of what wrenches have given, after the latest step."""
+
+
+class ConditionedStepper(ResistedStepper):
     """Steps of ``h`` s by another stepper, with friction torques held over the step, and wrenches.
 
     Under wrenches the step is that of :class:`~sms_handover.plant.external_wrenches.WrenchStepper`. Of the
-    latest step it knows what friction has taken and what the wrenches have given. ``start_s`` is the time at
-    which the next step begins, ``asked`` the wrench on the base that others ask for in it. Not thread-safe.
+    latest step it knows what friction has taken and what the wrenches have given. Not thread-safe.
     """
 
     def __init__(
@@ -49,11 +70,15 @@ class ConditionedStepper:
             robot.pin, robot.data, tableau, h, self._outside.held, robot.springs
         )
         self._generalized = np.zeros(robot.pin.nv)
-        self.start_s = 0.0
-        self.asked: BaseWrench | None = None
+        self._start_s = 0.0
+        self._asked: BaseWrench | None = None
         self.acting: Acting | None = None
         self._start = self._end = (np.zeros(0), np.zeros(0))
         self._friction: Array | None = None
+
+    def begin(self, start_ns: int, asked: BaseWrench | None = None) -> None:
+        """Tell when the next step begins, and which wrench on the base others ask for in it."""
+        self._start_s, self._asked = ns_to_seconds(start_ns), asked
 
     def step(self, q: Array, v: Array, effort: Array) -> tuple[Array, Array]:
         """Return q (7 + n,) and v (6 + n,) after a step under joint efforts (n,), as read-only arrays."""
@@ -62,7 +87,7 @@ class ConditionedStepper:
         generalized[BASE_NV:] = effort
         if robot.springs:
             generalized[-len(robot.springs) :] = robot.springs.torque(q, v)
-        acting = self.acting = self._outside.over(self.start_s, q, v, self.asked)
+        acting = self.acting = self._outside.over(self._start_s, q, v, self._asked)
         if acting:
             generalized = under_wrench.forces(q, v, effort, acting)
         total, self._friction = effort, None
@@ -86,7 +111,7 @@ class ConditionedStepper:
     @property
     def as_companion(self) -> Companion:
         """The robot as the companion of a deputy that floats, as the latest step began."""
-        force = self.acting.force if self.acting else _NO_FORCE
+        force = self.acting.force if self.acting else NO_FORCE
         return companion_of(self._robot.pin, self._robot.data, self._start, force)
 
     def given(self, before: ExternalAccount, companion: Companion | None = None) -> ExternalAccount:

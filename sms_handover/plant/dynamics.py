@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from sms_handover.model.robot_model import RobotModel
+from sms_handover.plant.conditioned_stepper import Resistance, ResistedStepper
 from sms_handover.plant.integrators import Tableau
 from sms_handover.plant.kinematics import PinocchioKinematics, PlantKinematics
 from sms_handover.plant.stepper import PinocchioStepper, Stepper
@@ -11,10 +12,14 @@ from sms_handover.plant.stepper import PinocchioStepper, Stepper
 
 @dataclass(frozen=True, eq=False)
 class PlantDynamics:
-    """Stepper and kinematics of one robot."""
+    """Stepper and kinematics of one robot.
+
+    ``resisted`` makes steps under friction and wrenches where it can, and None where another stepper is to.
+    """
 
     stepper: Stepper
     kinematics: PlantKinematics
+    resisted: Callable[[Resistance], ResistedStepper | None] | None = None
 
 
 MakeDynamics = Callable[[RobotModel], PlantDynamics]

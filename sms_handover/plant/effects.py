@@ -2,18 +2,17 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from sms_handover.conditions.conditions import IDEAL, Conditions
 from sms_handover.conditions.fingerprint import fingerprint
 from sms_handover.conditions.joint_values import CommandErrors
 from sms_handover.conditions.random_streams import RandomStreams
 from sms_handover.errors import ConfigurationError
 from sms_handover.model.robot_model import RobotModel
+from sms_handover.plant.asked_stepper import AskedStepper
 from sms_handover.plant.command_path import CommandPath, CommandsOnTheWay
-from sms_handover.plant.conditioned_stepper import ConditionedStepper, Resistance
+from sms_handover.plant.conditioned_stepper import ConditionedStepper, Resistance, ResistedStepper
 from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics
-from sms_handover.plant.external_wrenches import NO_ACCOUNT, ExternalAccount, sum_over
+from sms_handover.plant.external_wrenches import NO_ACCOUNT, NO_FORCE, ExternalAccount, sum_over
 from sms_handover.plant.integrators import Tableau
 from sms_handover.plant.joint_friction import JointFriction
 from sms_handover.plant.motor_torque import MotorTorque
@@ -21,19 +20,19 @@ from sms_handover.plant.rigid_deputy import RigidDeputy
 from sms_handover.types import Array, BaseWrench
 from sms_handover.units import ns_to_seconds, seconds_to_ns
 
-_NO_FORCE = np.zeros(3)  # N
-
 
 @dataclass(frozen=True, eq=False)
 class EffectsState:
     """What the effects carry from tick to tick; their noise follows from seed and tick.
 
-    ``conditions`` is the fingerprint of those that they are of.
+    ``conditions`` is the fingerprint of those that they are of; ``was_asked`` tells whether a wrench that
+    others asked for has acted.
     """
 
     conditions: str
     commands: CommandsOnTheWay | None
     external: ExternalAccount
+    was_asked: bool = False
 
 
 class PlantEffects:
@@ -49,13 +48,13 @@ class PlantEffects:
         self._h = ns_to_seconds(tick_ns)
         self._delay = _in_ticks(conditions.command or CommandErrors(), tick_ns)
         friction = JointFriction(conditions.friction, self._h) if conditions.friction else None
-        self._on_deputy = tuple(conditions.deputy_wrenches.values())
-        self._resistance = Resistance(friction, tuple(conditions.wrenches.values()), self._on_deputy)
+        self.on_deputy = tuple(conditions.deputy_wrenches.values())
+        self.resistance = Resistance(friction, tuple(conditions.wrenches.values()), self.on_deputy)
         self.has_moved_deputy = False  # in the latest tick, by a wrench
         self._fingerprint = fingerprint(conditions)
-        self._stepper: ConditionedStepper | None = None
-        self._path: CommandPath | None = None
-        self._motor: MotorTorque | None = None
+        self._stepper: ResistedStepper | None = None
+        self.path: CommandPath | None = None
+        self.motor: MotorTorque | None = None
         self.external = NO_ACCOUNT
         self.asked: BaseWrench | None = None  # the wrench that was asked for in the latest tick
         self.seed(seed)
@@ -63,29 +62,29 @@ class PlantEffects:
     @property
     def given(self) -> ExternalAccount | None:
         """What wrenches from outside have given, None where conditions have none and none was asked for."""
-        has_any = self._resistance.wrenches or self._on_deputy or self.external is not NO_ACCOUNT
+        has_any = self.resistance.wrenches or self.on_deputy or self._was_asked
         return self.external if has_any else None
 
     def reset(self) -> None:
         """Go back to the start of a run."""
-        if self._path:
-            self._path.reset()
-        self.external, self.asked = NO_ACCOUNT, None
+        if self.path:
+            self.path.reset()
+        self.external, self.asked, self._was_asked = NO_ACCOUNT, None, False
 
     def seed(self, seed: int) -> None:
         """Let every random stream follow from a seed, from the start of a run on."""
         streams, conditions = RandomStreams(seed), self._conditions
         if conditions.command:
-            self._path = CommandPath(self._joints, self._delay, conditions.command.dropped, streams)
+            self.path = CommandPath(self._joints, self._delay, conditions.command.dropped, streams)
         if conditions.torque:
-            self._motor = MotorTorque(conditions.torque, self._h, streams)
+            self.motor = MotorTorque(conditions.torque, self._h, streams)
         self.reset()
 
     @property
     def state(self) -> EffectsState:
         """What the later motion depends on besides seed and tick."""
-        commands = self._path.state if self._path else None
-        return EffectsState(self._fingerprint, commands, self.external)
+        commands = self.path.state if self.path else None
+        return EffectsState(self._fingerprint, commands, self.external, self._was_asked)
 
     def restore(self, state: EffectsState | None) -> None:
         """Go back to a former :attr:`state`, None where there were no effects.
@@ -98,37 +97,42 @@ class PlantEffects:
                 "the snapshot is of a run under other conditions, must be of these: give --conditions and "
                 "-p conditions... as in its run"
             )
-        if self._path and state.commands:
-            self._path.state = state.commands
-        nothing = not (state.external.work or np.any(state.external.linear_impulse))
-        nothing = nothing and not np.any(state.external.angular_impulse)
-        self.external, self.asked = NO_ACCOUNT if nothing else state.external, None
+        if self.path and state.commands:
+            self.path.state = state.commands
+        self.external, self.asked, self._was_asked = state.external, None, state.was_asked
 
     def dynamics(self, inner: MakeDynamics, tableau: Tableau) -> MakeDynamics:
-        """Return what makes dynamics with these effects out of others."""
+        """Return what makes dynamics with these effects out of others.
+
+        C takes the ticks of friction and wrenches on the base where it can, but for those in which others
+        ask for a wrench.
+        """
+        known_to_c = bool(self.resistance.friction or self.resistance.wrenches) and not self.on_deputy
 
         def make(robot: RobotModel) -> PlantDynamics:
             bare = inner(robot)
-            resistance, values = self._resistance, self._conditions.friction
+            resistance, values = self.resistance, self._conditions.friction
             if robot.springs and values:
                 friction = JointFriction(values.with_free(len(robot.springs)), self._h)
                 resistance = replace(resistance, friction=friction)
-            stepper = ConditionedStepper(robot, resistance, bare.stepper, tableau, self._h)
-            return PlantDynamics(stepper, bare.kinematics)
+            ours = ConditionedStepper(robot, resistance, bare.stepper, tableau, self._h)
+            in_c = bare.resisted(resistance) if bare.resisted and known_to_c else None
+            return PlantDynamics(AskedStepper(in_c, ours) if in_c else ours, bare.kinematics)
 
         return make
 
     def torque(self, tick: int, command: Array) -> Array:
         """Return the torques (n,) N m of the motors in a tick in which a command is given."""
-        arrived = self._path.arriving(tick, command) if self._path else command
-        return self._motor.given(tick, arrived) if self._motor else arrived
+        arrived = self.path.arriving(tick, command) if self.path else command
+        return self.motor.given(tick, arrived) if self.motor else arrived
 
     def begins(self, tick: int, stepper: object, asked: BaseWrench | None) -> None:
         """Tell the stepper of the tick when it begins, and what wrench on the base is asked for in it."""
-        self._stepper = stepper if isinstance(stepper, ConditionedStepper) else None
+        self._stepper = stepper if isinstance(stepper, ResistedStepper) else None
         self.asked, self._start_s = asked, ns_to_seconds(tick * self._tick_ns)
+        self._was_asked = self._was_asked or asked is not None
         if self._stepper:
-            self._stepper.start_s, self._stepper.asked = self._start_s, asked
+            self._stepper.begin(tick * self._tick_ns, asked)
 
     def settle(self, deputy: RigidDeputy | None) -> float:
         """Book what wrenches have given in the tick, and return what friction has taken, in J.
@@ -138,12 +142,12 @@ class PlantEffects:
         if self._stepper is None:
             return 0.0
         pushed = None
-        if deputy and self._on_deputy:
-            pushed = sum_over(self._on_deputy, self._start_s, self._h, deputy.body)
-        beside = deputy.as_companion(_NO_FORCE if pushed is None else pushed.force) if deputy else None
+        if deputy and self.on_deputy:
+            pushed = sum_over(self.on_deputy, self._start_s, self._h, deputy.body)
+        beside = deputy.as_companion(NO_FORCE if pushed is None else pushed.force) if deputy else None
         self.external = self._stepper.given(self.external, beside)
         self.has_moved_deputy = bool(pushed)
-        if deputy and pushed:
+        if deputy and pushed and isinstance(self._stepper, ConditionedStepper):
             self.external = deputy.drift_under(pushed, self.external, self._stepper.as_companion)
         return self._stepper.lost
 

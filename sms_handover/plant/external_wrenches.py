@@ -13,7 +13,7 @@ from sms_handover.plant.held_body import HeldBody, LeverArm
 from sms_handover.plant.integrators import LieGroupIntegrator, Tableau
 from sms_handover.types import Array, freeze
 
-_NOTHING = np.zeros(3)
+NO_FORCE = np.zeros(3)  # N
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Companion:
         return self.centre + after * (self.velocity + 0.5 * gained), self.velocity + gained
 
 
-NO_ACCOUNT = ExternalAccount(_NOTHING, _NOTHING, 0.0)
+NO_ACCOUNT = ExternalAccount(NO_FORCE, NO_FORCE, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ def companion_of(model: pin.Model, data: pin.Data, at: tuple[Array, Array], forc
 
 def sum_over(models: Sequence[WrenchModel], start_s: float, tick_s: float, body: BodyAtInstant) -> Wrench:
     """Return the sum of some wrenches over a tick, in their order."""
-    force, torque = _NOTHING, _NOTHING
+    force, torque = NO_FORCE, NO_FORCE
     for model in models:
         wrench = model.over(start_s, tick_s, body)
         force, torque = force + wrench.force, torque + wrench.torque

@@ -18,7 +18,7 @@ from sms_handover.plant.deputy import MasslessDeputy
 from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics, pinocchio_dynamics
 from sms_handover.plant.effects import PlantEffects
 from sms_handover.plant.enforced_limits import EnforcedLimits
-from sms_handover.plant.external_wrenches import ExternalAccount
+from sms_handover.plant.external_wrenches import NO_FORCE, Companion, ExternalAccount
 from sms_handover.plant.grasping import execute_grasp
 from sms_handover.plant.integrators import TABLEAUS
 from sms_handover.plant.joint_limits import ENFORCE, JointLimitWatch, require_start_within_limits
@@ -205,9 +205,14 @@ class FreeFloatingPlant:
         return self._effects.external.work if self._effects else 0.0
 
     @property
-    def is_ideal(self) -> bool:
-        """Whether the conditions are ideal, and only motors move joints: commands are the efforts."""
-        return self._effects is None and self._robot.springs is None
+    def enforces_limits(self) -> bool:
+        """Whether joints are kept within their limits."""
+        return self._enforces
+
+    @property
+    def effects(self) -> PlantEffects | None:
+        """The effects of conditions that are not ideal, which compiled ticks take over and give back."""
+        return self._effects
 
     @property
     def external_impulse(self) -> ExternalAccount | None:
@@ -335,13 +340,21 @@ class FreeFloatingPlant:
         return self._effects.asked if self._effects else None
 
     def adopt(
-        self, steps: int, q: Array, v: Array, joint_effort: Array, work: float, saturated: Counts
+        self,
+        steps: int,
+        q: Array,
+        v: Array,
+        joint_effort: Array,
+        work: float,
+        losses: float,
+        saturated: Counts,
     ) -> None:
-        """Take over the state that ``steps`` ticks have led to elsewhere, with the work since the start.
+        """Take over what ``steps`` ticks have led to elsewhere, with work and losses since the start.
 
         The arrays are read-only; ``saturated`` (n,) has the ticks of each joint at its effort limit.
         """
         self.tick += steps
+        self._losses = losses
         self._use_state(q, v)
         self.joint_effort, self._work = joint_effort, work
         self._saturated_ticks += saturated
@@ -388,6 +401,11 @@ class FreeFloatingPlant:
         angle, rate = self._q[BASE_NQ + n :], self._v[BASE_NV + n :]
         torque = springs.torque(self._q, self._v)
         return PanelState(angle, rate, torque, float(springs.energy(angle)))
+
+    @property
+    def companion(self) -> Companion | None:
+        """The deputy where it floats and has mass."""
+        return self._floating.as_companion(NO_FORCE) if self._floating else None
 
     @property
     def _floating(self) -> RigidDeputy | None:

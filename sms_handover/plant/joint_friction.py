@@ -28,7 +28,7 @@ class JointFriction:
     """
 
     def __init__(self, values: FrictionValues, h: float) -> None:
-        self._values, self._h = values, h
+        self.values, self._h = values, h
         self._sticking = np.flatnonzero(values.stiction)  # joints with a part that does not vanish at rest
         self._diagonal = np.diag(values.viscous)
 
@@ -37,7 +37,7 @@ class JointFriction:
 
         ``generalized`` (6 + n,) are the wrench on the base, in its axes, and the torques that act beside it.
         """
-        values, at, rate = self._values, self._sticking, v[BASE_NV:]
+        values, at, rate = self.values, self._sticking, v[BASE_NV:]
         inertia, pushed = _reduced(robot, q, v, generalized)
         inertia /= self._h
         # w = M (x + H* w_0 / h + u - c*), with M^-1 = H* / h + f_v
@@ -54,7 +54,7 @@ class JointFriction:
 
     def _bound(self, rate: Array) -> Array:
         """Return what dry friction (n,) N m is at most, at rates (n,) rad/s at the start of a tick."""
-        values = self._values
+        values = self.values
         falling = np.exp(-np.square(rate / values.stribeck_speed))
         bound: Array = values.coulomb + (values.stiction - values.coulomb) * falling
         return bound

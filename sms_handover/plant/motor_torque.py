@@ -20,13 +20,20 @@ class MotorTorque:
     """
 
     def __init__(self, errors: TorqueErrors, h: float, streams: RandomStreams) -> None:
-        self._factor, self._offset = 1.0 + errors.gain, errors.offset
+        self.factor, self.offset, self.step = 1.0 + errors.gain, errors.offset, errors.step
         self._stepped = errors.step > 0.0
-        self._step = np.where(self._stepped, errors.step, 1.0)
+        self.divisor = np.where(self._stepped, errors.step, 1.0)
         self._sigma = errors.noise_density / sqrt(h)  # N m
         self._noise = streams.noise(_NAME, errors.gain.size)
+        self._noisy = bool(np.any(self._sigma))
 
     def given(self, tick: int, command: Array) -> Array:
         """Return the torques (n,) N m in a tick under a command (n,) N m."""
-        rounded = np.where(self._stepped, self._step * np.round(command / self._step), command)
-        return frozen(self._factor * rounded + self._offset + self._sigma * self._noise.normal(tick))
+        rounded = np.where(self._stepped, self.divisor * np.round(command / self.divisor), command)
+        return frozen(self.factor * rounded + self.offset + self.noise(tick, 1)[0])
+
+    def noise(self, first: int, ticks: int) -> Array:
+        """Return the noise (ticks, n) N m of some ticks from a first one on."""
+        if not self._noisy:
+            return np.zeros((ticks, self._sigma.size))
+        return self._sigma * self._noise.normals(first, ticks)

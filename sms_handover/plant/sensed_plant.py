@@ -40,11 +40,6 @@ class SensedPlant(FreeFloatingPlant):
         self._sensors, self.tick_ns = sensors, tick_ns
         super().__init__(robot, parameters, initial, tick_ns, make_dynamics, effects)
 
-    @property
-    def is_ideal(self) -> bool:
-        """False: sensors measure in every tick."""
-        return False
-
     def reset(self) -> None:
         """Go back to the initial state at time zero."""
         super().reset()

@@ -18,6 +18,7 @@ from sms_handover.types import BASE_NQ, BASE_NV, Array, BaseWrench, GraspEvent, 
 _BY_PERIOD = (
     *("reference_position", "reference_velocity", "deputy_pose", "deputy_twist"),
     *("linear_momentum", "angular_momentum", "kinetic_energy", "work", "external_work", "lost"),
+    *("linear_impulse", "angular_impulse"),
 )
 _NONE = np.zeros(3)  # [N s], [N m s]
 _NO_PANELS = np.zeros(0)
@@ -135,9 +136,7 @@ class RunRecorder:
         for name in _BY_PERIOD:
             self._periods[name].append(getattr(rows, name))
         self._periods["reference_ns"].append(rows.stamp_ns)
-        for name in ("linear_impulse", "angular_impulse"):  # in C nothing acts from outside
-            self._periods[name].append(np.zeros((len(rows.stamp_ns), 3)))
-        self._periods["elastic_energy"].append(np.zeros(len(rows.stamp_ns)))  # nor do panels swing
+        self._periods["elastic_energy"].append(np.zeros(len(rows.stamp_ns)))  # in C no panels swing
         for name in ("panel_position", "panel_velocity"):
             self._periods[name].append(np.zeros((len(rows.stamp_ns), 0)))
         status = [CONSTANTS[status] if status else _NOT_ASKED for status in rows.ik_status]

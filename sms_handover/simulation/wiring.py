@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,13 @@ import numpy as np
 from sms_handover.clearance.distances import ClearanceModel
 from sms_handover.clearance.monitor import ClearanceMonitor
 from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
+from sms_handover.compiled.effects import CompiledResistedStepper
 from sms_handover.compiled.inverse_kinematics import CompiledIk
 from sms_handover.compiled.kinematics import CompiledKinematics
 from sms_handover.compiled.linearisation import CompiledDerivatives
 from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.compiled.tool_motion import CompiledToolMotion
+from sms_handover.compiled.wrench_table import WrenchTable
 from sms_handover.conditions.conditions import IDEAL, Conditions
 from sms_handover.conditions.sensors.suite import SensorSuite
 from sms_handover.control.compensation import CompensatedTorque, Compensation
@@ -31,11 +34,11 @@ from sms_handover.ik.levenberg_marquardt import FindJoints, find_joints
 from sms_handover.ik.parameters import IkParameters
 from sms_handover.model.poses import se3_of
 from sms_handover.model.robot_model import RobotModel
+from sms_handover.plant.conditioned_stepper import Resistance, ResistedStepper
 from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics, pinocchio_dynamics
 from sms_handover.plant.effects import PlantEffects
 from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.plant.integrators import TABLEAUS, Tableau
-from sms_handover.plant.joint_limits import ENFORCE
 from sms_handover.plant.parameters import PlantParameters
 from sms_handover.plant.plant_state import InitialState
 from sms_handover.plant.sensed_plant import SensedPlant
@@ -103,9 +106,20 @@ def make_dynamics(dynamics: str, tableau: Tableau, h: float) -> MakeDynamics:
     def make(robot: RobotModel) -> PlantDynamics:
         if robot.springs:  # C knows of no springs
             return by_pinocchio(robot)
-        return PlantDynamics(CompiledStepper(robot, tableau, h), CompiledKinematics(robot))
+        resisted = partial(_resisted_stepper, robot, tableau, seconds_to_ns(h))
+        return PlantDynamics(CompiledStepper(robot, tableau, h), CompiledKinematics(robot), resisted)
 
     return make
+
+
+def _resisted_stepper(
+    robot: RobotModel, tableau: Tableau, tick_ns: int, resistance: Resistance
+) -> ResistedStepper | None:
+    """Return compiled steps under friction and wrenches, None where C does not have one of these."""
+    if not WrenchTable.knows(resistance.wrenches):
+        _say_once("steps under wrenches are Pinocchio's: C does not have one of their kinds")
+        return None
+    return CompiledResistedStepper(robot, resistance, tableau, tick_ns)
 
 
 def make_generator(
@@ -236,15 +250,17 @@ def make_runner(
     by_python = PythonRunner(plant, controller, uses_measurements=common.uses_measurements)
     if common.dynamics != COMPILED:
         return by_python
-    has_all = parameters.joint_limits != ENFORCE and plant.is_ideal
-    if not has_all or not CompiledTicks.fits(plant, controller, known):
-        _LOG.warning(
-            "ticks are carried out by Python: C has only laws nmpc and pid without compensation, joints that "
-            "are alike in truth and model, limits that are not enforced, panels that are locked, and ideal "
-            "conditions"
-        )
+    obstacle = CompiledTicks.obstacle(plant, controller, known)
+    if obstacle:
+        _say_once(f"ticks are carried out by Python: C does not have {obstacle}")
         return by_python
     return CompiledTicks(plant, controller, known, parameters.integrator, common.tick_ns)
+
+
+@cache
+def _say_once(text: str) -> None:
+    """Warn once in a process, however many loops it makes."""
+    _LOG.warning(text)
 
 
 def longest_reference_ns(common: CommonParameters, parameters: ControllerParameters) -> int:

@@ -113,10 +113,10 @@ def test_one_effect_moves_no_draw_of_another() -> None:
         found["model_error.links"] = [link.inertia.com for arm in robot.arms for link in arm.links]
         found["model_error.mounts"] = [arm.mount.rpy for arm in robot.arms]
         effects = loop._plant._effects
-        if effects and effects._motor:
-            found["torque.noise_density"] = [effects._motor._noise.normal(k).tolist() for k in range(5)]
-        if effects and effects._path:
-            found["command.dropped"] = [effects._path._losses.uniform(k).tolist() for k in range(5)]
+        if effects and effects.motor:
+            found["torque.noise_density"] = [effects.motor._noise.normal(k).tolist() for k in range(5)]
+        if effects and effects.path:
+            found["command.dropped"] = [effects.path._losses.uniform(k).tolist() for k in range(5)]
         if isinstance(loop._plant, SensedPlant):
             for name, sensor in loop._plant._sensors._sensors.items():
                 if hasattr(sensor, "_noise"):

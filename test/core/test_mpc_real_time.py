@@ -19,6 +19,8 @@ from sms_handover.control.mpc.plan_problem import PlanProblem
 from sms_handover.control.mpc.plan_queue import PlanQueue
 from sms_handover.control.mpc.plan_solver import PlanSolver
 from sms_handover.control.mpc.planner import Step
+from sms_handover.control.mpc.real_time import MpcInRealTime
+from sms_handover.errors import NoPlanError
 from sms_handover.plan_report import PlanReport, PlanStatus
 from sms_handover.simulation import loop as loop_module
 from sms_handover.simulation import wiring
@@ -159,6 +161,19 @@ def test_without_plans_the_arms_brake_and_an_old_plan_is_not_used(in_real_time: 
     assert (np.abs(live.efforts) <= robot.effort_limit).all()
     assert live.reports[-1].status is PlanStatus.SOLVED and live.reports[-1].late_plans == 1
     assert fastest[-1] > 0.01
+
+
+def test_without_a_solver_the_law_ends_once_the_arms_are_at_rest(in_real_time: Start) -> None:
+    """In one line that says how the solver ended."""
+    loop = in_real_time(lambda number: 1_000_000 if number > 6 else 10)
+    before, controller = Followed(loop, 130), loop.controller
+    assert isinstance(controller, MpcInRealTime) and np.abs(before.rates[-1]).max() > 0.1
+    remote, trouble = controller._remote, "the solver process was ended by SIGKILL"
+    assert isinstance(remote, Delayed)
+    remote.trouble = trouble
+    with pytest.raises(NoPlanError, match=rf"no plan .* at rest at .* s: {trouble}"):
+        Followed(loop, 2000)
+    assert np.abs(loop.state.joint_velocity).max() < 1e-4
 
 
 _PARENT = """

@@ -44,7 +44,7 @@ def _moved(
     stepper = ConditionedStepper(robot, Resistance(None, models), inner, TABLEAUS["rk4"], tick)
     (q, v), account = start, NO_ACCOUNT
     for k in range(ticks):
-        stepper.start_s = k * tick
+        stepper.begin(round(k * tick * 1e9))
         q, v = stepper.step(q, v, np.zeros(robot.n_joints))
         account = stepper.given(account)
     return q, v, account
@@ -165,7 +165,7 @@ def test_a_wrench_that_is_asked_for_acts_over_the_tick_of_its_stamp_alone() -> N
         given.append(0.0 if pushed.external_impulse is None else pushed.external_impulse.linear_impulse[0])
         assert (pushed.pushed is not None) == (tick == 3)
     assert given == [0.0] * 3 + [0.04] * 3
-    assert alone.is_ideal and not pushed.is_ideal
+    assert alone.effects is None and pushed.effects is not None
     with pytest.raises(MessageError, match=r"stamped 0.005 s, but the run is at 0.006 s"):
         pushed.push(BaseWrench(5_000_000, WORLD, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
     with pytest.raises(MessageError, match="in frame 'tool', must be 'world' or 'base_link'"):
@@ -204,7 +204,7 @@ def test_a_snapshot_under_other_conditions_is_rejected() -> None:
 
 
 def test_a_wrench_on_a_deputy_without_mass_is_an_error_of_one_line() -> None:
-    wrench = {"conditions.wrenches.drag": {"on": "deputy", **_ON_DEPUTY["push"]}}
+    wrench: dict[str, Any] = {"conditions.wrenches.drag": {"on": "deputy", **_ON_DEPUTY["push"]}}
     with pytest.raises(ConfigurationError, match="drag acts on the deputy, whose mass is 0 kg"):
         load_scenario("smooth", wrench)
 

@@ -1107,7 +1107,7 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "torque without its errors",
         "plant/effects",
-        "self._motor.given(tick, arrived) if self._motor else arrived",
+        "self.motor.given(tick, arrived) if self.motor else arrived",
         "arrived",
         "conditions",
     ),

@@ -20,11 +20,14 @@ typedef struct {
 typedef struct {
   double reference[N], rates[N], targets[ARMS * POSE_ROW], tools[ARMS * POSE_ROW], deputy[POSE_ROW];
   double deputy_twist[TWIST];
-  double conserved[10], work, status;   /* as in compiled/kinematics_functions.py; J; -1: not asked */
+  double conserved[10], work;           /* as in compiled/kinematics_functions.py; J */
+  double lost, given[7], status;        /* as in effects_t, 0 without; -1: not asked */
 } period_t;
 
 /* Work out what the plant shows at the beginning of a period. */
-static void observe(const ticks_t *t, quiet_t *quiet, period_t *p, double *w) {
+void sms_observe(const ticks_t *t, void *of_periods, void *of_period, double *w) {
+  quiet_t *quiet = of_periods;
+  period_t *p = of_period;
   double twists[ARMS * TWIST];
   if (quiet->holder >= 0)
     sms_motion_rows(t->q, t->v, quiet->holder, quiet->in_tool, p->tools, twists, quiet->deputy,
@@ -37,6 +40,10 @@ static void observe(const ticks_t *t, quiet_t *quiet, period_t *p, double *w) {
   double *results[ARGUMENTS] = {p->conserved};
   sms_conserved(arguments, results, 0, w, 0);
   p->work = t->work;
+  if (t->effects) {
+    p->lost = t->effects->total_lost;
+    memcpy(p->given, t->effects->total_given, sizeof p->given);
+  }
 }
 
 /* Find targets, joints and rates of the reference, at a fraction of the motion and its rate. */
@@ -92,7 +99,7 @@ long sms_periods(ticks_t *t, long scheme, const ik_settings_t *settings, quiet_t
                  period_t *periods, double *rows, long count, long ticks, double *w) {
   for (long k = 0; k < count; k++, rows += ticks * (NQ + NV + 2 * N)) {
     period_t *p = periods + k;
-    observe(t, quiet, p, w);
+    t->observe_truth(t, quiet, p, w);
     refer(t, settings, quiet, p, progress[2 * k], progress[2 * k + 1], w);
     for (int j = 0; j < N; j++) {
       t->motion[0][j] = p->reference[j], t->motion[1][j] = p->rates[j];
@@ -100,7 +107,7 @@ long sms_periods(ticks_t *t, long scheme, const ik_settings_t *settings, quiet_t
       quiet->rates[j] = p->rates[j];
     }
     t->reference_ns = t->stamp_ns;
-    sms_ticks(t, scheme, rows, ticks, ticks, w);
+    t->ticks_of_truth(t, scheme, rows, ticks, ticks, w);
     if (quiet->most_failures > 0 && quiet->failures >= quiet->most_failures) return k + 1;
   }
   return count;

@@ -1,23 +1,17 @@
 /* Ticks: the loop of simulation/period_runner.py in C, with the same operations in the same order.
  *
  * Included behind the functions that CasADi has generated for a kind of robot, and behind the definitions of
- *   N           number of joints
- *   PARAMETERS  number of inertial parameters, PER_BODY for each body
+ *   N, NQ, NV   number of joints, and of entries of q and v
+ *   PER_BODY    number of inertial parameters of a body
  *   LOADED      functions of the law where truth and model differ in what an arm carries, by its number
  *   TOOL_BODIES bodies that have the tools
  *   ARGUMENTS   most pointers that a generated function needs room for
  * No operation may be fused or reordered (-ffp-contract=off), so that the two loops agree bit for bit.
  */
-#include <string.h>
-
-#define NQ (7 + N)
-#define NV (6 + N)
-#define NS_PER_S 1e9 /* [ns/s] */
-
 enum { LAW_NMPC = 0, LAW_PID = 1 };
 
 /* All fields have 8 bytes: Python sees them as one array (compiled/ticks.py has the same order). */
-typedef struct {
+typedef struct ticks {
   double q[NQ], v[NV], effort[N];       /* state, and the efforts that acted up to it */
   double motion[3][N];                  /* q_d rad, q_d' rad/s, q_d'' rad/s^2 at the last reference */
   double gains[3];                      /* nmpc: A_1, A_2; pid: K_P, K_I, K_D */
@@ -25,17 +19,15 @@ typedef struct {
   double limit[N];                      /* N m, of the joints as the law knows them */
   double true_limit[N];                 /* N m, of the joints as they are */
   double tick_s, work;                  /* s, J */
-  double true_parameters[PARAMETERS], known_parameters[PARAMETERS];
   long long stamp_ns, reference_ns, longest_ns, tick_ns, law;
   long long one_robot, loaded;          /* truth and model alike; but for what this arm carries, -1: for more */
+  const double *true_parameters, *known_parameters;
+  effects_t *effects;                   /* of conditions that are not ideal, or 0 */
+  function_t law_of_model;              /* what the law computes by the model, whose joints may be elsewhere */
+  void (*ticks_of_truth)(struct ticks *, long, double *, long, long, double *);
+  void (*observe_truth)(const struct ticks *, void *, void *, double *);
   long long saturated[N];
 } ticks_t;
-
-static double clipped(double value, double limit) {
-  if (value < -limit) return -limit;
-  if (value > limit) return limit;
-  return value; /* NaN too, as in NumPy */
-}
 
 static void desired_motion(const ticks_t *t, double (*desired)[N]) {
   long long age_ns = t->stamp_ns - t->reference_ns;
@@ -53,29 +45,29 @@ static void desired_motion(const ticks_t *t, double (*desired)[N]) {
   }
 }
 
-typedef int (*function_t)(const double **, double **, casadi_int *, double *, int);
-
 static double sign(double x) { return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : x; }
 
 /* Whether the law works out what the step keeps of its first stage. */
-static int is_prepared(const ticks_t *t) { return t->law == LAW_NMPC && (t->one_robot || t->loaded >= 0); }
+static int is_prepared(const ticks_t *t) {
+  return t->law == LAW_NMPC && (t->one_robot || t->loaded >= 0) && !resists(t->effects);
+}
 
 /* Efforts of the law; where truth and model share most of it, also what the step keeps of its first stage. */
-static void efforts_of(ticks_t *t, double (*desired)[N], double *efforts, double *kept, double *w) {
+static void efforts_of(ticks_t *t, int prepared, double (*desired)[N], double *efforts, double *kept, double *w) {
   if (t->law == LAW_NMPC) {
     /* CasADi has columns where NumPy has rows: (3, n) in memory is its (n, 3) */
     static const function_t loaded[] = LOADED;
     static const int tool_bodies[] = TOOL_BODIES;
     const double *arguments[ARGUMENTS] = {t->q, t->v, desired[0], t->gains, t->known_parameters};
     double *results[ARGUMENTS] = {efforts, kept};
-    if (t->one_robot)
+    if (prepared && t->one_robot)
       sms_prepared_torque(arguments, results, 0, w, 0);
-    else if (t->loaded >= 0) {
+    else if (prepared) {
       int own = PER_BODY * tool_bodies[t->loaded];
       arguments[5] = t->true_parameters + own, arguments[6] = t->known_parameters + own;
       loaded[t->loaded](arguments, results, 0, w, 0);
     } else
-      sms_computed_torque(arguments, results, 0, w, 0);
+      t->law_of_model(arguments, results, 0, w, 0);
     for (int j = 0; j < N; j++) efforts[j] = clipped(efforts[j], t->limit[j]);
     return;
   }
@@ -93,28 +85,42 @@ const long long sms_work_size = WORK;
 /* Carry out `ticks` ticks, of which `steps` are integrated; write a row of q, v, effort and command each. */
 void sms_ticks(ticks_t *t, long scheme, double *rows, long ticks, long steps, double *w) {
   static const function_t schemes[] = STEPS, rests[] = RESTS;
-  int prepared = is_prepared(t);
-  double kept[KEPT];
+  effects_t *e = t->effects;
+  int prepared = is_prepared(t), resisted = resists(e), open = 0; /* whether the account of a step is open */
+  double kept[KEPT], numbers[NUMBERS];
   double desired[3][N], command[N], acted[N], force[NV] = {0.0}, q[NQ], v[NV];
   for (long k = 0; k < ticks; k++) {
     desired_motion(t, desired);
-    efforts_of(t, desired, command, kept, w);
+    efforts_of(t, prepared, desired, command, kept, w);
     memcpy(rows, t->q, sizeof t->q), rows += NQ;
     memcpy(rows, t->v, sizeof t->v), rows += NV;
     memcpy(rows, t->effort, sizeof t->effort), rows += N;
     memcpy(rows, command, sizeof command), rows += N;
-    if (k == steps) return;
+    if (k == steps) break;
+    if (e) motors(e, k, command, command);
     for (int j = 0; j < N; j++) {
       double size = command[j] < 0.0 ? -command[j] : command[j];
       t->saturated[j] += size >= t->true_limit[j];
       acted[j] = clipped(command[j], t->true_limit[j]);
       force[6 + j] = acted[j];
     }
-    const double *arguments[ARGUMENTS] = {t->q, t->v, force, t->true_parameters, &t->tick_s, kept};
-    double *results[ARGUMENTS] = {q, v};
-    (prepared ? rests : schemes)[scheme](arguments, results, 0, w, 0);
+    if (resisted) {
+      numbers_at(t->q, t->v, t->true_parameters, numbers, w);
+      if (open) settle(e, t->q, t->v, numbers, t->tick_s);
+      resisted_step(e, k, t->stamp_ns, scheme, t->q, t->v, acted, t->true_parameters, &t->tick_s, numbers, q, v, w);
+      open = e->n_wrenches > 0;
+    } else {
+      const double *arguments[ARGUMENTS] = {t->q, t->v, force, t->true_parameters, &t->tick_s, kept};
+      double *results[ARGUMENTS] = {q, v};
+      (prepared ? rests : schemes)[scheme](arguments, results, 0, w, 0);
+    }
     for (int j = 0; j < N; j++) t->work += acted[j] * (q[7 + j] - t->q[7 + j]);
     memcpy(t->q, q, sizeof q), memcpy(t->v, v, sizeof v), memcpy(t->effort, acted, sizeof acted);
     t->stamp_ns += t->tick_ns;
   }
+  if (open) {
+    numbers_at(t->q, t->v, t->true_parameters, numbers, w);
+    settle(e, t->q, t->v, numbers, t->tick_s);
+  }
+  if (e) pass(e, steps < ticks ? steps : ticks);
 }

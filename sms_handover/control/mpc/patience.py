@@ -78,11 +78,15 @@ class Patience:
 
     def error(self, stamp_ns: int, excess: float, row: str) -> NoPlanError:
         """Return the error that names the limit exceeded at rest, or else that of the last program."""
-        reason = _in_words(row, excess) if row else self._state.hindrance
-        at_s = ns_to_seconds(stamp_ns)
-        return NoPlanError(
-            f"control law 'mpc' has no plan within its limits, the arms are at rest at {at_s:g} s: {reason}"
-        )
+        return no_plan(stamp_ns, _in_words(row, excess) if row else self._state.hindrance)
+
+
+def no_plan(stamp_ns: int, reason: str) -> NoPlanError:
+    """Return the error that tells why the arms are at rest."""
+    at_s = ns_to_seconds(stamp_ns)
+    return NoPlanError(
+        f"control law 'mpc' has no plan within its limits, the arms are at rest at {at_s:g} s: {reason}"
+    )
 
 
 def _hindrance(solution: Solution) -> str:
