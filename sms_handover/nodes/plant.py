@@ -156,6 +156,11 @@ class PlantNode(GraphNode[PlantParameters]):
         return self._inputs.missing(self._plant.stamp_ns, self._needed) or JOINT_COMMAND
 
     @property
+    def answer_is_near(self) -> bool:
+        """Whether only the controller has to work: at a reference period trajectory and ik have to before."""
+        return self._needed is _COMMAND and not self._ahead_of_recorder
+
+    @property
     def _ahead_of_recorder(self) -> bool:
         """Whether the next state would be more than may be lost if the recorder were killed."""
         next_ns = self._plant.stamp_ns + self._tick_ns
