@@ -15,13 +15,14 @@ SITE := build/docs/html
 
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint .ci/constraints.txt
+OPTIMA = OPENBLAS_NUM_THREADS=1 $(VENV)-crocoddyl/bin/python -m pytest -q -p no:cacheprovider test/verification/test_crocoddyl.py
 MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evidence $(MEASURED)/evidence.json
 
 # The environment stands alone: what a sourced ROS workspace or another environment exports must not leak in.
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DEFAULT_GOAL := help
-.PHONY: help handover figures report simulate test verify measure bench docs screenshots faults lowest cycles fuzz hostile soak reference clearance geometries masses effects scenarios engines evidence campaign lint install colcon clean
+.PHONY: help handover figures report simulate test verify measure bench docs acceptance screenshots faults lowest cycles fuzz hostile soak reference clearance geometries crocoddyl masses effects scenarios engines evidence campaign balancer lint install colcon clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -43,10 +44,11 @@ simulate: install  ## the same handover in one process, without DDS or a recordi
 test: lint  ## check style and types, then run every test but those of verify in TEST_WORKERS processes
 	$(BIN)/python -m pytest --numprocesses $(TEST_WORKERS) --dist loadfile --timeout $(TEST_SECONDS) --durations 20
 
-verify: $(VENV)/.verify  ## measure against independent answers, break every law on purpose, write docs/verification.md
+verify: $(VENV)/.verify $(VENV)-crocoddyl/.crocoddyl  ## measure against independent answers, break every law on purpose, write docs/verification.md
 	@mkdir -p $(MEASURED)
 	status=0; \
 	$(MEASURE) || status=1; \
+	$(OPTIMA) || status=1; \
 	$(BIN)/python test/verification/mutations.py --output $(MEASURED)/breaks.json || status=1; \
 	$(BIN)/python test/verification/report.py $(MEASURED)/evidence.json --breaks $(MEASURED)/breaks.json || status=1; \
 	exit $$status
@@ -100,6 +102,15 @@ campaign: $(VENV)/.test  ## compare 1000 runs of a campaign bit for bit, however
 effects: install  ## run the smooth handover under each effect of conditions alone, write docs/conditions.md
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m docs.effects
 
+acceptance: install  ## run every scenario, nominal seeds and shares of friction under laws with a model, write docs/control.md
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m docs.acceptance
+
+balancer: $(VENV)/.test  ## measure base turn against tool error and clearance under examples/balancer, write docs/balancer.md
+	rm -rf build/balancer
+	$(PIP) --no-deps --target build/balancer ./examples/balancer
+	rm -rf examples/balancer/build examples/balancer/*.egg-info
+	PYTHONPATH=build/balancer OPENBLAS_NUM_THREADS=1 $(BIN)/python -m docs.balancer
+
 masses: install  ## hand over deputies of 1 to 24 kg, known to the law or not, write docs/deputy_with_mass.md
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m docs.masses
 
@@ -109,6 +120,9 @@ scenarios: install  ## run every shipped scenario in one process and draw it aga
 engines: $(VENV)-basilisk/.engines  ## replay shipped scenarios (SCENARIOS, or all) in MuJoCo and Basilisk, write docs/second_engine.md
 	OPENBLAS_NUM_THREADS=1 $(VENV)-basilisk/bin/python -m docs.second_engine $(SCENARIOS)
 	OPENBLAS_NUM_THREADS=1 $(VENV)-basilisk/bin/python -m pytest -q -p no:cacheprovider test/verification/test_second_engine.py -k basilisk
+
+crocoddyl: $(VENV)-crocoddyl/.crocoddyl  ## compare optimal plans of mpc without limits with those of Crocoddyl
+	$(OPTIMA)
 
 reference: install  ## write the pages of docs/ that list what is in the code
 	$(BIN)/python -m docs.reference
@@ -124,7 +138,7 @@ colcon:  ## build the package as a ROS workspace does, with colcon, and list its
 	PYTHON="$(PYTHON)" .ci/colcon
 
 clean:  ## remove the environment and everything built; recordings stay
-	rm -rf $(VENV) $(LOWEST) $(VENV)-basilisk build dist docs/api *.egg-info interfaces*/build interfaces*/*.egg-info .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) $(LOWEST) $(VENV)-basilisk $(VENV)-crocoddyl build dist docs/api *.egg-info interfaces*/build interfaces*/*.egg-info .mypy_cache .pytest_cache .ruff_cache
 
 # Stamps: each holds until a file it depends on changes.
 INTERFACES := $(wildcard interfaces/*.txt interfaces/*.cmake interfaces/*.xml interfaces/*.py interfaces/*.toml) \
@@ -169,6 +183,11 @@ $(VENV)/.verify: $(VENV)/.test
 $(VENV)-basilisk/.engines: $(METADATA) .ci/basilisk.txt
 	$(PYTHON) -m venv $(VENV)-basilisk
 	$(VENV)-basilisk/bin/python -m pip install --quiet --disable-pip-version-check --constraint .ci/basilisk.txt --editable '.[basilisk,mpc,mujoco]' 'pytest>=8.4'
+	@touch $@
+
+$(VENV)-crocoddyl/.crocoddyl: $(METADATA)
+	$(PYTHON) -m venv $(VENV)-crocoddyl
+	$(VENV)-crocoddyl/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[crocoddyl,mpc]' 'pytest>=8.4'
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.test

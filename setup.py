@@ -138,6 +138,8 @@ setup(
         ],
         # second engines for verify --with; the tested ranges
         "mujoco": ["mujoco>=4.0,<5"],  # needs Python 3.11
+        # another solver of optimal control; its wheels are silently wrong beside a later pin: make crocoddyl
+        "crocoddyl": ["crocoddyl>=3.2.1,<3.3", "libpinocchio==4.0.0", "pin==4.0.0"],
         "basilisk": ["bsk>=2.12,<2.13"],  # its own pins of other packages need an environment of its own
         "bench": [  # what the benchmarks compare with, beyond verify
             "drake>=1.51,<2",

@@ -16,8 +16,9 @@ from sms_handover.control.law import LawSetup
 from sms_handover.control.nmpc import NMPC, NmpcGains
 from sms_handover.control.protocol import Guidance
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
+from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.plant.integrators import TABLEAUS
+from sms_handover.plant.plant_state import InitialState
 from sms_handover.simulation.parameters import COMPILED, DYNAMICS
 from sms_handover.simulation.scenario import load_parameters, load_scenario
 from sms_handover.simulation.simulate import simulate

@@ -41,9 +41,9 @@ FALLBACK = "graph by rclpy's executor, not recorded"
 COMPOSED_FALLBACK = "graph with --compose by rclpy's executor, not recorded"
 
 
-def bare(role: str) -> float:
+def bare(role: str, *variant: str) -> float:
     """Return the time in s of a bare round trip."""
-    command = [sys.executable, "-m", "benchmarks.ping_pong", role, str(TRIPS)]
+    command = [sys.executable, "-m", "benchmarks.ping_pong", role, str(TRIPS), *variant]
     return 1e-6 * float(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
@@ -57,8 +57,13 @@ def alone(dynamics: str) -> float:
 
 def graph(folder: str, arguments: Sequence[str]) -> float:
     """Return the time in s of a tick of the graph; raises CalledProcessError, on a lost message too."""
-    command = [sys.executable, "-m", "sms_handover.cli.main", "run", "--no-dry-run", "--overwrite"]
-    command += ["--duration", str(SIMULATED_S), "--output", f"{folder}/run", *arguments]
+    return run_graph([sys.executable, "-m", "sms_handover.cli.main"], folder, arguments)
+
+
+def run_graph(program: Sequence[str], folder: str, arguments: Sequence[str]) -> float:
+    """Return the time in s of a tick of the graph that a program starts as sms-handover does."""
+    command = [*program, "run", "--no-dry-run", "--overwrite", "--duration", str(SIMULATED_S)]
+    command += ["--output", f"{folder}/run", *arguments]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     return 1e-3 / float(_FACTOR.findall(done.stderr)[-1])
 

@@ -19,6 +19,7 @@ SCRIPTS: tuple[str, ...] = (  # in the order of the document
     "clearance",
     "startup",
     "lockstep",
+    "bounds",
     "realtime",
     "recorder",
     "recorder_kill",

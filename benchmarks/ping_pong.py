@@ -1,13 +1,17 @@
 """The floor of lock step: two processes hand the loop's messages to each other and compute nothing.
 
 The same bytes, quality of service and way of taking them as in the graph. Run as a module, as ``ping`` or,
-for both sides in one process, as ``solo``, it prints the mean time of a round trip in us.
+for both sides in one process, as ``solo``, it prints the mean time of a round trip in us. Variants of
+``ping``: ``spinning``, where both look for what they await before they sleep, as plant and controller do;
+``one``, where a state is one message; ``watched``, where a third process takes everything, as the
+recorder does.
 """
 
 import os
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from time import perf_counter
 
 import numpy as np
@@ -22,6 +26,7 @@ from sms_handover.graph.topics import (
     JOINT_COMMAND,
     JOINT_STATES,
     PLANT,
+    RECORDER,
     graph_topics,
 )
 from sms_handover.launcher.domain import reserved_domain
@@ -29,24 +34,32 @@ from sms_handover.messages.stamps import stamp_ns
 from sms_handover.ros.codecs.loop_messages import JointStateCodec, OdometryCodec
 from sms_handover.ros.node.endpoints import Endpoints
 from sms_handover.ros.process.network_scope import apply_network_scope
+from sms_handover.ros.process.realtime import stand_back
 from sms_handover.ros.transport.direct import DirectInputs
 from sms_handover.ros.transport.inputs import OnSerialized
+from sms_handover.ros.transport.spinning import AdaptiveSpin
 
 _ARMS = ("arm_a", "arm_b")
 NAMES = [f"{arm}_joint_{number}" for arm in _ARMS for number in range(1, 8)]
 _STATE, _COMMAND = (JOINT_STATES, BASE_ODOMETRY), (JOINT_COMMAND,)
 _TICK_NS = 1_000_000  # [ns] between two stamps
 _WAIT_S = 0.2  # [s] longest sleep
+_SPIN_S = 0.002  # [s] of wall time to look for a message before that, as plant and controller do
+_WATCH_S = 0.002  # [s] of wall time between two looks of the third process, as of the recorder
+_NICENESS = 10  # [-] of it, as of the recorder
+SPINNING, ONE, WATCHED = "spinning", "one", "watched"
 
 
 class Side:
     """One of the two nodes: it publishes the messages of a stamp, and sleeps until the other's have come."""
 
-    def __init__(self, name: str, sends: tuple[str, ...], takes: tuple[str, ...]) -> None:
+    def __init__(self, name: str, sends: tuple[str, ...], takes: tuple[str, ...], variant: str = "") -> None:
         node = Node(name, start_parameter_services=False, enable_rosout=False)
-        endpoints = self._endpoints = Endpoints(node, graph_topics(_ARMS), (PLANT, CONTROLLER))
+        peers = (PLANT, CONTROLLER, RECORDER) if variant == WATCHED else (PLANT, CONTROLLER)
+        endpoints = self._endpoints = Endpoints(node, graph_topics(_ARMS), peers)
         self._inputs = DirectInputs(node)
         self._inputs.awaited = lambda: takes[-1]
+        self._spin = AdaptiveSpin(_SPIN_S) if variant == SPINNING else None
         self._came = dict.fromkeys(takes, -_TICK_NS)
         self._publish = [endpoints.publisher(topic).publish for topic in sends]
         for topic in takes:
@@ -63,6 +76,9 @@ class Side:
             BASE_ODOMETRY: lambda stamp: odometry.pack(stamp, pose, twist),
             JOINT_COMMAND: lambda stamp: commands.pack(stamp, effort=zeros),
         }
+        if variant == ONE:
+            parts = pack[JOINT_STATES], pack[BASE_ODOMETRY]
+            pack[JOINT_STATES] = lambda stamp: b"".join(part(stamp) for part in parts)
         self._pack = [pack[topic] for topic in sends]
 
     def match(self) -> None:
@@ -78,7 +94,18 @@ class Side:
     def wait(self, stamp: int) -> None:
         """Sleep until every message of a stamp has come."""
         while min(self._came.values()) < stamp:
-            self._inputs.spin_once(self._executor, _WAIT_S)
+            if self._spin is None or not self._spin.find(lambda: self._have(stamp)):
+                self._inputs.spin_once(self._executor, _WAIT_S)
+
+    def watch(self, stamp: int) -> None:
+        """Take what comes now and then, until every message of a stamp has come."""
+        while not self._have(stamp):
+            self._executor.spin_once(timeout_sec=_WATCH_S)
+
+    def _have(self, stamp: int) -> bool:
+        """Take what has come; return whether every message of a stamp is there."""
+        self._inputs.poll()
+        return min(self._came.values()) >= stamp
 
     def _taker(self, topic: str) -> OnSerialized:
         """Return what notes the stamp of a message."""
@@ -89,30 +116,47 @@ class Side:
         return take
 
 
-def pong(trips: int) -> None:
+def _state(variant: str) -> tuple[str, ...]:
+    """Return the topics of a state."""
+    return (JOINT_STATES,) if variant == ONE else _STATE
+
+
+def pong(trips: int, variant: str) -> None:
     """Answer the other process."""
     rclpy.init()
-    side = Side(CONTROLLER, _COMMAND, _STATE)
+    side = Side(CONTROLLER, _COMMAND, _state(variant), variant)
     side.match()
     for trip in range(trips):
         side.wait(trip * _TICK_NS)
         side.send(trip * _TICK_NS)
 
 
-def ping(trips: int) -> float:
+def watch(trips: int) -> None:
+    """Take every message of the two others and do nothing with them."""
+    rclpy.init()
+    side = Side(RECORDER, (), (*_STATE, *_COMMAND), WATCHED)
+    stand_back(_NICENESS)
+    side.match()
+    side.watch((trips - 1) * _TICK_NS)
+
+
+def ping(trips: int, variant: str) -> float:
     """Return the mean time in s of a round trip."""
-    with reserved_domain(None) as domain:
+    with reserved_domain(None) as domain, ExitStack() as stack:
         os.environ["ROS_DOMAIN_ID"] = str(domain)
-        command = [sys.executable, "-m", "benchmarks.ping_pong", "pong", str(trips)]
-        with subprocess.Popen(command) as other:
-            rclpy.init()
-            side = Side(PLANT, _STATE, _COMMAND)
-            side.match()
-            start = perf_counter()
-            for trip in range(trips):
-                side.send(trip * _TICK_NS)
-                side.wait(trip * _TICK_NS)
-            elapsed = perf_counter() - start
+        others = []
+        for role in ("pong", "watch") if variant == WATCHED else ("pong",):
+            command = [sys.executable, "-m", "benchmarks.ping_pong", role, str(trips), variant]
+            others.append(stack.enter_context(subprocess.Popen(command, start_new_session=True)))
+        rclpy.init()
+        side = Side(PLANT, _state(variant), _COMMAND, variant)
+        side.match()
+        start = perf_counter()
+        for trip in range(trips):
+            side.send(trip * _TICK_NS)
+            side.wait(trip * _TICK_NS)
+        elapsed = perf_counter() - start
+        for other in others:
             other.wait()
     return elapsed / trips
 
@@ -138,11 +182,13 @@ def main() -> None:
     """Play one of the two sides, or both."""
     os.environ.update(ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST", ROS_STATIC_PEERS="")
     apply_network_scope()
-    role, trips = sys.argv[1], int(sys.argv[2])
+    role, trips, variant = sys.argv[1], int(sys.argv[2]), "".join(sys.argv[3:])
     if role == "pong":
-        pong(trips)
+        pong(trips, variant)
+    elif role == "watch":
+        watch(trips)
     else:
-        print(1e6 * (solo if role == "solo" else ping)(trips))
+        print(1e6 * (solo(trips) if role == "solo" else ping(trips, variant)))
     rclpy.try_shutdown()
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from benchmarks.machine import versions
 from benchmarks.results import Result, Table, publish, row
 from benchmarks.timing import interleaved
+from sms_handover.compiled.linearisation import CompiledDerivatives
 from sms_handover.control.mpc.controller import MpcController
 from sms_handover.control.mpc.distance_rows import DistanceModel
 from sms_handover.control.mpc.momentum import base_start
@@ -59,6 +60,7 @@ class Contest:
         gains: MpcGains = gains_by_phase(schedule, scenario.parameters.controller)[0]
         distances = NearPairs(make_clearance(robot, schedule))
         self.planner = Planner(robot, gains, distances, np.eye(3))
+        self._compiled = Planner(robot, gains, distances, np.eye(3), CompiledDerivatives)
         self._prediction, self._tools = PredictionModel(robot), ToolErrorModel(robot)
         self._distances = DistanceModel(robot, distances, gains.distance_pairs, gains.least_distance)
         loop, preview = Loop(scenario), TargetPreview(robot, schedule)
@@ -78,6 +80,15 @@ class Contest:
     def whole(self, problem: Problem) -> None:
         """Carry out one iteration as the law does."""
         self.planner.step(problem.start, problem.accelerations, problem.targets)
+
+    def compiled(self, problem: Problem) -> None:
+        """Carry out one iteration with the dynamics linearised in C."""
+        self._compiled.step(problem.start, problem.accelerations, problem.targets)
+
+    def dynamics(self, problem: Problem) -> None:
+        """Predict the motion with the derivatives of dynamics alone, and do nothing with them."""
+        start = problem.start
+        self._prediction.predict(self.planner.horizon, start.base, start.q, start.w, problem.accelerations)
 
     def derivatives(self, problem: Problem) -> None:
         """Find the derivatives of all outputs, and do nothing with them."""
@@ -107,14 +118,20 @@ def main() -> None:
     for intervals in INTERVALS:
         contest = Contest(intervals)
         whole = [shortest(partial(contest.whole, problem)) for problem in contest.problems]
+        compiled = [shortest(partial(contest.compiled, problem)) for problem in contest.problems]
+        dynamics = [shortest(partial(contest.dynamics, problem)) for problem in contest.problems]
         derivatives = [shortest(partial(contest.derivatives, problem)) for problem in contest.problems]
         programs = [shortest(partial(contest.solve, program)) for program in contest.programs()]
         parts = float(np.median(np.add(derivatives, programs)))
         median, tail = float(np.median(whole)), float(np.percentile(whole, 99.0))
-        numbers = (median, tail, float(np.median(derivatives)), float(np.median(programs)))
+        parts_of = (compiled, dynamics, derivatives, programs)
+        numbers = (median, tail, *(float(np.median(each)) for each in parts_of))
         rows.append(row(str(intervals), *(number * _MS_PER_S for number in numbers), median / parts))
         values[str(intervals)] = {WHOLE: median, "tail": tail, PARTS: parts}
-    heading = ("intervals", "solve, median [ms]", "99th percentile [ms]", "derivatives [ms]", "program [ms]")
+    heading = (
+        *("intervals", "solve, median [ms]", "99th percentile [ms]", "dynamics in C: median [ms]"),
+        *("dynamics [ms]", "derivatives [ms]", "program [ms]"),
+    )
     publish(
         Result(
             name="predictive_control",
@@ -123,9 +140,9 @@ def main() -> None:
             notes=[
                 f"Processor time of one iteration at each of the first {STATES} reference periods of "
                 "scenario `tight`, with the base's rotation limited too; the shortest of some counts. "
-                "Derivatives are Pinocchio's, of dynamics, tools and distances; the program is DAQP with its "
-                "checks. "
-                f"Compared: {versions(('pin', 'daqp', 'numpy'))}.",
+                "Derivatives are Pinocchio's, of dynamics, tools and distances; the column before has those "
+                "of dynamics alone. The program is DAQP with its checks. "
+                f"Compared: {versions(('pin', 'daqp', 'casadi', 'numpy'))}.",
             ],
             values=values,
         )

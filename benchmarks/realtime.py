@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import accumulate, pairwise
 from math import ceil
-from os import cpu_count, getloadavg
+from os import cpu_count, getloadavg, sched_getaffinity, sched_setaffinity
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
@@ -25,6 +25,7 @@ _BUSY = "while True: pass"
 
 _FIRST = ("-p", "common.priority:=50")
 _AWAKE = ("-p", "plant.busy_wait:=0.001")
+_FEW, _MORE = 2, 4  # [-] processors
 CASES: dict[str, tuple[bool, tuple[str, ...]]] = {
     "as found, a process per node": (False, ()),
     "as found, --compose": (False, ("--compose",)),
@@ -82,23 +83,40 @@ def quantile(counts: Sequence[int], width: float, part: float) -> float:
     return width * (1 + next(index for index, value in enumerate(sums) if value >= part * sums[-1]))
 
 
-def case(name: str, folder: Path) -> tuple[str, ...]:
+@contextmanager
+def restricted(count: int) -> Iterator[None]:
+    """Let what is started meanwhile have so many processors only."""
+    every = sched_getaffinity(0)
+    sched_setaffinity(0, sorted(every)[:count])
+    try:
+        yield
+    finally:
+        sched_setaffinity(0, every)
+
+
+def counts(processors: int) -> tuple[int, ...]:
+    """Return on how many processors a process per node is measured: on four too where there are more."""
+    return (_FEW, _MORE) if processors >= _MORE else (processors,)
+
+
+def case(name: str, folder: Path, processors: int) -> tuple[str, ...]:
     """Return the row of one case."""
     busy, arguments = CASES[name]
-    with load(busy):
+    with restricted(processors), load(busy):
         command = [sys.executable, "-m", "benchmarks.sleeper", str(DURATION_S + _START_S)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as sleeper:
             try:
                 bag = run_graph(folder, arguments)
             except RuntimeError as error:
                 sleeper.kill()
-                return row(name, str(error).strip().splitlines()[-1], *["-"] * 10)
+                return row(name, str(processors), str(error).strip().splitlines()[-1], *["-"] * 10)
             noise = json.loads(sleeper.communicate()[0])
     told = reports(bag)
     last = told[-1]
-    counts = [sum(column) for column in zip(*(report.latency_counts for report in told), strict=True)]
+    latencies = [sum(column) for column in zip(*(report.latency_counts for report in told), strict=True)]
     return row(
         name,
+        f"{processors}",
         f"{last.ticks}",
         f"{last.late_ticks}",
         f"{last.held_commands}",
@@ -106,8 +124,8 @@ def case(name: str, folder: Path) -> tuple[str, ...]:
         1e6 * median(report.period_error_p99 for report in told),
         1e6 * max(report.period_error_p99 for report in told),
         1e6 * max(report.period_max for report in told),
-        1e6 * quantile(counts, last.latency_bin, 0.5),
-        1e6 * quantile(counts, last.latency_bin, 0.99),
+        1e6 * quantile(latencies, last.latency_bin, 0.5),
+        1e6 * quantile(latencies, last.latency_bin, 0.99),
         noise["p99_us"],
         noise["max_us"],
     )
@@ -117,9 +135,13 @@ def main() -> None:
     """Measure and publish."""
     found = getloadavg()[0]
     with TemporaryDirectory() as folder:
-        rows = [case(name, Path(folder)) for name in CASES]
+        every = len(sched_getaffinity(0))
+        first, *others = CASES
+        rows = [case(first, Path(folder), count) for count in counts(every)]
+        rows += [case(name, Path(folder), every) for name in others]
     heading = (
         "machine",
+        "processors",
         "ticks",
         "late",
         "held commands",
@@ -142,7 +164,10 @@ def main() -> None:
                 "by the times at which states were sent, those of single seconds by the plant's own clock. "
                 "Never asleep is `-p plant.busy_wait:=0.001`. The bare sleeper "
                 "is a process beside it that only wakes every ms: what it is off is the machine's doing. "
-                "With --compose plant and controller are in one process, the other nodes in their own. "
+                "With --compose plant and controller are in one process, the other nodes in their own. A "
+                "command of another process comes after two wake-ups of sleeping threads on each way: where "
+                "the bare sleeper, which is woken once, is off by a good part of a tick, commands have to be "
+                "held, and a longer tick, --compose or lock step is the remedy, as the run says beforehand. "
                 f"As found, the machine had a load average of {found:.1f}, where 0 is idle."
             ],
             tables=[Table(heading, rows)],

@@ -85,7 +85,10 @@ def main() -> None:
         Result(
             name="startup",
             question="How long until it answers?",
-            notes=["Whole processes, from their start to their end or to the first line of progress."],
+            notes=[
+                "Whole processes, from their start to their end or to the first line of progress. Allowed "
+                "are 2 s to the first tick of the graph."
+            ],
             tables=[import_table(), first_tick_table()],
         )
     )

@@ -29,16 +29,23 @@ SHIPPED, EARLIER = "smooth", "colliding"  # a scenario with room, and the geomet
 
 @dataclass(frozen=True)
 class Case:
-    """One run: a scenario, the weight of base turns in s^2/rad^2, and the least distance in m."""
+    """One run: a scenario, the weight of base turns in s^2/rad^2, the least distance in m, a limit of rates.
+
+    ``rate_limit`` is in rad/s, 0 is that of the robot.
+    """
 
     scenario: str
     weight: float
-    clearance: float
+    keep_apart: float
+    rate_limit: float = 0.0
 
     @property
     def name(self) -> str:
-        """What a user sets."""
-        return "idle arm held (weight 0)" if self.weight == 0.0 else f"weight {self.weight:.0e}"
+        """What arm B does, as text."""
+        if self.weight == 0.0:
+            return "held (weight 0)"
+        limit = f", all rates <= {self.rate_limit:g} rad/s" if self.rate_limit else ""
+        return f"weight {self.weight:.0e}{limit}"
 
 
 @dataclass(frozen=True)
@@ -59,10 +66,23 @@ class Outcome:
     active: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Task:
+    """What came of a whole task: errors of its grasps in mm, farthest and last turn of the base in deg."""
+
+    grasps: tuple[float, ...]
+    turn: float
+    end: float
+
+
+TASKS = tuple(
+    (scenario, law) for scenario in ("smooth", "massive", "tumbling") for law in ("nmpc", "balancer")
+)
 WEIGHTS = tuple(Case(SHIPPED, weight, 0.02) for weight in (0.0, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7))
 ROOM = (
     *(Case(EARLIER, weight, 0.0) for weight in (0.0, 1e3, 1e5, 1e6, 1e7)),
-    *(Case(EARLIER, 1e7, clearance) for clearance in (0.05, 0.1, 0.15)),
+    *(Case(EARLIER, 1e7, apart) for apart in (0.05, 0.1, 0.15)),
+    Case(EARLIER, 1e7, 0.05, rate_limit=0.1),
 )
 
 
@@ -74,7 +94,11 @@ def outcome_of(case: Case) -> Outcome:
             "common": {"duration": SECONDS, "tick": TICK, "on_touch": "report"},
             "trajectory.time_law": "quintic",
             "law": "balancer",
-            "controller": {"base_turn_weight": case.weight, "clearance": case.clearance},
+            "controller": {
+                "base_turn_weight": case.weight,
+                "keep_apart": case.keep_apart,
+                "arm_rate_limit": case.rate_limit,
+            },
         },
     )
     run, robot = simulate(scenario), scenario.truth.robot
@@ -92,15 +116,27 @@ def outcome_of(case: Case) -> Outcome:
     )
 
 
-def section(found: Mapping[Case, Outcome]) -> str:
+def task_of(scenario: str, law: str) -> Task:
+    """Return what comes of a whole task under a law as it is shipped."""
+    run = simulate(load_scenario(scenario, {"common.tick": TICK, "law": law}))
+    turns = np.linalg.norm(base_rotation(run).values, axis=1) * DEG_PER_RAD
+    grasps = tuple(event.position_error * MM_PER_M for event in run.grasp_events)
+    return Task(grasps, float(turns.max()), float(turns[-1]))
+
+
+def section(found: Mapping[Case, Outcome], tasks: Mapping[tuple[str, str], Task]) -> str:
     """Return the text of the section."""
     figures = ("Turn [deg]", "Turn rate [deg/s]", "Tool [mm]", "Grasp [mm]", "Rate of B [rad/s]", "B [mm]")
     weights = [(case.name, *_cells(found[case])) for case in WEIGHTS]
     room = [
-        (case.name, f"{case.clearance * MM_PER_M:.0f}", *_cells(found[case]), _bodies(found[case].active))
+        (case.name, f"{case.keep_apart * MM_PER_M:.0f}", *_cells(found[case]), _bodies(found[case].active))
         for case in ROOM
     ]
     held, best = (min(found[case].turn for case in WEIGHTS if test(case)) for test in (_holds, _balances))
+    whole = [
+        (*key, ", ".join(f"{mm:.2g}" for mm in task.grasps), f"{task.turn:.2f}", f"{task.end:.2f}")
+        for key, task in tasks.items()
+    ]
     return f"""\
 This section is written by `make balancer`: the first {SECONDS:.0f} s, in which arm A goes to the deputy and
 grasps it and arm B is idle, at a tick of {TICK * 1e3:g} ms. Turn and turn rate are the largest of the base,
@@ -109,7 +145,7 @@ rate of arm B, and the last column how near arm B came to anything else.
 
 ![Base turn against tool error, and against clearance](images/balancer.svg)
 
-Scenario `{SHIPPED}`, `clearance` of 20 mm. With the idle arm held the base turns by {held:.2f} degrees, with
+Scenario `{SHIPPED}`, `keep_apart` of 20 mm. With the idle arm held the base turns by {held:.2f} degrees, with
 the balancer by down to {best:.3f}:
 
 {table(("Arm B", *figures), weights)}
@@ -117,7 +153,11 @@ the balancer by down to {best:.3f}:
 Scenario `{EARLIER}` with smooth targets, the geometry in which an earlier prototype was measured; the
 gripper of A keeps 1 mm from the deputy, where the grasp frame is on its face, hence the error at the grasp:
 
-{table(("Arm B", "Clearance", *figures, "B is kept from"), room)}
+{table(("Arm B", "Apart [mm]", *figures, "B is kept from"), room)}
+
+Whole tasks, with the parameters that the law has by itself:
+
+{table(("Scenario", "Law", "Grasp, transfer [mm]", "Farthest turn [deg]", "Turn at the end [deg]"), whole)}
 """
 
 
@@ -138,7 +178,7 @@ def _balances(case: Case) -> bool:
 def _cells(outcome: Outcome) -> tuple[str, ...]:
     """Return the figures of an outcome as text."""
     first = (f"{outcome.turn:.3f}", f"{outcome.turn_rate:.3f}", f"{outcome.tool:.2g}", f"{outcome.grasp:.2g}")
-    return (*first, f"{outcome.rate:.3f}", f"{outcome.least:.1f}")
+    return (*first, f"{outcome.rate:.3f}", f"{round(outcome.least, 1) + 0.0:.1f}")  # no -0.0
 
 
 def _bodies(active: tuple[str, ...]) -> str:
@@ -154,16 +194,21 @@ def draw(found: Mapping[Case, Outcome], file: Path) -> None:
     left.plot(
         [found[case].turn for case in WEIGHTS], [found[case].tool for case in WEIGHTS], "o-", color="#0072b2"
     )
-    for case in WEIGHTS:
-        left.annotate(f"{case.weight:.0e}" if case.weight else "held", (found[case].turn, found[case].tool))
+    for index, case in enumerate(WEIGHTS):
+        name = f"{case.weight:.0e}" if case.weight else "held"
+        shift = (0, -14) if index % 2 else (0, 7)
+        point = found[case].turn, found[case].tool
+        left.annotate(name, point, shift, textcoords="offset points", ha="center")
+    left.margins(0.12)
     left.set_xlabel("largest turn of the base [deg]")
     left.set_ylabel("largest tool error [mm]")
     left.set_title(f"{SHIPPED}, by weight")
-    free = [case for case in ROOM if case.clearance == 0.0]
-    kept = [case for case in ROOM if case.weight == max(case.weight for case in ROOM)]
+    free = [case for case in ROOM if case.keep_apart == 0.0]
+    most = max(case.weight for case in ROOM)
+    kept = [case for case in ROOM if case.weight == most and not case.rate_limit]
     for cases, label, color in (
-        (free, "by weight, clearance 0", "#0072b2"),
-        (kept, "by clearance", "#d55e00"),
+        (free, "by weight, keep_apart 0", "#0072b2"),
+        (kept, "weight 1e7, keep_apart 0 to 0.15 m", "#d55e00"),
     ):
         ordered = sorted(cases, key=lambda case: found[case].turn)
         turns, least = ([getattr(found[case], name) for case in ordered] for name in ("turn", "least"))
@@ -177,7 +222,7 @@ def draw(found: Mapping[Case, Outcome], file: Path) -> None:
 
 
 def measured() -> dict[Case, Outcome]:
-    """Run all cases."""
+    """Run all cases, which are the first phases alone."""
     found = dict[Case, Outcome]()
     for case in (*WEIGHTS, *ROOM):
         found[case] = outcome_of(case)
@@ -188,8 +233,9 @@ def measured() -> dict[Case, Outcome]:
 def main() -> None:
     """Run all cases and write page and picture."""
     found = measured()
+    tasks = {key: task_of(*key) for key in TASKS}
     draw(found, PICTURE)
-    PAGE.write_text(with_section(PAGE.read_text(encoding="utf-8"), section(found)), encoding="utf-8")
+    PAGE.write_text(with_section(PAGE.read_text(encoding="utf-8"), section(found, tasks)), encoding="utf-8")
     print(f"{PAGE.name} written")
 
 

@@ -5,7 +5,9 @@ import json
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
+from functools import cache, partial
 from pathlib import Path
 
 import matplotlib
@@ -16,7 +18,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.patches import Rectangle
 
-from docs.geometry_search import Found, Tally, possible
+from docs.geometry_search import Tally, possible
 from docs.geometry_trial import Bench
 from docs.tables import table
 from sms_handover.analysis.claims import PEAK_TORQUE
@@ -53,34 +55,39 @@ def rows_of(file: Path) -> list[Row]:
     return [Row(**json.loads(line)) for line in lines]
 
 
-def measured(bench: Bench, seed: int, index: int) -> tuple[Row, Found]:
-    """Return geometry number ``index`` of a seed, whatever was drawn before it."""
+@cache
+def bench() -> Bench:
+    """Return what all trials of a process share."""
+    return Bench()
+
+
+def measured(seed: int, index: int) -> tuple[Row, str]:
+    """Return geometry number ``index`` of a seed and its schedule, whatever was drawn before it."""
     tally = Tally()
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,)))
-    found = next(possible(bench, random, tally, lambda line: None))
+    found = next(possible(bench(), random, tally, lambda line: None))
     trial = found.trial
     claims = {claim.name: bool(claim.holds) for claim in trial.claims}
     peaks = {law: float(peak) for law, peak in trial.peaks.items()} if trial.peaks else {}
     figures = (float(trial.lead), trial.least, trial.rate)
-    return Row(index, claims, peaks, *figures, tally.simulated, dict(tally.failures)), found
+    return Row(index, claims, peaks, *figures, tally.simulated, dict(tally.failures)), found.text
 
 
-def grown(seed: int, count: int, folder: Path) -> list[Row]:
-    """Return ``count`` rows; those that a folder lacks are worked out and appended to its file."""
+def grown(seed: int, count: int, folder: Path, jobs: int = 1) -> list[Row]:
+    """Return ``count`` rows; those that a folder lacks are worked out, ``jobs`` at a time, and appended."""
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / f"rows_{seed}.jsonl"
     rows = rows_of(file)
     if len(rows) >= count:
         return rows[:count]
-    bench = Bench()
-    for index in range(len(rows), count):
-        row, found = measured(bench, seed, index)
-        (folder / f"geometry_{seed}_{index}.yaml").write_text(found.text, encoding="utf-8")
-        with file.open("a", encoding="utf-8") as stream:
-            stream.write(json.dumps(asdict(row)) + "\n")
-        rows.append(row)
-        held = sum(row.claims.values())
-        print(f"{index + 1} of {count}: {held} claims hold, {row.simulated} simulated", flush=True)
+    with ProcessPoolExecutor(jobs) as pool:
+        for row, text in pool.map(partial(measured, seed), range(len(rows), count)):
+            (folder / f"geometry_{seed}_{row.index}.yaml").write_text(text, encoding="utf-8")
+            with file.open("a", encoding="utf-8") as stream:
+                stream.write(json.dumps(asdict(row)) + "\n")
+            rows.append(row)
+            held = sum(row.claims.values())
+            print(f"{row.index + 1} of {count}: {held} claims hold, {row.simulated} simulated", flush=True)
     return rows
 
 
@@ -205,8 +212,9 @@ def main(arguments: list[str]) -> None:
     parser = argparse.ArgumentParser(prog="python -m docs.geometries", description=__doc__)
     parser.add_argument("--seed", type=int, default=SEED, help="of every random number")
     parser.add_argument("--count", type=int, default=COUNT, help="geometries on the page")
+    parser.add_argument("-j", "--jobs", type=int, default=2, help="geometries at the same time")
     options = parser.parse_args(arguments)
-    rows = grown(options.seed, options.count, FOLDER)
+    rows = grown(options.seed, options.count, FOLDER, options.jobs)
     draw(rows, FIGURE)
     PAGE.write_text(page(rows, options.seed), encoding="utf-8")
     print(f"{PAGE.name} written")

@@ -58,7 +58,7 @@ def topics_page() -> str:
             _nodes(node for node in subscribers_of(topic) if node != RECORDER),
             contents_of(topic),
         )
-        for topic in graph_topics([ANY_ARM], clearance=True, wrenches=True, sensors=SENSOR_TYPES)
+        for topic in graph_topics([ANY_ARM], clearance=True, sensors=SENSOR_TYPES)
     ]
     services = [
         (f"`{s.relative_name}`", f"`{s.type}`", f"`{s.server}`", _nodes(s.clients), s.does) for s in SERVICES

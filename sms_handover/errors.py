@@ -54,6 +54,10 @@ class ControllerError(SmsHandoverError):
     """A controller returned invalid efforts, or cannot go on."""
 
 
+class NoPlanError(SmsHandoverError):
+    """A predictive law finds no plan within its limits again and again; the arms are at rest."""
+
+
 class BagError(SmsHandoverError):
     """A recording cannot be written, opened or trusted."""
 

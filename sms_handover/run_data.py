@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from sms_handover.graph.events import RunEvent
 from sms_handover.plan_report import PlannedPaths, PlanReport
-from sms_handover.types import GraspEvent, TaskPhase
+from sms_handover.types import BaseWrench, GraspEvent, TaskPhase
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
@@ -47,11 +47,16 @@ class RunData:
     in axes of the deputy; momentum (M, 3) of robot and deputy in ``world`` axes, the angular one about the
     common centre of mass; ``kinetic_energy`` (M,) J, which grows by ``work`` of the joint efforts and
     ``external_work`` of wrenches from outside, less ``lost`` to heat, each (M,) J since the start;
-    ``linear_impulse`` (M, 3) N s and ``angular_impulse`` (M, 3) N m s are what those have added to the
-    momenta, 0 where there were none; ``ik_status`` (M,) the number of the IkStatus message, -1 where none was
-    asked. Bags of older versions have no deputy twist (NaN), and their work is less what joint stops have
-    taken. ``plans`` has the reports of a predictive law, one per solve; ``measured`` is None
-    where no sensor was simulated.
+    ``elastic_energy`` (M,) J of the springs of panels on hinges counts to the same balance; their angles
+    ``panel_position`` (M, p) rad and rates ``panel_velocity`` (M, p) rad/s are in the order of
+    ``panel_names``. ``linear_impulse`` (M, 3) N s and ``angular_impulse`` (M, 3) N m s are what those have
+    added to the momenta, 0 where there were none; ``ik_status`` (M,) the number of the IkStatus message, -1
+    where none was asked. Bags of older versions have no deputy twist (NaN), and their work is less what
+    joint stops have taken. ``plans`` has the reports of a predictive law, one per solve, and
+    ``planned_paths`` those of the tools, of every fifth; ``base_wrenches`` what others have asked for and
+    acted, each with the stamp of its tick; ``measured`` is None where no sensor was simulated. ``applied`` is
+    JSON of what acted in the plant, as it was read back from it: conditions and inertias; '' in bags of older
+    versions.
     """
 
     joint_names: tuple[str, ...]
@@ -76,6 +81,9 @@ class RunData:
     work: Array
     external_work: Array
     lost: Array
+    elastic_energy: Array
+    panel_position: Array
+    panel_velocity: Array
     linear_impulse: Array
     angular_impulse: Array
     ik_status: npt.NDArray[np.int64]
@@ -83,6 +91,9 @@ class RunData:
     grasp_events: tuple[GraspEvent, ...]
     run_events: tuple[RunEvent, ...] = ()
     plans: tuple[PlanReport, ...] = ()
+    base_wrenches: tuple[BaseWrench, ...] = ()
+    panel_names: tuple[str, ...] = ()
+    applied: str = ""
     planned_paths: tuple[PlannedPaths, ...] = ()
     measured: MeasuredRows | None = None
 

@@ -139,6 +139,19 @@ class JointCommand:
         freeze(self, "effort")
 
 
+@dataclass(frozen=True)
+class BaseWrench:
+    """Force (3,) N at the origin of base_link and torque (3,) N m about it, over the tick of a stamp.
+
+    Both are in the axes of ``frame``, which is ``world`` or ``base_link``.
+    """
+
+    stamp_ns: int
+    frame: str
+    force: tuple[float, ...]
+    torque: tuple[float, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class TickRows:
     """Ticks as arrays, a row each: stamps (k,) ns, q (k, 7 + n), v (k, 6 + n), and efforts (k, n) N m.

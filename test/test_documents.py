@@ -25,6 +25,7 @@ from sms_handover.graph.services import SERVICES
 from sms_handover.graph.topics import CONTROLLER, SENSOR_TYPES, graph_topics
 from sms_handover.ros.launching.launch_arguments import ARGUMENTS
 from sms_handover.ros.reference.interfaces import COMMON_GROUP, OWN_GROUPS, groups_of
+from sms_handover.simulation.parameters import CommonParameters
 from sms_handover.simulation.scenario import load_scenario
 
 from .core.laws import offer
@@ -110,7 +111,7 @@ def check_ours(words: list[str]) -> None:
         if node == CONTROLLER and getattr(options, "own_controller", None):
             cls = TaskSpaceGains  # the pages start our example
         elif node == CONTROLLER and options.controller:
-            cls = parameters_with(law_named(options.controller))
+            cls = parameters_with(law_named(options.controller), CommonParameters)
         require([name], [item.name for item in fields(cls)], f"parameter of {node}")
 
 
@@ -138,8 +139,7 @@ def check_ros2(words: list[str]) -> None:
         require([word.partition(":=")[0] for word in words[3:] if ":=" in word], known, "launch argument")
     elif words[0] == "topic":
         known = [
-            "/" + topic.name.lstrip("/")
-            for topic in graph_topics(ARMS, clearance=True, wrenches=True, sensors=SENSOR_TYPES)
+            "/" + topic.name.lstrip("/") for topic in graph_topics(ARMS, clearance=True, sensors=SENSOR_TYPES)
         ]
         require([word for word in words[2:] if word.startswith("/")], known, "topic")
     elif words[:2] == ["service", "call"]:
@@ -165,9 +165,11 @@ def require(names: Iterable[str], known: Iterable[str], what: str) -> None:
 
 
 @pytest.fixture(autouse=True)
-def law_of_the_example(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The pages install it."""
-    monkeypatch.syspath_prepend(offer(tmp_path_factory.mktemp("site"), "my_law", joint_pd="my_law:LAW"))
+def laws_of_the_examples(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The pages install them."""
+    site = tmp_path_factory.mktemp("site")
+    monkeypatch.syspath_prepend(offer(site, "my_law", joint_pd="my_law:LAW"))
+    offer(site, "balancer", balancer="balancer.law:LAW")
 
 
 def place(block: Block) -> str:

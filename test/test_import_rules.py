@@ -55,7 +55,7 @@ ALLOWED: dict[str, set[str]] = {
     **{layer: {"model"} for layer in MIDDLE - {"plant"}},
     "plant": {"model", "conditions"},
     "clearance": {"model"},
-    "compiled": {"model", *MIDDLE},
+    "compiled": {"model", "conditions", *MIDDLE},
     "simulation": {"model", "conditions", *MIDDLE, "compiled", "clearance"},
     "bag": {"messages", "model", "simulation"},
     "analysis": {"model", "trajectory", "clearance", "simulation", "bag", "scene"},

@@ -77,7 +77,7 @@ def before(run: RunData, end_ns: int) -> RunData:
             values[item.name] = value[ticks if item.name in _PER_TICK else periods]
         elif isinstance(value, Mapping):
             values[item.name] = {arm: rows[periods] for arm, rows in value.items()}
-        elif item.name in ("joint_names", "arms"):
+        elif item.name in ("joint_names", "arms", "panel_names", "applied"):
             values[item.name] = value
         elif isinstance(value, MeasuredRows):
             cut = {name: ticks if name in _PER_TICK else periods for name in _MEASURED_ROWS}
@@ -101,6 +101,9 @@ def as_far_as_recorded(recorded: RunData, again: RunData) -> tuple[RunData, tupl
         if isinstance(theirs, np.ndarray) and theirs.shape == ours.shape and _lacks([theirs], [ours]):
             values[item.name] = theirs
             missing.append(item.name)
+    if not recorded.applied:
+        values["applied"] = ""
+        missing.append("applied")
     events, lacking = recorded.grasp_events, {}
     for item in fields(GraspEvent):
         theirs, ours = ([getattr(e, item.name) for e in run.grasp_events] for run in (recorded, again))

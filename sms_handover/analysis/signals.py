@@ -119,19 +119,25 @@ def angular_momentum_change(run: RunData) -> Signal:
 
 
 def energy(run: RunData) -> Signal:
-    """Return kinetic energy, work of the torques and heat in J, and work from outside where there is any."""
+    """Return kinetic energy, work of the torques and heat in J; work from outside and springs if any."""
     account = {"kinetic energy": run.kinetic_energy, "work": run.work, "lost": run.lost}
     if np.any(np.nan_to_num(run.external_work)):
         account["external work"] = run.external_work
+    if run.panel_names:
+        account["elastic energy"] = run.elastic_energy
     return _signal("energy", "J", run.reference_ns, np.column_stack(list(account.values())), tuple(account))
 
 
 def energy_residual(run: RunData) -> Signal:
-    """Return E - W - X + D less its first value in J, each reference period; zero up to rounding.
+    """Return E + U - W - X + D less its first value in J, each reference period; zero up to rounding.
 
-    W is the work of the torques, X that of wrenches from outside, D what has become heat.
+    U is the energy of springs, W the work of the torques, X that of wrenches from outside, D what has become
+    heat.
     """
-    balance = (run.kinetic_energy - run.work - run.external_work + run.lost)[:, np.newaxis]
+    balance = run.kinetic_energy - run.work - run.external_work + run.lost
+    if run.panel_names:
+        balance = balance + run.elastic_energy
+    balance = balance[:, np.newaxis]
     return _signal("energy residual", "J", run.reference_ns, balance - _first(balance), ("residual",))
 
 

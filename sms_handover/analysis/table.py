@@ -249,7 +249,7 @@ def _conservation_rows(runs: Sequence[RunMetrics]) -> tuple[Row, ...]:
     return (
         row("largest change of linear momentum [kg m/s]", physics, lambda of: of.linear_momentum),
         row("largest change of angular momentum [kg m^2/s]", physics, lambda of: of.angular_momentum),
-        row("largest |dE - W| / max E [-]", physics, lambda of: of.energy),
+        row("largest energy residual / max E [-]", physics, lambda of: of.energy),
         row("peak kinetic energy [J]", physics, lambda of: of.peak_kinetic_energy),
         *(row(label, physics, value) for label, value in _ACCOUNT if any(map(value, physics))),
         row("IK solves", runs, lambda item: float(item.ik.solves)),

@@ -113,7 +113,7 @@ def _by_itself(bag: Path, domain_id: int | None) -> int:
             scenario = scenario_in(read_info(bag), Path(folder))
         except BagError as error:
             raise ConfigurationError(str(error)) from error  # exit code 2: what was given cannot be used
-        again = simulate(scenario)
+        again = simulate(scenario, base_wrenches=recorded.base_wrenches)
     ended_early = recorded.tick_ns.size < again.tick_ns.size
     if ended_early:
         end_ns = int(recorded.tick_ns[-1])

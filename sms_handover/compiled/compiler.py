@@ -69,8 +69,8 @@ def _compiler() -> list[str]:
     command = shlex.split(os.environ.get("CC", "")) or ["cc"]
     if shutil.which(command[0]) is None:
         raise ConfigurationError(
-            f"dynamics 'compiled' needs a C compiler, and there is no {command[0]!r}: "
-            "install one, set CC to it, or take dynamics 'pinocchio'"
+            f"compiled dynamics need a C compiler, and there is no {command[0]!r}: "
+            "install one, set CC to it, or take 'pinocchio' instead of 'compiled'"
         )
     return command
 

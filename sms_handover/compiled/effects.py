@@ -19,7 +19,7 @@ from sms_handover.plant.external_wrenches import Companion, ExternalAccount
 from sms_handover.plant.integrators import TABLEAUS, Tableau
 from sms_handover.plant.joint_friction import JointFriction
 from sms_handover.plant.stepper import PinocchioStepper
-from sms_handover.types import Array, frozen
+from sms_handover.types import Array, BaseWrench, frozen
 from sms_handover.units import ns_to_seconds
 
 GIVEN = 7  # numbers of an account: linear and angular impulse, work
@@ -123,8 +123,8 @@ class CompiledResistedStepper(ResistedStepper):
         self._table = EffectsTable(self._arrays[2].size, resistance, tick_ns)
         self._tick_ns, self._h[0] = tick_ns, ns_to_seconds(tick_ns)
 
-    def begin(self, start_ns: int) -> None:
-        """Tell when the next step begins."""
+    def begin(self, start_ns: int, asked: BaseWrench | None = None) -> None:
+        """Tell when the next step begins; a wrench that is asked for is not for C."""
         self._start_ns = start_ns
 
     def step(self, q: Array, v: Array, effort: Array) -> tuple[Array, Array]:

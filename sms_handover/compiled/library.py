@@ -28,6 +28,22 @@ def dynamics_library(robot: RobotModel, schemes: Mapping[str, Tableau] = TABLEAU
     return library_of("dynamics", identity, lambda: str(_writer().dynamics_source(bodies, tools, schemes)))
 
 
+def linearisation_library(robot: RobotModel) -> Path:
+    """Return the library with the derivatives of a robot's inverse dynamics, made unless it is cached.
+
+    It is apart from the other because it takes longer to compile than all of that. Raises ConfigurationError
+    where it cannot be made.
+    """
+    bodies = body_tree(robot)
+    make = "sms_handover.compiled.linearisation_source"
+    return library_of("linearisation", _identity(bodies, (), {}), lambda: _written(make, bodies))
+
+
+def _written(module: str, bodies: tuple[Body, ...]) -> str:
+    """Return the C code of the linearisation, by the module that writes it."""
+    return str(_writer(module).linearisation_source(bodies))
+
+
 def _identity(bodies: tuple[Body, ...], tools: tuple[Tool, ...], schemes: Mapping[str, Tableau]) -> bytes:
     """Return a digest of all that the C code depends on: generator, schemes, and how the bodies are joined.
 
@@ -58,10 +74,10 @@ def _generator() -> bytes:
     return digest.digest()
 
 
-def _writer() -> Any:
-    """Return the C code generator; CasADi is imported only where code must be generated."""
+def _writer(module: str = "sms_handover.compiled.source") -> Any:
+    """Return a C code generator; CasADi is imported only where code must be generated."""
     try:
-        return import_module("sms_handover.compiled.source")
+        return import_module(module)
     except ModuleNotFoundError as error:
         if error.name != "casadi":
             raise

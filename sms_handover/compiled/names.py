@@ -8,6 +8,9 @@ OBSERVE, RESISTED_STEP, SETTLE = "sms_observe", "sms_resisted_step", "sms_settle
 TICKS, WORK_SIZE = "sms_ticks", "sms_work_size"  # the loop, and the numbers that it needs room for
 
 
+LINEARISATION = "sms_linearisation"
+
+
 def rest_name(scheme: str) -> str:
     """Return the name of the function that steps by a scheme after its first stage has been prepared."""
     return f"sms_rest_{scheme}"

@@ -41,7 +41,7 @@ def dynamics_source(bodies: Sequence[Body], tools: Sequence[Tool], schemes: Mapp
     joints = len(bodies) - 1
     by = _acceleration(bodies)
     angles, v = ca.SX.sym("angles", joints), ca.SX.sym("v", BASE_NV + joints)
-    numbers, known = _with_parameters(bodies)
+    numbers, known = with_parameters(bodies)
     resisted = ResistedFunctions(angles, v, numbers, known)
     functions = [
         *(step_function(step_name(n), by, scheme, joints, goes_on=False) for n, scheme in schemes.items()),
@@ -79,14 +79,19 @@ def dynamics_source(bodies: Sequence[Body], tools: Sequence[Tool], schemes: Mapp
     }
     lines = [f"#define {name} {value}" for name, value in definitions.items()]
     native = [(_NATIVE / f"{name}.c").read_text(encoding="ascii") for name in _NATIVE_FILES]
-    own = [(_NATIVE / f"{name}.c").read_text(encoding="ascii") for name in ("sine_cosine", "exponential")]
-    return "\n".join((*own, generator.dump(), *lines, *native))
+    exponential = (_NATIVE / "exponential.c").read_text(encoding="ascii")
+    return "\n".join((own_sine_cosine(), exponential, generator.dump(), *lines, *native))
+
+
+def own_sine_cosine() -> str:
+    """Return the C code of sine and cosine that all generated code uses."""
+    return (_NATIVE / "sine_cosine.c").read_text(encoding="ascii")
 
 
 def _acceleration(bodies: Sequence[Body]) -> Acceleration:
     """Return the functions for v' by the mass matrix, and by articulated bodies for later stages."""
     turn, v, force = _symbols(bodies)
-    parameters, known = _with_parameters(bodies)
+    parameters, known = with_parameters(bodies)
     robot = RigidBodies(known, *turn, v)
     factors, bias = robot.inertia_factors(), robot.bias()
     numbers = _kept(bias, factors)
@@ -115,7 +120,7 @@ def _computed_torque(bodies: Sequence[Body], by: Acceleration | None = None) -> 
     With ``by`` the numbers that its first stage keeps are a second result.
     """
     turn, v, _ = _symbols(bodies)
-    parameters, known = _with_parameters(bodies)
+    parameters, known = with_parameters(bodies)
     joints = len(bodies) - 1
     wanted = ca.SX.sym("wanted", joints)
     robot = RigidBodies(known, *turn, v)
@@ -135,7 +140,7 @@ def _loaded_torque(bodies: Sequence[Body], arm: int, last: int) -> Any:
     and the numbers that the first stage keeps by the truth.
     """
     turn, v, _ = _symbols(bodies)
-    parameters, known = _with_parameters(bodies)
+    parameters, known = with_parameters(bodies)
     joints = len(bodies) - 1
     wanted = ca.SX.sym("wanted", joints)
     own = [ca.SX.sym(name, PER_BODY) for name in ("in_truth", "in_model")]
@@ -162,7 +167,7 @@ def _by_feedback(name: str, inner: Any, joints: int, numbers: Sequence[int]) -> 
     return ca.Function(name, given, list(results) if inner.n_out() > 1 else [results])
 
 
-def _with_parameters(bodies: Sequence[Body]) -> tuple[Any, tuple[Body, ...]]:
+def with_parameters(bodies: Sequence[Body]) -> tuple[Any, tuple[Body, ...]]:
     """Return the parameters, and the bodies that have them in place of numbers."""
     parameters = ca.SX.sym("parameters", parameter_count(bodies))
     known = [

@@ -59,6 +59,12 @@ class CompiledTicks:
             return "enforced joint limits"
         if plant.effects and not WrenchTable.knows(plant.effects.resistance.wrenches):
             return "a wrench of this kind"
+        if plant.effects and plant.effects.on_deputy:
+            return "wrenches on the deputy"
+        if any(plant.base_wrenches):
+            return "wrenches from a topic"
+        if plant.robot.description.flexible_panels:
+            return "panels that swing"
         if (known.joint_names, known.arms) != (plant.robot.joint_names, plant.robot.arms):
             return "a model with other joints than the truth"
         return ""

@@ -19,7 +19,7 @@ from sms_handover.conditions.thruster_misfire import ThrusterMisfire
 from sms_handover.conditions.wrench import WrenchModel
 from sms_handover.conditions.wrench_history import WrenchHistory
 from sms_handover.configuration.checks import check_vector
-from sms_handover.configuration.conditions_fields import AXES, CONDITIONS_FIELDS, WORLD
+from sms_handover.configuration.conditions_fields import AXES, BODIES, CONDITIONS_FIELDS, ON_BASE, WORLD
 from sms_handover.configuration.sections import Section
 from sms_handover.configuration.yaml_reader import Mapping as YamlMapping
 from sms_handover.model.robot_model import RobotModel
@@ -32,23 +32,26 @@ _ROW = 7  # [-] time, force, torque
 class Conditions:
     """What is not ideal about a run in its plant; None or empty is ideal.
 
-    The error of the model is part of the true robot already.
+    ``wrenches`` act on the base, ``deputy_wrenches`` on the deputy, by name. The error of the model is part
+    of the true robot already.
     """
 
     friction: FrictionValues | None = None
     torque: TorqueErrors | None = None
     command: CommandErrors | None = None
     wrenches: Mapping[str, WrenchModel] = field(default_factory=dict)
+    deputy_wrenches: Mapping[str, WrenchModel] = field(default_factory=dict)
     sensors: Mapping[str, SensorValues] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in ("wrenches", "sensors"):
+        for name in ("wrenches", "deputy_wrenches", "sensors"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
     @property
     def acts(self) -> bool:
         """Whether something acts in the plant that an ideal one has not."""
-        return bool(self.friction or self.torque or self.command or self.wrenches)
+        any_wrench = self.wrenches or self.deputy_wrenches
+        return bool(self.friction or self.torque or self.command or any_wrench)
 
     @property
     def ideal(self) -> bool:
@@ -66,11 +69,15 @@ def conditions_of(content: YamlMapping, robot: RobotModel) -> Conditions:
     of rotors that the robot has not.
     """
     root = Section(content, Path(), spec=CONDITIONS_FIELDS)
+    on_base, on_deputy = (
+        _wrenches(root.section("wrenches"), body) if "wrenches" in root else {} for body in BODIES
+    )
     conditions = Conditions(
         _friction(root, robot.n_joints),
         _torque(root, robot.n_joints),
         _command(root),
-        _wrenches(root.section("wrenches")) if "wrenches" in root else {},
+        on_base,
+        on_deputy,
         sensors_of(root.section("sensors"), robot.n_joints) if "sensors" in root else {},
     )
     _require_rotors(root, conditions, robot)
@@ -129,11 +136,13 @@ def _command(root: Section) -> CommandErrors | None:
     return errors if errors.any else None
 
 
-def _wrenches(section: Section) -> dict[str, WrenchModel]:
-    """Return the wrenches by name."""
+def _wrenches(section: Section, body: str) -> dict[str, WrenchModel]:
+    """Return the wrenches on a body by name."""
     found = {}
     for name in section.keys:
         wrench = section.section(name)
+        if (wrench.name("on", "body", BODIES) if "on" in wrench else ON_BASE) != body:
+            continue
         kind = wrench.one_of(f"wrench {name!r}")
         inner = wrench.section(kind)
         with inner.located():

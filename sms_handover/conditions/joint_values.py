@@ -30,6 +30,16 @@ class FrictionValues:
                 f"must be >= the Coulomb friction of {self.coulomb[joint]:g} N m"
             )
 
+    def with_free(self, count: int) -> "FrictionValues":
+        """Return those of these joints and so many more without friction behind them."""
+        none = np.zeros(count)
+        viscous, coulomb, stiction, speed = (
+            np.concatenate([part, none])
+            for part in (self.viscous, self.coulomb, self.stiction, self.stribeck_speed)
+        )
+        speed[speed.size - count :] = 1.0  # [rad/s], of no effect
+        return FrictionValues(viscous, coulomb, stiction, speed)
+
     @property
     def any(self) -> bool:
         """Whether a joint has friction."""

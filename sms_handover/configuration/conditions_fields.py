@@ -14,6 +14,8 @@ from sms_handover.configuration.sensor_fields import SENSOR_FIELDS
 WRENCH_KINDS = ("constant", "thruster_misfire", "history", "gravity_gradient", "relative_orbit")
 BODY, WORLD = "body", "world"
 AXES = (BODY, WORLD)
+ON_BASE, ON_DEPUTY = "base", "deputy"
+BODIES = (ON_BASE, ON_DEPUTY)
 
 
 def _per_joint(
@@ -64,7 +66,7 @@ _COMMAND = MappingSpec(
 )
 _FORCE = vector(3, "force", "N")
 _TORQUE_OF_WRENCH = vector(3, "torque", "N m")
-_POINT = vector(3, "where the force acts in the axes of base_link", "m")
+_POINT = vector(3, "where the force acts in the axes of the body", "m")
 _AXES_OF = text("axes of force and torque", AXES)
 _ORBIT = {
     "radius": ValueSpec("radius of the orbit", "m", above=0.0),
@@ -72,15 +74,16 @@ _ORBIT = {
     "normal": vector(3, "direction of the orbital angular momentum in world"),
 }
 _WRENCH = MappingSpec(
-    "a wrench on the base",
+    "a wrench on the base or the deputy",
     optional={
+        "on": text("body that it acts on, by default the base; the deputy must have mass", BODIES),
         "constant": MappingSpec(
             "a constant force and torque",
             {"force": _FORCE, "torque": _TORQUE_OF_WRENCH},
             {"point": _POINT, "axes": _AXES_OF},
         ),
         "thruster_misfire": MappingSpec(
-            "a thruster that fires by mistake, fixed to the base",
+            "a thruster that fires by mistake, fixed to the body",
             {
                 "force": _FORCE,
                 "point": _POINT,
@@ -89,7 +92,7 @@ _WRENCH = MappingSpec(
             },
         ),
         "history": MappingSpec(
-            "force and torque about the origin of the base over time",
+            "force and torque about the origin of the body over time",
             optional={
                 "file": text(
                     "CSV file without a head, its path relative to this one: time s, force N, torque N m, "
@@ -147,7 +150,7 @@ CONDITIONS_FIELDS = MappingSpec(
         "friction": _FRICTION,
         "torque": _TORQUE,
         "command": _COMMAND,
-        "wrenches": NamedSpec("wrenches on the base by name", _WRENCH),
+        "wrenches": NamedSpec("wrenches from outside by name", _WRENCH),
         "model_error": _MODEL_ERROR,
         "sensors": SENSOR_FIELDS,
     },

@@ -35,9 +35,20 @@ BOX_OR_MOMENTS = EitherSpec(
     text("moments of inertia; uniform_box: those of a box of this mass and size", (UNIFORM_BOX,)),
     MOMENTS,
 )
+_FLEXIBLE = MappingSpec(
+    "a hinge with a spring and a damper that carries the panel, which then has mass",
+    {
+        "mass": _MASS,
+        "hinge": vector(3, "a point of the axis in base_link", "m"),
+        "axis": vector(3, "unit vector in base_link"),
+        "stiffness": ValueSpec("torque of the spring by angle", "N m/rad", above=0.0),
+    },
+    {"damping": ValueSpec("torque of the damper by rate", "N m s/rad", minimum=0.0)},
+)
 _PANEL = MappingSpec(
-    "a box that is drawn on the spacecraft and has no mass",
+    "a box that is drawn on the spacecraft, without mass unless it is flexible",
     {"xyz": vector(3, "centre in base_link", "m"), "size": _EDGES},
+    {"flexible": _FLEXIBLE},
 )
 _BASE = MappingSpec(
     "the spacecraft",

@@ -44,6 +44,7 @@ class LawSetup(Generic[G]):
     that is handed over, as the law knows it. Guidance comes every ``reference_ns``. What a law needs besides
     it gets if it declares so: a ``preview`` of targets to come, the ``distances`` between bodies. In real
     time ``start_solver`` starts a process that solves the problems of a planning law.
+    ``compiled_derivatives`` makes those of the dynamics as C code, for a law whose parameters ask for it.
     """
 
     robot: RobotModel
@@ -55,6 +56,7 @@ class LawSetup(Generic[G]):
     reference_ns: int = 20_000_000
     preview: Preview | None = None
     distances: Distances | None = None
+    compiled_derivatives: Callable[[RobotModel], Any] | None = None
     start_solver: Callable[["LawSetup[Any]"], RemoteSolver] | None = None
 
 

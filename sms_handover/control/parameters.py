@@ -63,15 +63,18 @@ class ControllerParameters(MpcGains, PidGains, NmpcGains):
     )
 
 
-def parameters_with(law: Law[Any]) -> type[ControllerParameters]:
+def parameters_with(law: Law[Any], every_node: type) -> type[ControllerParameters]:
     """Return the parameters of the controller under a law, with those of a law of another package.
 
-    Raises ConfigurationError if that law calls a parameter like one that is there already.
+    ``every_node`` is the dataclass of the parameters that every node has. Raises ConfigurationError if that
+    law calls a parameter like one that is there already.
     """
     if law.name in SHIPPED:
         return ControllerParameters
     for item in fields(law.parameters):
-        if item.name in ControllerParameters.__dataclass_fields__:
+        if item.name in {
+            found.name for taken in (ControllerParameters, every_node) for found in fields(taken)
+        }:
             raise ConfigurationError(
                 f"control law {law.name!r} has a parameter {item.name!r}, as the controller has: rename it"
             )

@@ -17,6 +17,8 @@ from sms_handover.types import BASE_NQ, BASE_NV, Array
 
 _LACKS = {
     Effect.ROTOR_INERTIA: "its spinning bodies have no rotors",
+    Effect.PANELS: "its joints are those of the arms alone",
+    Effect.DEPUTY_WRENCHES: "wrenches are not replayed",
     Effect.JOINT_STOPS: "its spinning bodies have no stops",
     Effect.WRENCHES: "it holds a torque in axes of the body, not of the world, over a tick",
     Effect.FRICTION: "its spinning bodies have springs and dampers only",

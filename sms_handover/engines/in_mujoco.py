@@ -13,6 +13,8 @@ from sms_handover.types import Array
 from sms_handover.units import ns_to_seconds
 
 _LACKS = {
+    Effect.PANELS: "its joints are those of the arms alone",
+    Effect.DEPUTY_WRENCHES: "wrenches are put on the base alone",
     Effect.JOINT_STOPS: "its joint limits are springs",
     Effect.FRICTION: "its dry friction is a soft constraint, without stiction",
 }

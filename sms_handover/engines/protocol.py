@@ -21,7 +21,9 @@ class Effect(Enum):
     JOINT_STOPS = "joint stops"
     DEPUTY_MASS = "a deputy with mass"
     WRENCHES = "wrenches from outside"
+    DEPUTY_WRENCHES = "wrenches on the deputy"
     FRICTION = "joint friction"
+    PANELS = "flexible panels"
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from sms_handover.conditions.wrench import WrenchModel
 from sms_handover.engines.protocol import Effect, FreeBody, Hold, Replay
 from sms_handover.errors import BagError
+from sms_handover.plant.base_wrenches import AskedWrenches
 from sms_handover.plant.joint_limits import ENFORCE
 from sms_handover.run_data import RunData
 from sms_handover.simulation.scenario import Scenario
@@ -30,10 +32,10 @@ def replay_of(run: RunData, scenario: Scenario) -> Replay:
         start_v=np.concatenate([run.base_twist[0], run.joint_velocity[0]]),
         efforts=run.joint_effort[1:],
         samples=np.searchsorted(run.tick_ns, run.reference_ns[compared_periods(run)]),
-        effects=frozenset(_effects(scenario)),
+        effects=frozenset(_effects(run, scenario)),
         deputy=_deputy(scenario),
         holds=_holds(run, tick_ns),
-        wrenches=tuple(scenario.truth.conditions.wrenches.values()),
+        wrenches=_wrenches(run, scenario),
     )
 
 
@@ -84,8 +86,16 @@ def _holds(run: RunData, tick_ns: int) -> tuple[Hold, ...]:
     )
 
 
-def _effects(scenario: Scenario) -> list[Effect]:
-    """Return the effects that a scenario has beyond efforts and links."""
+def _wrenches(run: RunData, scenario: Scenario) -> tuple[WrenchModel, ...]:
+    """Return the wrenches on the base, those that others have asked for included."""
+    of_conditions = tuple(scenario.truth.conditions.wrenches.values())
+    if not run.base_wrenches:
+        return of_conditions
+    return (*of_conditions, AskedWrenches(run.base_wrenches, scenario.parameters.common.tick_ns))
+
+
+def _effects(run: RunData, scenario: Scenario) -> list[Effect]:
+    """Return the effects that a run of a scenario has beyond efforts and links."""
     found = []
     if any(scenario.truth.robot.description.rotor_inertia.values()):
         found.append(Effect.ROTOR_INERTIA)
@@ -93,9 +103,13 @@ def _effects(scenario: Scenario) -> list[Effect]:
         found.append(Effect.JOINT_STOPS)
     if scenario.truth.schedule.deputy.mass:
         found.append(Effect.DEPUTY_MASS)
+    if scenario.truth.robot.description.flexible_panels:
+        found.append(Effect.PANELS)
     conditions = scenario.truth.conditions
-    if conditions.wrenches:
+    if conditions.wrenches or run.base_wrenches:
         found.append(Effect.WRENCHES)
+    if conditions.deputy_wrenches:
+        found.append(Effect.DEPUTY_WRENCHES)
     if conditions.friction is not None:
         found.append(Effect.FRICTION)
     return found

@@ -116,6 +116,10 @@ def _references(run: RunData, wanted: Wanted) -> RunTable:
     columns.add("kinetic_energy", "J", run.kinetic_energy)
     for name, joules in (("work", run.work), ("external_work", run.external_work), ("lost", run.lost)):
         columns.add(name, "J", joules)
+    if run.panel_names:
+        columns.add("elastic_energy", "J", run.elastic_energy)
+        columns.add_all([f"{panel}.position" for panel in run.panel_names], "rad", run.panel_position)
+        columns.add_all([f"{panel}.velocity" for panel in run.panel_names], "rad/s", run.panel_velocity)
     columns.add("ik_status", "", run.ik_status, INTEGER)
     phases = {phase.stamp_ns: phase for phase in run.phases}
     found = [phases.get(int(stamp_ns)) for stamp_ns in run.reference_ns]

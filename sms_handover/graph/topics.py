@@ -31,6 +31,8 @@ class Rate(Enum):
     CHANGE = "on change, latched"
     WALL = "every second of wall time"
     SOLVE = "every solve of a predictive law"
+    OUTSIDE = "every tick in which one is asked for"
+    OUTSIDE_REFERENCE = "every reference period, once any has acted"
     SHOWN = "every fifth solve of a predictive law"
     SENSOR = "as the sensor gives results"
 
@@ -54,6 +56,11 @@ class Topic:
     def is_global(self) -> bool:
         """Whether the topic is outside the namespace of the graph, where other graphs may publish too."""
         return self.name.startswith("/")
+
+    @property
+    def is_from_outside(self) -> bool:
+        """Whether no node of the graph publishes the topic; it counts by what its subscriber makes of it."""
+        return not self.publishers
 
     @property
     def is_shared(self) -> bool:
@@ -95,13 +102,16 @@ SENSOR_TYPES = {  # of the topics of sensors that have one of their own
 CLEARANCE = "clearance"  # only where it is measured online
 LINEAR_MOMENTUM = "momentum/linear"
 ANGULAR_MOMENTUM = "momentum/angular"
-LINEAR_IMPULSE = "impulse/linear"  # of wrenches from outside, only where there are any
+LINEAR_IMPULSE = "impulse/linear"  # of wrenches from outside
 ANGULAR_IMPULSE = "impulse/angular"
+BASE_WRENCH = "base_wrench"  # what anybody may ask for,
+APPLIED_BASE_WRENCH = "base_wrench/applied"  # and what acted, which is what a recording counts on
 ENERGY = "energy"
 IK_STATUS = "ik/status"
 MPC_STATUS = "mpc/status"  # only where the law solves a program as it goes on
 PLANNED_PATHS = "mpc/planned_paths"  # markers, for viewers
 ROBOT_DESCRIPTION = "robot_description"
+APPLIED_VALUES = "applied_values"
 DEPUTY_MARKER = "deputy/marker"
 RUN_STATE = "run/state"
 RUN_READY = "run/ready"
@@ -150,20 +160,20 @@ def graph_topics(
     arms: Iterable[str],
     *,
     clearance: bool = False,
-    wrenches: bool = False,
     sensors: Collection[str] = (),
     measured: bool = False,
 ) -> tuple[Topic, ...]:
     """Return every topic of the graph for a robot with these arms.
 
-    ``clearance`` if it is measured online; ``wrenches`` if conditions have some from outside; ``sensors`` are
-    the topics of those that conditions have; with ``measured`` the loop goes by what they tell.
+    ``clearance`` if it is measured online; ``sensors`` are the topics of those that conditions have; with
+    ``measured`` the loop goes by what they tell. Nodes outside the graph publish a topic without publishers.
     """
     everyone_else = (TRAJECTORY, IK, CONTROLLER)
     by_law, by_trajectory = state_topics(measured=measured), sampled_topics(measured=measured)
     pose, vector = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/Vector3Stamped"
     odometry = "nav_msgs/msg/Odometry"
     joints, text = "sensor_msgs/msg/JointState", "std_msgs/msg/String"
+    wrench = "geometry_msgs/msg/WrenchStamped"
 
     def state(name: str, type_name: str, rate: Rate) -> Topic:
         needed_by = (CONTROLLER,) * (name in by_law) + (TRAJECTORY,) * (name in by_trajectory)
@@ -182,11 +192,16 @@ def graph_topics(
         Topic(GRASP_EVENT, f"{_OURS}/GraspEvent", (PLANT,), (TRAJECTORY, CONTROLLER), Rate.CHANGE),
         Topic(LINEAR_MOMENTUM, vector, (PLANT,), (), Rate.REFERENCE),
         Topic(ANGULAR_MOMENTUM, vector, (PLANT,), (), Rate.REFERENCE),
+        Topic(LINEAR_IMPULSE, vector, (PLANT,), (), Rate.OUTSIDE_REFERENCE),
+        Topic(ANGULAR_IMPULSE, vector, (PLANT,), (), Rate.OUTSIDE_REFERENCE),
+        Topic(BASE_WRENCH, wrench, (), (PLANT,), Rate.OUTSIDE),
+        Topic(APPLIED_BASE_WRENCH, wrench, (PLANT,), (), Rate.OUTSIDE),
         Topic(ENERGY, f"{_OURS}/EnergyStamped", (PLANT,), (), Rate.REFERENCE),
         Topic(IK_STATUS, f"{_OURS}/IkStatus", (TRAJECTORY,), (), Rate.REFERENCE),
         Topic(MPC_STATUS, f"{_OURS}/MpcStatus", (CONTROLLER,), (), Rate.SOLVE),
         Topic(PLANNED_PATHS, "visualization_msgs/msg/MarkerArray", (CONTROLLER,), (), Rate.SHOWN),
         Topic(ROBOT_DESCRIPTION, text, (PLANT,), (), Rate.CHANGE),
+        Topic(APPLIED_VALUES, text, (PLANT,), (), Rate.CHANGE),
         Topic(TF, TF_TYPE, (PLANT, TRAJECTORY), (), Rate.REFERENCE),
         Topic(TF_STATIC, TF_TYPE, (PLANT,), (), Rate.CHANGE),
         Topic(DEPUTY_MARKER, "visualization_msgs/msg/Marker", (PLANT,), (), Rate.CHANGE),
@@ -199,10 +214,6 @@ def graph_topics(
         Topic(CLOCK, "rosgraph_msgs/msg/Clock", (PLANT,), (), Rate.CLOCK),
         Topic(DIAGNOSTICS, "diagnostic_msgs/msg/DiagnosticArray", LOOP_NODES, (), Rate.WALL),
     ]
-    if wrenches:
-        table += [
-            Topic(name, vector, (PLANT,), (), Rate.REFERENCE) for name in (LINEAR_IMPULSE, ANGULAR_IMPULSE)
-        ]
     if sensors or measured:
         table += [
             state(MEASURED_JOINT_STATES, joints, Rate.TICK),

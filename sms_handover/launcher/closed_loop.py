@@ -9,7 +9,7 @@ from rclpy.executors import Executor
 
 from sms_handover.analysis.deviation import LargestDeviation, StateDeviation
 from sms_handover.bag.info import read_info
-from sms_handover.bag.run.ticks import recorded_ticks
+from sms_handover.bag.run.ticks import recorded_base_wrenches, recorded_ticks
 from sms_handover.configuration.scenario_file import COMMON
 from sms_handover.errors import BagError, ConfigurationError, GraphError
 from sms_handover.graph.topics import CONTROLLER, PLANT
@@ -39,7 +39,7 @@ def closed_loop(bag: Path, domain_id: int | None) -> int:
         try:
             info = read_info(bag)
             scenario = scenario_in(info, folder)
-            ticks = recorded_ticks(bag)
+            ticks, wrenches = recorded_ticks(bag), recorded_base_wrenches(bag)
         except BagError as error:
             raise ConfigurationError(str(error)) from error  # exit code 2: what was given cannot be used
         with reserved_domain(domain_id) as domain:
@@ -48,9 +48,8 @@ def closed_loop(bag: Path, domain_id: int | None) -> int:
             for number in (signal.SIGTERM, signal.SIGHUP):
                 signal.signal(number, signal.default_int_handler)
             with joined_graph(plan, CONTROLLER) as (node, executor):
-                replay = CommandReplay(
-                    node, ticks, scenario.truth.robot, scenario.parameters.common.reference_ns
-                )
+                reference_ns = scenario.parameters.common.reference_ns
+                replay = CommandReplay(node, ticks, scenario.truth.robot, reference_ns, wrenches)
                 with NodeProcesses(folder, graph_environment(plan)) as processes:
                     processes.start(PLANT, ["--ros-args", *_plant_arguments(scenario)])
                     with Display(info.end_ns) as display:

@@ -1,7 +1,7 @@
 """Command replay: answers the plant with recorded commands, in place of controller and trajectory."""
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -15,6 +15,7 @@ from sms_handover.bag.run.ticks import RecordedTick
 from sms_handover.frames import BASE, WORLD
 from sms_handover.graph.topics import (
     BASE_ODOMETRY,
+    BASE_WRENCH,
     CONTROLLER,
     GRASP_EVENT,
     JOINT_COMMAND,
@@ -26,12 +27,14 @@ from sms_handover.graph.topics import (
     graph_topics,
 )
 from sms_handover.model.robot_model import RobotModel
+from sms_handover.ros.codecs.base_wrench import wrench_message
 from sms_handover.ros.codecs.convert import header
 from sms_handover.ros.codecs.loop_messages import JointStateCodec, Stamped, StateCodec, decoded
 from sms_handover.ros.node.endpoints import CountedPublisher, Endpoints
 from sms_handover.ros.node.message_filter import Decode, MessageFilter
 from sms_handover.ros.transport.inputs import OnSerialized
 from sms_handover.ros.transport.stamp_sync import StampSync
+from sms_handover.types import BaseWrench
 from sms_handover.units import NS_PER_S
 
 PEERS = (PLANT, CONTROLLER)
@@ -46,13 +49,18 @@ class CommandReplay:
     """Feeds a live plant in lock step from a recording, and compares every state with the recorded one."""
 
     def __init__(
-        self, node: Node, ticks: Iterator[RecordedTick], robot: RobotModel, reference_ns: int
+        self,
+        node: Node,
+        ticks: Iterator[RecordedTick],
+        robot: RobotModel,
+        reference_ns: int,
+        base_wrenches: Sequence[BaseWrench] = (),
     ) -> None:
         """Create the endpoints on a node with the name of the controller.
 
         Each ``reference_ns`` the plant needs a phase. Where none was recorded, as at the end of a run in
         real time, it gets one without grasp commands. Where no command was recorded the last one, zero at
-        first, is held, as by a plant in real time.
+        first, is held, as by a plant in real time. ``base_wrenches`` are those that acted on the base.
         """
         self.deviation = LargestDeviation()
         self.stamp_ns = -1  # of the latest state
@@ -69,6 +77,8 @@ class CommandReplay:
         self._command = self._endpoints.publisher(JOINT_COMMAND)
         self._phase = self._endpoints.publisher(TASK_PHASE)
         self._ready = self._endpoints.publisher(RUN_READY)
+        self._wrenches = base_wrenches
+        self._wrench = self._endpoints.publisher(BASE_WRENCH) if base_wrenches else None
         self._answers: list[tuple[CountedPublisher, Any]] = []  # to the last state
         self.refusals = MessageFilter(node.get_logger().warning, lambda topic, error: None)
         reads = dict(zip(_STATE, (self._codec.joints.checked, self._codec.odometry.checked), strict=True))
@@ -87,6 +97,9 @@ class CommandReplay:
     def _check_matched(self) -> None:
         if not self._endpoints.unmatched:
             self._matching.cancel()
+            for wrench in self._wrenches:  # before the run, so that each is there when its tick comes
+                if self._wrench:
+                    self._wrench.publish(wrench_message(wrench))
             self._ready.publish(String(data=CONTROLLER))
 
     def _subscribe(self, name: str, deliver: OnSerialized) -> None:

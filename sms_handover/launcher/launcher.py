@@ -112,9 +112,7 @@ def _run(plan: LaunchPlan, interrupts: Interrupts, memory: SharedMemory) -> Outc
         driver = LifecycleDriver(node, plan.own_nodes)
         if plan.server is not None:
             plan.server.wait_until_ready(interrupts.heed)
-        started = arguments_of(plan)
-        for name in sorted(started, key=lambda name: name != RECORDER):  # which takes longest to configure
-            arguments = started[name]
+        for name, arguments in arguments_of(plan).items():
             if name not in plan.external:
                 processes.start(name, arguments.line)
             elif plan.controller:
@@ -130,7 +128,7 @@ def joined_graph(plan: LaunchPlan, name: str) -> Iterator[tuple[Node, Executor]]
     os.environ.setdefault(_LOG_FOLDER, str(plan.log_folder / "ros"))  # its default needs a HOME
     os.environ.update(plan.scope.environment)
     try:
-        rclpy.init(domain_id=plan.domain, signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=[], domain_id=plan.domain, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # such as no thread or no memory left
         raise GraphError(f"ROS cannot be started: {error}") from error
     node = Node(name, start_parameter_services=False, enable_rosout=False)

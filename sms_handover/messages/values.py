@@ -9,6 +9,7 @@ from sms_handover.graph.events import RunEvent, Severity
 from sms_handover.graph.message_constants import member_of
 from sms_handover.plan_report import PlannedPaths, PlanReport, PlanStatus
 from sms_handover.types import (
+    BaseWrench,
     Collision,
     GraspAction,
     GraspCommand,
@@ -29,6 +30,13 @@ def pose_values(message: Any) -> tuple[float, ...]:
 def vector_values(message: Any) -> tuple[float, ...]:
     """Return the components of a Vector3Stamped."""
     return message.vector.x, message.vector.y, message.vector.z
+
+
+def base_wrench(message: Any) -> BaseWrench:
+    """Return the wrench of a WrenchStamped."""
+    force, torque = message.wrench.force, message.wrench.torque
+    parts = [(float(part.x), float(part.y), float(part.z)) for part in (force, torque)]
+    return BaseWrench(header_ns(message), message.header.frame_id, *parts)
 
 
 def energy_values(message: Any) -> tuple[float, ...]:

@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 from sms_handover.errors import RobotDescriptionError, UnknownNameError
 from sms_handover.frames import BASE, DEPUTY, joint_name, mount_frame, tool_frame
+from sms_handover.model.panels import FlexiblePanel, Panel, flexible_panels
 from sms_handover.model.parts import Floats, Gripper, Inertia, JointDescription, LinkDescription, Origin
 from sms_handover.model.shapes import ContactPairs, Shapes
 from sms_handover.model.validation import vector
@@ -61,18 +62,6 @@ class ArmDescription:
 
 
 @dataclass(frozen=True)
-class Panel:
-    """A box that is drawn on the spacecraft and has no mass: centre (3,) m in ``base_link``, edges (3,) m."""
-
-    xyz: Floats
-    size: Floats
-
-    def __post_init__(self) -> None:
-        vector(self.xyz, 3, "panel xyz", "m")
-        vector(self.size, 3, "panel size", "m", above=0.0)
-
-
-@dataclass(frozen=True)
 class Base:
     """The spacecraft body: its inertia in ``base_link``, edges (3,) m of the box drawn for it, its panels."""
 
@@ -114,11 +103,16 @@ class RobotDescription:
     @property
     def link_names(self) -> tuple[str, ...]:
         """The names of all links, those of frames without a body included."""
-        names = [BASE]
+        names = [BASE, *(panel.link for panel in self.flexible_panels)]
         for arm in self.arms:
             links = (link.name for link in arm.links)
             names += [mount_frame(arm.name), *links, arm.gripper.name, tool_frame(arm.name)]
         return tuple(names)
+
+    @property
+    def flexible_panels(self) -> tuple[FlexiblePanel, ...]:
+        """The panels on hinges with a spring and a damper."""
+        return flexible_panels(self.base.panels)
 
     @property
     def rotor_inertia(self) -> dict[str, float]:
@@ -128,4 +122,5 @@ class RobotDescription:
     @property
     def mass(self) -> float:
         """Total mass in kg."""
-        return self.base.inertia.mass + sum(arm.mass for arm in self.arms)
+        panels = sum(panel.panel.mass for panel in self.flexible_panels)
+        return self.base.inertia.mass + panels + sum(arm.mass for arm in self.arms)

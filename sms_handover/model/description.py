@@ -11,7 +11,8 @@ from sms_handover.configuration.yaml_reader import Mapping
 from sms_handover.errors import RobotDescriptionError
 from sms_handover.frames import BASE
 from sms_handover.model.arm_file import override_limits, read_arm, read_origin
-from sms_handover.model.assembly import ArmDescription, Base, Panel, RobotDescription, gripper_name
+from sms_handover.model.assembly import ArmDescription, Base, RobotDescription, gripper_name
+from sms_handover.model.panels import Hinge, Panel
 from sms_handover.model.parts import Floats, Gripper, Inertia, box_moments
 from sms_handover.model.shape_section import read_contact_pairs, read_shapes
 
@@ -49,7 +50,19 @@ def _base(section: Section) -> Base:
     with section.located("inertia"):
         inertia = Inertia(BASE, mass, com, moments)
     panels = section.sections("panels") if "panels" in section else ()
-    return Base(inertia, size, tuple(Panel(item.vector("xyz"), item.vector("size")) for item in panels))
+    return Base(inertia, size, tuple(map(_panel, panels)))
+
+
+def _panel(section: Section) -> Panel:
+    """Return one panel."""
+    xyz, size = section.vector("xyz"), section.vector("size")
+    if "flexible" not in section:
+        return Panel(xyz, size)
+    inner = section.section("flexible")
+    damping = inner.number("damping") if "damping" in inner else 0.0
+    hinge = inner.vector("hinge"), inner.vector("axis"), inner.number("stiffness"), damping
+    with inner.located():
+        return Panel(xyz, size, inner.number("mass"), Hinge(*hinge))
 
 
 def _base_moments(section: Section, mass: float, size: Floats) -> Floats:

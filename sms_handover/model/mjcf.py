@@ -137,7 +137,7 @@ class _Writer:
 
     def motors(self, root: ET.Element) -> None:
         """Add a motor per joint, which gives no more than the joint's limit."""
-        moving = [joint for joint in self._tree.joints if joint.kind != FIXED]
+        moving = [joint for joint in self._tree.joints if joint.kind != FIXED and not joint.is_passive]
         actuator = ET.SubElement(root, "actuator")
         for joint in moving:
             known = isfinite(joint.effort)
@@ -157,7 +157,9 @@ class _Writer:
         armature = self._rotor.get(joint.name, 0.0)
         motor = {"armature": _text([armature]), "damping": "0", "frictionloss": "0", "stiffness": "0"}
         bounds = {}
-        if self._limited and isfinite(joint.lower) and isfinite(joint.upper):
+        if joint.is_passive:
+            motor |= {"stiffness": _text([joint.stiffness]), "damping": _text([joint.damping])}
+        elif self._limited and isfinite(joint.lower) and isfinite(joint.upper):
             bounds = {"limited": "true", "range": _text([joint.lower, joint.upper])}
         kind = "slide" if joint.kind == "prismatic" else "hinge"
         ET.SubElement(body, "joint", motor | bounds, name=joint.name, type=kind, axis=_text(joint.axis))

@@ -11,8 +11,10 @@ import pinocchio as pin
 from sms_handover.errors import RobotDescriptionError, UnknownNameError
 from sms_handover.frames import tool_frame
 from sms_handover.model.assembly import RobotDescription
+from sms_handover.model.carried import Carried
 from sms_handover.model.description import load_robot
 from sms_handover.model.poses import pose_of, se3_of, twist_of
+from sms_handover.model.springs import Springs
 from sms_handover.model.urdf import to_urdf
 from sms_handover.types import BASE_NQ, BASE_NV, Array, Pose, Twist, read_only
 
@@ -23,15 +25,17 @@ class RobotModel:
     """A spacecraft with arms: kinematics and dynamics of its nv = 6 + n degrees of freedom.
 
     The configuration is q = (base position, base quaternion x y z w, n joint angles), the
-    velocity v = (base twist in ``base_link`` axes, n joint rates). There is no gravity. An instance
-    owns Pinocchio's workspace and must not be shared between threads.
+    velocity v = (base twist in ``base_link`` axes, n joint rates). There is no gravity. Panels on hinges are
+    locked at rest; :func:`~sms_handover.model.moving_panels.with_moving_panels` lets them swing, with
+    ``springs``. An instance owns Pinocchio's workspace and must not be shared between threads.
     """
 
     def __init__(self, description: RobotDescription) -> None:
         """Build the model; raises RobotDescriptionError where the description is inconsistent."""
         self.description = description
         self.urdf = to_urdf(description)
-        self.pin = pin.buildModelFromXML(self.urdf, pin.JointModelFreeFlyer())
+        rigid = to_urdf(description, panels_move=False) if description.flexible_panels else self.urdf
+        self.pin = pin.buildModelFromXML(rigid, pin.JointModelFreeFlyer())
         self.pin.gravity.setZero()
         self.data = self.pin.createData()
         self.base_solver = eigenpy.LLT(BASE_NV)  # workspace too: Cholesky of (6, 6)
@@ -48,6 +52,8 @@ class RobotModel:
         self.tool_frame_id: Mapping[str, int] = MappingProxyType(
             {arm: self.pin.getFrameId(tool_frame(arm)) for arm in self.arms}
         )
+        self.carried: Carried | None = None
+        self.springs: Springs | None = None
         self._apply_rotor_inertia()
 
     @classmethod

@@ -52,6 +52,9 @@ def to_srdf(urdf: str, disabled: Iterable[DisabledPair]) -> str:
     ET.SubElement(
         root, "virtual_joint", name="floating", type="floating", parent_frame=WORLD, child_link=tree.root
     )
+    for joint in tree.joints:
+        if joint.is_passive:
+            ET.SubElement(root, "passive_joint", name=joint.name)
     for pair in disabled:
         reason = pair.reason.value
         ET.SubElement(root, "disable_collisions", link1=pair.first, link2=pair.second, reason=reason)

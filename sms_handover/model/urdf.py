@@ -4,16 +4,18 @@ Numbers keep full double precision. URDF has no rotor inertia.
 """
 
 from collections.abc import Sequence
-from math import atan2, hypot
+from math import atan2, hypot, pi
 from xml.etree import ElementTree as ET
 
 from sms_handover.frames import BASE, mount_frame, tool_frame
 from sms_handover.model.assembly import ArmDescription, RobotDescription
+from sms_handover.model.panels import FlexiblePanel
 from sms_handover.model.parts import Inertia, JointDescription, LinkDescription, Origin
 from sms_handover.model.shape_elements import replace_solids, write_contacts
 from sms_handover.model.shapes import AT_ORIGIN
-from sms_handover.model.urdf_values import add_origin, numbers
+from sms_handover.model.urdf_values import STIFFNESS, add_origin, numbers
 
+_SWIFT = 1e9  # [rad/s] limit of the rate of a hinge, where URDF asks for one
 _COLOURS = {  # [-] red, green, blue, opacity; appearance only
     "body": (0.75, 0.68, 0.45, 1.0),
     "panel": (0.10, 0.16, 0.42, 1.0),
@@ -22,12 +24,14 @@ _COLOURS = {  # [-] red, green, blue, opacity; appearance only
 }
 
 
-def to_urdf(robot: RobotDescription) -> str:
+def to_urdf(robot: RobotDescription, *, panels_move: bool = True) -> str:
     """Return the robot as URDF with ``base_link`` as its root.
 
     Per arm: link ``<arm>_mount`` fixed to the body, joints ``<arm>_joint_<i>`` moving links
     ``<arm>_link_<i>``, then ``<arm>_gripper`` with its frame on the flange and ``<arm>_tool``, fixed.
-    Shapes are boxes and cylinders; the solar panels are visual only. What the description says of clearance
+    Shapes are boxes and cylinders; the solar panels are visual only. A panel on a hinge is a link
+    ``panel_<i>``; its joint is fixed unless ``panels_move``, and has the stiffness of its spring as an
+    attribute of ``dynamics`` that others ignore. What the description says of clearance
     replaces the collision elements of links, and is in an element of its own that others ignore.
     """
     root = ET.Element("robot", name=robot.name)
@@ -36,7 +40,10 @@ def to_urdf(robot: RobotDescription) -> str:
     base = _link(root, BASE, robot.base.inertia)
     _box(base, robot.base.size, AT_ORIGIN, "body", solid=True)
     for panel in robot.base.panels:
-        _box(base, panel.size, Origin(panel.xyz, (0.0, 0.0, 0.0)), "panel", solid=False)
+        if panel.hinge is None:
+            _box(base, panel.size, Origin(panel.xyz, (0.0, 0.0, 0.0)), "panel", solid=False)
+    for flexible in robot.flexible_panels:
+        _panel(root, flexible, moves=panels_move)
     for arm in robot.arms:
         _arm(root, arm)
     replace_solids(root, robot.shapes)
@@ -62,6 +69,23 @@ def _arm(root: ET.Element, arm: ArmDescription) -> None:
     _fixed(root, parent, gripper.name, arm.flange)
     _link(root, tool_frame(arm.name))
     _fixed(root, gripper.name, tool_frame(arm.name), gripper.tool)
+
+
+def _panel(root: ET.Element, panel: FlexiblePanel, *, moves: bool) -> None:
+    """Add a panel and its hinge."""
+    link = _link(root, panel.link, panel.inertia)
+    _box(link, panel.panel.size, Origin(panel.centre, (0.0, 0.0, 0.0)), "panel", solid=False)
+    hinge, place = panel.hinge, Origin(panel.hinge.xyz, (0.0, 0.0, 0.0))
+    if not moves:
+        _connect(ET.SubElement(root, "joint", name=panel.joint, type="fixed"), BASE, panel.link, place)
+        return
+    joint = ET.SubElement(root, "joint", name=panel.joint, type="revolute")
+    _connect(joint, BASE, panel.link, place)
+    ET.SubElement(joint, "axis", xyz=numbers(hinge.axis))
+    bounds = {"lower": numbers([-pi]), "upper": numbers([pi]), "velocity": numbers([_SWIFT])}
+    ET.SubElement(joint, "limit", {**bounds, "effort": numbers([0.0])})
+    damper = {"damping": numbers([hinge.damping]), "friction": numbers([0.0])}
+    ET.SubElement(joint, "dynamics", {**damper, STIFFNESS: numbers([hinge.stiffness])})
 
 
 def _link(root: ET.Element, name: str, inertia: Inertia | None = None) -> ET.Element:

@@ -9,6 +9,7 @@ from xml.etree import ElementTree as ET
 from sms_handover.errors import RobotDescriptionError
 from sms_handover.frames import tool_frame
 from sms_handover.model.parts import Floats, Inertia, Origin
+from sms_handover.model.urdf_values import STIFFNESS
 
 FIXED = "fixed"
 MOVING = ("revolute", "continuous", "prismatic")
@@ -26,7 +27,10 @@ class TreeLink:
 
 @dataclass(frozen=True)
 class TreeJoint:
-    """A joint: ``axis`` (3,) in its own frame; limits in rad or m, and N m or N, infinite if not given."""
+    """A joint: ``axis`` (3,) in its own frame; limits in rad or m, and N m or N, infinite if not given.
+
+    A passive joint has a spring of ``stiffness`` N m/rad and a damper of ``damping`` N m s/rad, and no motor.
+    """
 
     name: str
     kind: str
@@ -37,6 +41,13 @@ class TreeJoint:
     lower: float
     upper: float
     effort: float
+    stiffness: float = 0.0
+    damping: float = 0.0
+
+    @property
+    def is_passive(self) -> bool:
+        """Whether a spring moves the joint, not a motor."""
+        return self.stiffness > 0.0
 
 
 @dataclass(frozen=True)
@@ -129,7 +140,9 @@ def _joint(element: ET.Element) -> TreeJoint:
         raise RobotDescriptionError(
             f"joint {name!r} is of type {kind!r}, must be {FIXED}, {', '.join(MOVING[:-1])} or {MOVING[-1]}"
         )
-    axis, limit = element.find("axis"), element.find("limit")
+    axis, limit, dynamics = (element.find(tag) for tag in ("axis", "limit", "dynamics"))
+    stiffness = 0.0 if dynamics is None else _number(dynamics, STIFFNESS, name, 0.0)
+    passive = dynamics is not None and stiffness > 0.0
     bounded = limit is not None and kind != "continuous"
     return TreeJoint(
         name,
@@ -141,6 +154,8 @@ def _joint(element: ET.Element) -> TreeJoint:
         _number(limit, "lower", name, 0.0) if limit is not None and bounded else -inf,
         _number(limit, "upper", name, 0.0) if limit is not None and bounded else inf,
         _number(limit, "effort", name, inf) if limit is not None else inf,
+        stiffness,
+        _number(dynamics, "damping", name, 0.0) if dynamics is not None and passive else 0.0,
     )
 
 

@@ -5,6 +5,8 @@ from xml.etree import ElementTree as ET
 
 from sms_handover.model.parts import Origin
 
+STIFFNESS = "spring_stiffness"  # attribute of the dynamics of a joint with a spring, N m/rad; as SDF names it
+
 
 def add_origin(parent: ET.Element, origin: Origin) -> None:
     """Place an element in the frame of its link."""

@@ -142,6 +142,11 @@ class AnsweringNode(GraphNode[P]):
             stamp = self._answered_ns + self._tick_ns if self._command.count else 0
         return self._inputs.missing(stamp, self._needed(stamp)) or self._odometry
 
+    @property
+    def answer_is_near(self) -> bool:
+        """Whether only the plant has to work: for a reference trajectory and ik have to before."""
+        return self.awaited in self._state
+
     def _needed(self, stamp: int) -> tuple[str, ...]:
         """Return the inputs that belong to a stamp, the last one to come last."""
         return self._everything if self._lockstep and stamp % self._reference_ns == 0 else self._state
@@ -240,7 +245,8 @@ class ControllerNode(AnsweringNode[ControllerParameters]):
         name = self.get_parameter(LAW).value if self.has_parameter(LAW) else scenario.get(LAW)
         if name is None:
             return group
-        return parameters_with(law_named(str(name), f"{CONTROLLER}: parameter {LAW!r}"))
+        law = law_named(str(name), f"{CONTROLLER}: parameter {LAW!r}")
+        return parameters_with(law, type(self.common))
 
     def prepare(self) -> None:
         """Set up the law; raises UnstableLoopError if its gains cannot work at this tick."""

@@ -23,6 +23,7 @@ from sms_handover.graph.topics import (
     RUN_STATE,
     TASK_PHASE,
 )
+from sms_handover.nodes.parts.base_wrench_input import BaseWrenchInput
 from sms_handover.nodes.parts.plant_clearance import PlantClearance
 from sms_handover.nodes.parts.plant_description import PlantDescription
 from sms_handover.nodes.parts.plant_outputs import PlantOutputs
@@ -83,9 +84,10 @@ class PlantNode(GraphNode[PlantParameters]):
         self._reconfigured = self.runs > 0
         self._wait_for_others()
         self._make_endpoints()
-        self._clearance = PlantClearance(self.robot, schedule, self.common, self.endpoints.publisher)
-        self._description = PlantDescription(self.robot, schedule.deputy, self.endpoints.publisher)
-        self._transforms = PlantTransforms(self.robot, self.endpoints.publisher)
+        publisher = self.endpoints.publisher
+        self._clearance = PlantClearance(self.robot, schedule, self.common, publisher)
+        self._description = PlantDescription(self._plant, self.robot, schedule.deputy, publisher)
+        self._transforms = PlantTransforms(self.robot, publisher)
         self.create_timer(_TIMING_PERIOD_S, self._publish_timing)
         if self.lockstep:
             self.create_timer(self.parameters.resend_after, self._resend)
@@ -154,6 +156,11 @@ class PlantNode(GraphNode[PlantParameters]):
         return self._inputs.missing(self._plant.stamp_ns, self._needed) or JOINT_COMMAND
 
     @property
+    def answer_is_near(self) -> bool:
+        """Whether only the controller has to work: at a reference period trajectory and ik have to before."""
+        return self._needed is _COMMAND and not self._ahead_of_recorder
+
+    @property
     def _ahead_of_recorder(self) -> bool:
         """Whether the next state would be more than may be lost if the recorder were killed."""
         next_ns = self._plant.stamp_ns + self._tick_ns
@@ -164,6 +171,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self._publish = {name: self.endpoints.publisher(name) for name in names}
         publisher = self.endpoints.publisher
         self._outputs = PlantOutputs(self.robot, publisher, self.common, self.conditions)
+        BaseWrenchInput(self._plant, self.inputs, lambda: self._last_tick * self._tick_ns)
         for topic, codec in ((TASK_PHASE, self._phase_codec), (JOINT_COMMAND, self._command_codec)):
             self.inputs.subscribe(topic, partial(self._on_input, topic), codec.checked)
         self.inputs.subscribe(RUN_RECORDED, self._on_recorded, stamped)
@@ -342,6 +350,7 @@ class PlantNode(GraphNode[PlantParameters]):
             self.membership.end()
         self.membership.finished = False
         self._control.reset_run()
+        self._plant.base_wrenches.clear()
         self._plant.reset()
         self._clearance.reset()
         self._inputs.reset_run()

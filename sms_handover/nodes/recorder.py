@@ -83,7 +83,8 @@ class RecorderNode(GraphNode[RecorderParameters]):
         self._recorded = self.endpoints.publisher(RUN_RECORDED)
         self._take_over(self._recordings.current)
         for topic in self.endpoints.topics:
-            self._record(topic)
+            if not topic.is_from_outside:
+                self._record(topic)
         self._recording.begin()
         if self.parameters.record_all:
             self.create_timer(_DISCOVERY_PERIOD_S, self._discover_topics)
@@ -207,6 +208,7 @@ class RecorderNode(GraphNode[RecorderParameters]):
         periods = {
             Rate.TICK: self.common.tick_ns,
             Rate.REFERENCE: self.common.reference_ns,
+            Rate.OUTSIDE_REFERENCE: self.common.reference_ns,
             Rate.CLOCK: CLOCK_PERIOD_NS,
         }
         alone = len(topic.publishers) == 1

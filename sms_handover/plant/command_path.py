@@ -31,7 +31,7 @@ class CommandPath:
 
     def __init__(self, joints: int, delay: int, dropped: float, streams: RandomStreams) -> None:
         self._rest = read_only(np.zeros(joints))  # N m
-        self._delay, self._dropped = delay, dropped
+        self._delay, self.dropped = delay, dropped
         self._losses: TickNoise = streams.noise(_NAME, 1)
         self.reset()
 
@@ -41,9 +41,9 @@ class CommandPath:
 
     def losses(self, first: int, ticks: int) -> npt.NDArray[np.bool_]:
         """Return whether the commands (ticks,) of some ticks from a first one on get lost."""
-        if not self._dropped:
+        if not self.dropped:
             return np.zeros(ticks, dtype=np.bool_)
-        return self._losses.uniforms(first, ticks)[:, 0] < self._dropped
+        return self._losses.uniforms(first, ticks)[:, 0] < self.dropped
 
     def hold(self, waiting: Array, held: Array) -> None:
         """Go on with commands on their way (delay, n), the oldest first, and that which the motors have."""

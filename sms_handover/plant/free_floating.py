@@ -1,30 +1,34 @@
 """Free-floating plant: robot and deputy, advanced tick by tick under joint efforts."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
+from sms_handover.conditions.conditions import IDEAL
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
 from sms_handover.model.conserved import ConservedQuantities, together
-from sms_handover.model.robot_model import BASE_NQ, RobotModel
+from sms_handover.model.moving_panels import with_moving_panels
+from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
+from sms_handover.plant.arm_part import ArmPart, PanelState
+from sms_handover.plant.base_wrenches import BaseWrenches
+from sms_handover.plant.damped_stepper import DampedStepper
 from sms_handover.plant.deputy import MasslessDeputy
 from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics, pinocchio_dynamics
 from sms_handover.plant.effects import PlantEffects
 from sms_handover.plant.enforced_limits import EnforcedLimits
-from sms_handover.plant.external_wrenches import Companion, ExternalAccount
+from sms_handover.plant.external_wrenches import NO_FORCE, Companion, ExternalAccount
 from sms_handover.plant.grasping import execute_grasp
 from sms_handover.plant.integrators import TABLEAUS
-from sms_handover.plant.joint_limits import ENFORCE, JointLimitWatch
+from sms_handover.plant.joint_limits import ENFORCE, JointLimitWatch, require_start_within_limits
 from sms_handover.plant.parameters import PlantParameters
-from sms_handover.plant.payload import Payload
-from sms_handover.plant.plant_state import PlantState
+from sms_handover.plant.payload import Payload, deputy_at_start
+from sms_handover.plant.plant_state import InitialState, PlantState
 from sms_handover.plant.rigid_deputy import RigidDeputy
 from sms_handover.types import (
     Array,
+    BaseWrench,
     DeputyState,
     GraspAction,
     GraspCommand,
@@ -33,29 +37,12 @@ from sms_handover.types import (
     Pose,
     RobotState,
     TickRows,
-    Twist,
     frozen,
     read_only,
 )
 from sms_handover.units import ns_to_seconds
 
 Counts = npt.NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class InitialState:
-    """Where a run starts: base pose in ``world`` and joint angles (n,) rad, at rest, and the deputy.
-
-    The deputy floats with a twist of its origin in ``world`` axes; its inertia is in its own axes, None if
-    it has no mass.
-    """
-
-    base_in_world: Pose
-    joint_position: Array
-    deputy_in_world: Pose
-    deputy_grasp_frames: Mapping[str, Pose]
-    deputy_twist_in_world: Twist | None = None
-    deputy_inertia: pin.Inertia | None = None
 
 
 class FreeFloatingPlant:
@@ -80,40 +67,45 @@ class FreeFloatingPlant:
         ``make_dynamics`` is asked for every robot that comes about as the deputy changes hands, by default
         for Pinocchio's. ``effects`` are those of conditions that are not ideal.
         """
-        self._robot = robot
+        self._arms, self._robot = ArmPart(robot), with_moving_panels(robot)
         self._tolerance = parameters.grasp_tolerance
         self._initial = initial
         self._tick_ns = tick_ns
         self._tick_s = ns_to_seconds(tick_ns)
         tableau = TABLEAUS[parameters.integrator]
         make = make_dynamics or pinocchio_dynamics(tableau, self._tick_s)
-        self._effects = effects
-        self._make = effects.dynamics(make, tableau) if effects else make
+        self.base_wrenches = BaseWrenches(tick_ns)
+        self._inner = self._make = make
+        self._tableau = tableau
         self._watch = JointLimitWatch(robot, tick_ns)
         self._enforces, self._rated_speed = parameters.joint_limits == ENFORCE, parameters.rated_speed
-        self._check_start()
-        self._bare = self._dynamics_of(robot)
+        require_start_within_limits(robot, initial.joint_position)
+        self._use(effects)
         self.reset()
+
+    def _use(self, effects: PlantEffects | None) -> None:
+        """Go on with effects, from the next integration on."""
+        self._effects = effects
+        if effects:
+            self._make = effects.dynamics(self._inner, self._tableau)
+        self._bare = self._dynamics_of(self._robot)
 
     def reset(self) -> None:
         """Go back to the initial state at time zero."""
         self.tick = 0  # integrated since the start
         robot, initial = self._robot, self._initial
-        self.q = read_only(robot.configuration(initial.base_in_world, initial.joint_position))
-        self.v = read_only(np.zeros(robot.pin.nv))
-        self.joint_effort = read_only(np.zeros(robot.n_joints))
+        q = robot.configuration(initial.base_in_world, initial.joint_position)
+        rest = np.zeros(robot.pin.nq - q.size)  # of the panels
+        self._use_state(read_only([*q, *rest]), read_only(np.zeros(robot.pin.nv)))
+        self.joint_effort = read_only(np.zeros(self._arms.robot.n_joints))
         self._work = self._losses = 0.0
         if self._effects:
             self._effects.reset()
         self._watch.reset()
-        self._saturated_ticks = np.zeros(robot.n_joints, dtype=np.int64)
-        place = (initial.deputy_in_world, initial.deputy_grasp_frames)
-        self._payload: Payload | None = None
-        if initial.deputy_inertia is None:
-            self._deputy = MasslessDeputy(*place, initial.deputy_twist_in_world)
-        else:
-            body = RigidDeputy(*place, initial.deputy_inertia, self._tick_s, initial.deputy_twist_in_world)
-            self._deputy, self._payload = body, Payload(robot, body)
+        self._saturated_ticks = np.zeros(self._arms.robot.n_joints, dtype=np.int64)
+        self._deputy = deputy_at_start(initial, self._tick_s)
+        body = self._deputy if isinstance(self._deputy, RigidDeputy) else None
+        self._payload = Payload(robot, body) if body else None
         self._next_v: Array | None = None  # after the impulse of a grasp at this instant
         self._next_losses = 0.0
         self._load()
@@ -127,8 +119,8 @@ class FreeFloatingPlant:
         """Return the state to :meth:`restore`."""
         return PlantState(
             self.tick,
-            self.q,
-            self.v,
+            self._q,
+            self._v,
             self.joint_effort,
             self._work,
             self._losses,
@@ -139,12 +131,11 @@ class FreeFloatingPlant:
         )
 
     def restore(self, state: PlantState) -> None:
-        """Go back to a former state; raises ConfigurationError if it is that of another robot or deputy."""
+        """Go back to a former state; raises ConfigurationError on another robot, deputy or conditions."""
         shapes = [array.shape for array in (state.q, state.v, state.joint_effort)]
-        if shapes != [self.q.shape, self.v.shape, self.joint_effort.shape]:
-            raise ConfigurationError(
-                f"the snapshot has {state.joint_effort.size} joints, must have {self.joint_effort.size}"
-            )
+        if shapes != [self._q.shape, self._v.shape, self.joint_effort.shape]:
+            count, wanted = (q.size - BASE_NQ for q in (state.q, self._q))
+            raise ConfigurationError(f"the snapshot has {count} joints and hinges, must have {wanted}")
         has_mass = state.deputy.q.size > 0
         if has_mass != (self._payload is not None):
             kinds = ("with", "without") if has_mass else ("without", "with")
@@ -153,11 +144,14 @@ class FreeFloatingPlant:
                 "set deputy.mass, in kg, as in its run"
             )
         self.tick, self._work, self._losses = state.tick, state.work, state.losses
-        self.q, self.v, self.joint_effort = (read_only(a) for a in (state.q, state.v, state.joint_effort))
+        self._use_state(read_only(state.q), read_only(state.v))
+        self.joint_effort = read_only(state.joint_effort)
         self._saturated_ticks = np.array(state.saturated_ticks, dtype=np.int64)
         self._watch.restore(state.excesses)
         self._deputy.restore(state.deputy)
-        if self._effects and state.effects:
+        if self._effects is None and state.effects:
+            self._use_ideal_effects()
+        if self._effects:
             self._effects.restore(state.effects)
         self._next_v, self._next_losses = None, 0.0
         if self._payload:
@@ -166,8 +160,8 @@ class FreeFloatingPlant:
 
     @property
     def robot(self) -> RobotModel:
-        """The robot without what it carries."""
-        return self._robot
+        """The robot without what it carries, with panels locked."""
+        return self._arms.robot
 
     @property
     def loaded_robot(self) -> RobotModel:
@@ -223,7 +217,7 @@ class FreeFloatingPlant:
     @property
     def external_impulse(self) -> ExternalAccount | None:
         """What wrenches from outside have given since the start, None where conditions have none."""
-        return self._effects.external if self._effects and self._effects.has_wrenches else None
+        return self._effects.given if self._effects else None
 
     @property
     def losses(self) -> float:
@@ -233,17 +227,17 @@ class FreeFloatingPlant:
     @property
     def saturated_ticks(self) -> dict[str, int]:
         """Return per joint the number of ticks whose command was at the effort limit or beyond."""
-        return dict(zip(self._robot.joint_names, self._saturated_ticks.tolist(), strict=True))
+        return dict(zip(self._arms.robot.joint_names, self._saturated_ticks.tolist(), strict=True))
 
     @property
     def tools_in_world(self) -> dict[str, Pose]:
         """Return the pose of every tool."""
-        return self._kinematics.tools_at(self.q)
+        return self._kinematics.tools_at(self._q)
 
     @property
     def conserved(self) -> ConservedQuantities:
         """Return momenta, energy and centre of mass of robot and deputy."""
-        return self.with_deputy(self._kinematics.conserved(self.q, self.v))
+        return self.with_deputy(self._kinematics.conserved(self._q, self._v))
 
     def with_deputy(self, of_robot: ConservedQuantities) -> ConservedQuantities:
         """Return what is conserved of robot and deputy, by that of the robot with what it carries."""
@@ -260,16 +254,16 @@ class FreeFloatingPlant:
 
     def _carry_out(self, command: GraspCommand) -> GraspEvent:
         """Execute one command; with a deputy that has mass its momentum changes hands too."""
-        v = self.v if self._next_v is None else self._next_v
+        v = self._v if self._next_v is None else self._next_v
         if self._deputy.holder:
-            self._kinematics.carry(self._deputy, self.q, v)
-        motions = {arm: self._kinematics.tool_motion(self.q, v, arm) for arm in self._robot.arms}
+            self._kinematics.carry(self._deputy, self._q, v)
+        motions = {arm: self._kinematics.tool_motion(self._q, v, arm) for arm in self._robot.arms}
         tools = {arm: pose for arm, (pose, _) in motions.items()}
         twists = {arm: twist for arm, (_, twist) in motions.items()}
         payload, deputy = self._payload, self._deputy
         if payload is None or not isinstance(deputy, RigidDeputy):
             return execute_grasp(command, deputy, tools, twists, self._tolerance, self.stamp_ns)
-        before = payload.twist_in_hand(self.q, v) if deputy.holder else deputy.twist_in_deputy
+        before = payload.twist_in_hand(self._q, v) if deputy.holder else deputy.twist_in_deputy
         event = execute_grasp(command, deputy, tools, twists, self._tolerance, self.stamp_ns)
         if event.status is not GraspStatus.SUCCEEDED:
             return event
@@ -277,7 +271,7 @@ class FreeFloatingPlant:
             payload.let_go(before)
             self._next_v = v
             return event
-        taken = payload.taken(self.q, v, before)
+        taken = payload.taken(self._q, v, before)
         self._next_v = taken.velocity
         self._next_losses += taken.energy_lost
         impulse = payload.in_world(taken.impulse)
@@ -305,21 +299,45 @@ class FreeFloatingPlant:
         if self._next_v is not None:
             self._jump(self._next_v)
         if effects:
-            effects.begins(self.tick, self._stepper)
-        before = self.q
+            effects.begins(self.tick, self._stepper, self.base_wrenches.at(self.tick))
+        before, whole = self._q, self._arms.padded(effort)
         if self._enforced is None:
-            q, v = self._stepper.step(before, self.v, effort)
+            q, v = (self._swinging or self._stepper).step(before, self._v, whole)
         else:
-            q, v, effort, lost = self._enforced.step(before, self.v, effort)
+            q, v, whole, lost = self._enforced.step(before, self._v, whole)
+            effort = self._arms.efforts(whole)
             self._losses += lost
+        if self._swinging:
+            self._losses += self._swinging.taken
         if effects:
-            self._losses += effects.settle(self.companion)
-        for part in (effort * (q[BASE_NQ:] - before[BASE_NQ:])).tolist():
+            self._losses += effects.settle(self._floating)
+        for part in (whole * (q[BASE_NQ:] - before[BASE_NQ:])).tolist():
             self._work += part
-        self.q, self.v, self.joint_effort = q, v, effort
+        self._use_state(q, v)
+        self.joint_effort = effort
         self.tick += 1
-        if not self._deputy.holder:
+        if not (self._deputy.holder or (effects and effects.has_moved_deputy)):
             self._deputy.drift(self._tick_s)
+
+    def push(self, wrench: BaseWrench) -> None:
+        """Let a wrench act on the base over the tick of its stamp, and no other tick.
+
+        Raises MessageError if that tick is over or has one already, or on an unknown frame.
+        """
+        self.base_wrenches.add(wrench, self.tick)
+        if self._effects is None:
+            self._use_ideal_effects()
+            if self._next_v is None:  # else as that velocity is taken on
+                self._load()
+
+    def _use_ideal_effects(self) -> None:
+        """Go on with effects of ideal conditions, which know of the wrenches that are asked for."""
+        self._use(PlantEffects(IDEAL, self.joint_effort.size, self._tick_ns, seed=0))  # nothing is drawn
+
+    @property
+    def pushed(self) -> BaseWrench | None:
+        """The wrench that was asked for and acted over the latest tick."""
+        return self._effects.asked if self._effects else None
 
     def adopt(
         self,
@@ -337,7 +355,8 @@ class FreeFloatingPlant:
         """
         self.tick += steps
         self._losses = losses
-        self.q, self.v, self.joint_effort, self._work = q, v, joint_effort, work
+        self._use_state(q, v)
+        self.joint_effort, self._work = joint_effort, work
         self._saturated_ticks += saturated
         if not self._deputy.holder:
             for _ in range(steps):  # a sum of ticks, as one after the other makes it
@@ -345,7 +364,8 @@ class FreeFloatingPlant:
 
     def _jump(self, v: Array) -> None:
         """Go on from the velocity after an impulse, with the payload that the robot then has."""
-        self.v, self._next_v = v, None
+        self._use_state(self._q, v)
+        self._next_v = None
         self._losses += self._next_losses
         self._next_losses = 0.0
         self._load()
@@ -353,44 +373,56 @@ class FreeFloatingPlant:
     def _load(self) -> None:
         """Use the equations of motion of the robot with what it carries."""
         loaded = self.loaded_robot
-        dynamics, self._enforced = self._bare if loaded is self._robot else self._dynamics_of(loaded)
+        found = self._bare if loaded is self._robot else self._dynamics_of(loaded)
+        dynamics, self._swinging, self._enforced = found
         self._stepper, self._kinematics = dynamics.stepper, dynamics.kinematics
 
-    def _dynamics_of(self, robot: RobotModel) -> tuple[PlantDynamics, EnforcedLimits | None]:
-        """Return the dynamics of a robot, and its enforced limits."""
-        dynamics = self._make(robot)
+    def _dynamics_of(
+        self, robot: RobotModel
+    ) -> tuple[PlantDynamics, DampedStepper | None, EnforcedLimits | None]:
+        """Return the dynamics of a robot, its stepper with dampers, and its enforced limits."""
+        dynamics, h = self._make(robot), self._tick_s
+        swinging = DampedStepper(dynamics.stepper, robot.springs, h) if robot.springs else None
         if not self._enforces:
-            return dynamics, None
-        return dynamics, EnforcedLimits(robot, dynamics.stepper, self._rated_speed, self._tick_s)
+            return dynamics, swinging, None
+        return dynamics, swinging, EnforcedLimits(robot, swinging or dynamics.stepper, self._rated_speed, h)
+
+    def _use_state(self, q: Array, v: Array) -> None:
+        """Be at a state of all that moves, of which base and arms are seen from outside."""
+        self._q, self._v = q, v
+        self.q, self.v = self._arms.position(q), self._arms.velocity(v)
+
+    @property
+    def panels(self) -> PanelState | None:
+        """The angles and rates of the panels on hinges, None where there are none."""
+        springs, n = self._robot.springs, self.joint_effort.size
+        if springs is None:
+            return None
+        angle, rate = self._q[BASE_NQ + n :], self._v[BASE_NV + n :]
+        torque = springs.torque(self._q, self._v)
+        return PanelState(angle, rate, torque, float(springs.energy(angle)))
 
     @property
     def companion(self) -> Companion | None:
         """The deputy where it floats and has mass."""
+        return self._floating.as_companion(NO_FORCE) if self._floating else None
+
+    @property
+    def _floating(self) -> RigidDeputy | None:
+        """The deputy where it floats and has mass."""
         deputy = self._deputy
-        if not isinstance(deputy, RigidDeputy) or deputy.holder:
-            return None
-        conserved, mass = deputy.conserved, deputy.inertia.mass
-        return Companion(mass, conserved.centre_of_mass, conserved.linear_momentum / mass)
+        return deputy if isinstance(deputy, RigidDeputy) and not deputy.holder else None
 
     def _limited(self, asked: Array) -> Array:
         """Return the efforts that act, and count those at their limit or beyond."""
         effort = asked
-        at_limit = np.abs(asked) >= self._robot.effort_limit
+        at_limit = np.abs(asked) >= self._arms.robot.effort_limit
         if np.count_nonzero(at_limit):
             self._saturated_ticks += at_limit
-            effort = frozen(self._robot.limited(asked))
+            effort = frozen(self._arms.robot.limited(asked))
         return effort
 
     def _deputy_follow(self) -> None:
         """Move a held deputy with its tool."""
         if self._deputy.holder:
-            self._kinematics.carry(self._deputy, self.q, self.v)
-
-    def _check_start(self) -> None:
-        """Raise ConfigurationError where a joint starts outside its limits."""
-        robot, start = self._robot, np.asarray(self._initial.joint_position)
-        for name, value, low, high in zip(robot.joint_names, start, robot.lower, robot.upper, strict=True):
-            if not low <= value <= high:
-                raise ConfigurationError(
-                    f"initial position of {name} is {value} rad, must be in [{low}, {high}] rad"
-                )
+            self._kinematics.carry(self._deputy, self._q, self._v)

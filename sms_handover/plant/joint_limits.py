@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import POSITION_EXCEEDED, RATE_EXCEEDED, RunEvent, Severity
 from sms_handover.graph.topics import PLANT
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
@@ -134,6 +135,15 @@ class JointLimitWatch:
         start, end, beyond = map(ns_to_seconds, (excess.start_ns, excess.end_ns, excess.beyond_ns))
         detail = f"{robot.joint_names[joint]} {what} for {beyond:g} s, from {start:g} to {end:g} s"
         return RunEvent(stamp_ns, PLANT, kind, Severity.WARNING, detail, "", value, limit, unit)
+
+
+def require_start_within_limits(robot: RobotModel, start: Array) -> None:
+    """Raise ConfigurationError where a joint starts outside its limits."""
+    for name, value, low, high in zip(robot.joint_names, start, robot.lower, robot.upper, strict=True):
+        if not low <= value <= high:
+            raise ConfigurationError(
+                f"initial position of {name} is {value} rad, must be in [{low}, {high}] rad"
+            )
 
 
 def _kept(rows: Array, lower: Array, upper: Array) -> bool:

@@ -23,9 +23,17 @@ class MotorTorque:
         self.factor, self.offset, self.step = 1.0 + errors.gain, errors.offset, errors.step
         self._stepped = errors.step > 0.0
         self.divisor = np.where(self._stepped, errors.step, 1.0)
+        self._h = h
         self._sigma = errors.noise_density / sqrt(h)  # N m
         self._noise = streams.noise(_NAME, errors.gain.size)
         self._noisy = bool(np.any(self._sigma))
+
+    @property
+    def applied(self) -> dict[str, Array]:
+        """The errors (n,) by which it computes, by name."""
+        step = np.where(self._stepped, self.divisor, 0.0)
+        density = self._sigma * sqrt(self._h)
+        return {"gain": self.factor - 1.0, "offset": self.offset, "step": step, "noise_density": density}
 
     def given(self, tick: int, command: Array) -> Array:
         """Return the torques (n,) N m in a tick under a command (n,) N m."""

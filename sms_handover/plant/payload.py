@@ -4,6 +4,8 @@ from sms_handover.model.capture import Capture, capture, carried_jacobian
 from sms_handover.model.carrying import carrying
 from sms_handover.model.poses import se3_of
 from sms_handover.model.robot_model import RobotModel
+from sms_handover.plant.deputy import MasslessDeputy
+from sms_handover.plant.plant_state import InitialState
 from sms_handover.plant.rigid_deputy import RigidDeputy
 from sms_handover.types import Array
 
@@ -47,3 +49,11 @@ class Payload:
     def _jacobian(self, q: Array) -> Array:
         """Return the Jacobian (6, 6 + n) of the deputy in the hand that holds it."""
         return carried_jacobian(self._bare, q, self._deputy.holder, self._deputy.in_tool)
+
+
+def deputy_at_start(initial: InitialState, h: float) -> MasslessDeputy:
+    """Return the deputy where a run starts, rigid if it has mass; ``h`` s is the tick."""
+    place, twist = (initial.deputy_in_world, initial.deputy_grasp_frames), initial.deputy_twist_in_world
+    if initial.deputy_inertia is None:
+        return MasslessDeputy(*place, twist)
+    return RigidDeputy(*place, initial.deputy_inertia, h, twist)

@@ -7,9 +7,9 @@ from sms_handover.conditions.sensors.suite import Measured, SensorsState, Sensor
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.dynamics import MakeDynamics
 from sms_handover.plant.effects import PlantEffects
-from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
+from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.plant.parameters import PlantParameters
-from sms_handover.plant.plant_state import PlantState
+from sms_handover.plant.plant_state import InitialState, PlantState
 from sms_handover.types import Array, Pose, RobotState
 
 

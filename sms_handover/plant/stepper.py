@@ -29,6 +29,7 @@ class PinocchioStepper:
 
     def __init__(self, robot: RobotModel, tableau: Tableau, h: float) -> None:
         self._model, self._data = robot.pin, robot.data
+        self._springs = robot.springs
         self._integrator = LieGroupIntegrator(robot.pin, tableau, h)
         self._generalized = np.zeros(robot.pin.nv)  # (0, u): no wrench on the base
 
@@ -38,6 +39,8 @@ class PinocchioStepper:
         return self._integrator.step(self._acceleration, q, v)
 
     def _acceleration(self, q: Array, v: Array) -> Array:
-        """Return v' (6 + n,) from H v' + c = (0, u)."""
+        """Return v' (6 + n,) from H v' + c = (0, u), with u of springs where they are."""
+        if self._springs:
+            self._generalized[-len(self._springs) :] = self._springs.torque(q, v)
         result: Array = pin.aba(self._model, self._data, q, v, self._generalized, _IN_WORLD)
         return result

@@ -3,13 +3,23 @@
 from collections.abc import Iterator
 
 import numpy as np
+import numpy.typing as npt
 import pinocchio as pin
 
 from sms_handover.frames import tool_frame
 from sms_handover.model.floating_model import floating_model, joint_columns
 from sms_handover.model.poses import pose_of, pose_row
 from sms_handover.model.robot_model import BASE_NQ
+from sms_handover.run_data import RunData
 from sms_handover.types import Array
+
+Rows = npt.NDArray[np.int64]
+
+
+def moving_joints(run: RunData, ticks: Rows, periods: Rows) -> tuple[Array, tuple[str, ...]]:
+    """Return the positions (T, n + p) rad of arms and panels at some ticks and periods, and their names."""
+    angles = np.hstack([run.joint_position[ticks], run.panel_position[periods]])
+    return angles, (*run.joint_names, *run.panel_names)
 
 
 class DescribedRobot:

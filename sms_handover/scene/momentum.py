@@ -3,15 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
 from sms_handover.model.poses import se3_of
 from sms_handover.run_data import RunData
-from sms_handover.scene.links import DescribedRobot
+from sms_handover.scene.links import DescribedRobot, Rows, moving_joints
 from sms_handover.types import Array, Pose, freeze
-
-Rows = npt.NDArray[np.int64]
 
 _LEAST = 1e-6  # [kg m^2/s] far above rounding, and far below what a tumbling deputy brings along
 
@@ -49,7 +46,7 @@ def momentum_of(
     sizes = np.linalg.norm(angular, axis=1)
     if not np.any(sizes > _LEAST):  # neither where it was not recorded
         return None
-    centres = robot.centres_of_mass(run.base_pose[ticks], run.joint_position[ticks], run.joint_names)
+    centres = robot.centres_of_mass(run.base_pose[ticks], *moving_joints(run, ticks, periods))
     if deputy.mass:
         places = np.array([_place(row, deputy.com) for row in run.deputy_pose[periods]])
         total = robot.mass + deputy.mass

@@ -11,7 +11,7 @@ from sms_handover.clearance.worst_pair import WorstPair
 from sms_handover.errors import ConfigurationError
 from sms_handover.frames import tool_frame
 from sms_handover.run_data import RunData, Stamps
-from sms_handover.scene.links import DescribedRobot
+from sms_handover.scene.links import DescribedRobot, moving_joints
 from sms_handover.scene.momentum import MASSLESS, Momentum, PointMass, momentum_of
 from sms_handover.scene.planned_lines import PlannedLines, planned_lines
 from sms_handover.scene.shapes import Shape, read_shapes
@@ -88,7 +88,7 @@ def make_scene(
         links=robot.links,
         arms=run.arms,
         stamp_ns=stamps,
-        link_in_world=robot.poses(run.base_pose[ticks], run.joint_position[ticks], run.joint_names),
+        link_in_world=robot.poses(run.base_pose[ticks], *moving_joints(run, ticks, periods)),
         deputy_size=deputy_size,
         deputy_in_world=run.deputy_pose[periods],
         target_in_world={arm: poses[periods] for arm, poses in run.target_pose.items()},

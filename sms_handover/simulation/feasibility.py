@@ -104,7 +104,7 @@ class _Walk:
         for phase in self._schedule.phases:
             self._grasp(phase)
             if not self._deputy.holder:
-                self._drift(ns_to_seconds(phase.end_ns - phase.start_ns))
+                self._deputy.drift(ns_to_seconds(phase.end_ns - phase.start_ns))
             rest, restarts = self._reach(phase)
             self._base, self._joints = rest.base_in_world, rest.joint_position
             turned = pose_distance(self._schedule.base_in_world, self._base)[1]
@@ -126,14 +126,6 @@ class _Walk:
                 raise ScheduleError(f"phase {phase.name!r}: {event.detail}")
             if isinstance(self._deputy, RigidDeputy):
                 self._momentum.handed_over(event, self._deputy, self._base, self._joints)
-
-    def _drift(self, duration: float) -> None:
-        """Let a deputy that nobody holds move to where it is at the end of a phase."""
-        if isinstance(self._deputy, RigidDeputy):
-            for _ in range(round(duration / _DRIFT_STEP_S)):
-                self._deputy.drift(_DRIFT_STEP_S)
-        else:
-            self._deputy.drift(duration)
 
     def _reach(self, phase: Phase) -> tuple[_Rest, int]:
         """Return where a phase ends and after how many restarts; raises ScheduleError where it cannot."""

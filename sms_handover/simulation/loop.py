@@ -1,6 +1,6 @@
 """The loop as an object: plant, trajectory, inverse kinematics and controller of a scenario, tick by tick."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -24,6 +24,8 @@ from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import CONTROLLER
 from sms_handover.model.conserved import ConservedQuantities
 from sms_handover.plan_report import PlannedPaths, PlanReport
+from sms_handover.plant.applied_values import applied_text
+from sms_handover.plant.arm_part import PanelState
 from sms_handover.plant.external_wrenches import ExternalAccount
 from sms_handover.plant.sensed_plant import KnownState, SensedPlant, known_of
 from sms_handover.simulation.parameters import COMPILED
@@ -40,6 +42,7 @@ from sms_handover.simulation.wiring import (
 )
 from sms_handover.types import (
     Array,
+    BaseWrench,
     DeputyState,
     GraspEvent,
     IkStatus,
@@ -55,9 +58,9 @@ from sms_handover.types import (
 class Period:
     """What is worked out once per reference period, at the instant at which it begins.
 
-    Tool poses and targets are in ``world``; since the start the joint efforts have done ``work`` J, wrenches
-    from outside ``external_work`` J, and ``lost`` J have become heat;
-    ``external_impulse`` is None where no such wrenches act; ``ik_status`` is None where no tool had
+    Tool poses and targets are in ``world``; since the start the joint efforts have done ``work`` J,
+    wrenches from outside ``external_work`` J, and ``lost`` J have become heat; ``external_impulse`` is None
+    where no such wrenches act, ``panels`` where none is on a hinge; ``ik_status`` is None where no tool had
     a target. ``events`` has what came of grasp commands, ``decisions`` what was decided about the task.
     ``clearance`` is None unless it is measured online, ``measured`` without sensors.
     """
@@ -72,6 +75,7 @@ class Period:
     external_work: float
     lost: float
     external_impulse: ExternalAccount | None
+    panels: PanelState | None
     ik_status: IkStatus | None
     events: tuple[GraspEvent, ...]
     decisions: tuple[RunEvent, ...]
@@ -159,11 +163,17 @@ class Loop:
     a retry or failure of the task; it is ``finished`` once the last state has been answered.
     """
 
-    def __init__(self, scenario: Scenario | None = None, controller: Controller | None = None) -> None:
+    def __init__(
+        self,
+        scenario: Scenario | None = None,
+        controller: Controller | None = None,
+        base_wrenches: Sequence[BaseWrench] = (),
+    ) -> None:
         """Make the loop of a scenario, by default the shipped one; ``controller`` replaces that of its law.
 
-        Raises ConfigurationError where the scenario cannot be run, and where its controller is external and
-        none is given.
+        ``base_wrenches`` act over the ticks of their stamps. Raises ConfigurationError where the scenario
+        cannot be run, and where its controller is external and none is given, and MessageError on wrenches of
+        one tick or an unknown frame.
         """
         self.scenario = scenario or load_scenario()
         parameters, truth = self.scenario.parameters, self.scenario.truth
@@ -173,6 +183,8 @@ class Loop:
         if self._common.dynamics == COMPILED and not self._common.uses_measurements:
             conditions = replace(conditions, sensors={})  # C does not measure, and nobody would listen
         self._plant = make_plant(truth.robot, truth.schedule, self._common, parameters.plant, conditions)
+        for wrench in base_wrenches:
+            self._plant.push(wrench)
         self._generator = make_generator(robot, schedule, self._common, parameters.trajectory)
         self._find_joints = make_ik(robot, self._common, parameters.ik)
         measured = self._common.measures_clearance
@@ -231,6 +243,16 @@ class Loop:
     def deputy(self) -> DeputyState:
         """The deputy at the same instant."""
         return self._plant.deputy
+
+    @property
+    def base_wrenches(self) -> tuple[BaseWrench, ...]:
+        """The wrenches that others have asked for and that have acted so far."""
+        return tuple(w for w in self._plant.base_wrenches if w.stamp_ns < self._plant.stamp_ns)
+
+    @property
+    def applied(self) -> str:
+        """What acts in the plant, read back from it, as JSON."""
+        return applied_text(self._plant)
 
     @property
     def controller(self) -> Controller:
@@ -376,6 +398,7 @@ class Loop:
             plant.external_work,
             plant.losses,
             plant.external_impulse,
+            plant.panels,
             status,
             events,
             decisions,

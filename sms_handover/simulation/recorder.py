@@ -13,7 +13,7 @@ from sms_handover.plan_report import PlannedPaths, PlanReport
 from sms_handover.run_data import MeasuredRows, RunData
 from sms_handover.simulation.loop import Period, Ticks
 from sms_handover.simulation.quiet_periods import QuietPeriods
-from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, TaskPhase, TickRows
+from sms_handover.types import BASE_NQ, BASE_NV, Array, BaseWrench, GraspEvent, TaskPhase, TickRows
 
 _BY_PERIOD = (
     *("reference_position", "reference_velocity", "deputy_pose", "deputy_twist"),
@@ -21,6 +21,7 @@ _BY_PERIOD = (
     *("linear_impulse", "angular_impulse"),
 )
 _NONE = np.zeros(3)  # [N s], [N m s]
+_NO_PANELS = np.zeros(0)
 _NOT_ASKED = -1  # in place of a status where inverse kinematics was not asked
 _GROWTH = 1.5  # [-] of the room for rows, where a run is longer than it was told
 
@@ -31,9 +32,15 @@ class RunRecorder:
     Of a period only numbers, phase and events are kept, so that a long run stays small.
     """
 
-    def __init__(self, joint_names: tuple[str, ...], arms: tuple[str, ...], ticks: int = 0) -> None:
+    def __init__(
+        self,
+        joint_names: tuple[str, ...],
+        arms: tuple[str, ...],
+        ticks: int = 0,
+        panel_names: tuple[str, ...] = (),
+    ) -> None:
         """Start without a row, with room for so many ticks; for more it grows."""
-        self._joint_names, self._arms = joint_names, arms
+        self._joint_names, self._arms, self._panel_names = joint_names, arms, panel_names
         n = len(joint_names)
         self._ends = np.cumsum([BASE_NQ + n, BASE_NV + n, n, n]).tolist()
         self._table = np.empty((ticks, self._ends[-1]))
@@ -92,7 +99,7 @@ class RunRecorder:
         """Add what a reference period begins with."""
         reference, conserved, status = period.reference, period.conserved, period.ik_status
         given = period.external_impulse
-        deputy = pose_row(period.deputy.deputy_in_world)
+        panels, deputy = period.panels, pose_row(period.deputy.deputy_in_world)
         row = {
             "reference_ns": reference.stamp_ns,
             "reference_position": reference.position,
@@ -105,6 +112,9 @@ class RunRecorder:
             "work": period.work,
             "external_work": period.external_work,
             "lost": period.lost,
+            "elastic_energy": panels.energy if panels else 0.0,
+            "panel_position": panels.angle if panels else _NO_PANELS,
+            "panel_velocity": panels.rate if panels else _NO_PANELS,
             "linear_impulse": _NONE if given is None else given.linear_impulse,
             "angular_impulse": _NONE if given is None else given.angular_impulse,
             "ik_status": CONSTANTS[status] if status else _NOT_ASKED,
@@ -126,6 +136,9 @@ class RunRecorder:
         for name in _BY_PERIOD:
             self._periods[name].append(getattr(rows, name))
         self._periods["reference_ns"].append(rows.stamp_ns)
+        self._periods["elastic_energy"].append(np.zeros(len(rows.stamp_ns)))  # in C no panels swing
+        for name in ("panel_position", "panel_velocity"):
+            self._periods[name].append(np.zeros((len(rows.stamp_ns), 0)))
         status = [CONSTANTS[status] if status else _NOT_ASKED for status in rows.ik_status]
         self._periods["ik_status"].append(np.array(status))
         for arm in self._arms:
@@ -133,8 +146,8 @@ class RunRecorder:
             self._tool_pose[arm].append(rows.tool_pose[arm])
         self._phases.extend(quiet.phases)
 
-    def data(self) -> RunData:
-        """Return the run so far."""
+    def data(self, base_wrenches: tuple[BaseWrench, ...] = (), applied: str = "") -> RunData:
+        """Return the run so far, with the wrenches that others asked for, and what acts in the plant."""
         rows, (nq, nv, acted, _) = self._table[: self._count], self._ends
         return RunData(
             joint_names=self._joint_names,
@@ -152,6 +165,9 @@ class RunRecorder:
             grasp_events=tuple(self._events),
             run_events=tuple(self._decisions),
             plans=tuple(self._plans),
+            base_wrenches=base_wrenches,
+            panel_names=self._panel_names,
+            applied=applied,
             planned_paths=tuple(self._paths),
             measured=self._measured_rows(),
             **{name: np.concatenate(rows) for name, rows in self._periods.items()},

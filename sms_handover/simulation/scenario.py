@@ -115,7 +115,7 @@ def load_parameters(
     else:
         values, places = given(CONTROLLER, CONTROLLER)
         law = law_named(str(values["law"]), f"{places.get('law', CONTROLLER)}: parameter 'law'")
-        controller = build(parameters_with(law), values, CONTROLLER, places)
+        controller = build(parameters_with(law, CommonParameters), values, CONTROLLER, places)
     return ParameterSet(
         common=common,
         plant=group(PlantParameters, PLANT, PLANT),
@@ -181,7 +181,19 @@ def load_world(common: CommonParameters, role: str, scenario: ScenarioFile) -> W
     robot = RobotModel(description)
     conditions = conditions_of(documents.conditions, robot)
     schedule = schedule_of(documents.schedule, text, robot, common.reference_ns)
+    if role == TRUTH:
+        _check_wrenches(conditions, schedule)
     return World(robot, schedule, conditions if role == TRUTH else IDEAL, error)
+
+
+def _check_wrenches(conditions: Conditions, schedule: Schedule) -> None:
+    """Raise ConfigurationError where a wrench acts on a deputy without mass, which nothing can move."""
+    for name in conditions.deputy_wrenches:
+        if not schedule.deputy.mass:
+            raise ConfigurationError(
+                f"conditions.wrenches.{name} acts on the deputy, whose mass is 0 kg, must be > 0 kg: "
+                "set deputy.mass, or let the wrench act on the base"
+            )
 
 
 def deputy_masses(

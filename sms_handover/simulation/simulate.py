@@ -1,13 +1,13 @@
 """Simulate a scenario in one process: the same objects as in the graph, joined by plain calls."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from sms_handover.control.protocol import Controller
 from sms_handover.run_data import RunData
 from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.recorder import RunRecorder
 from sms_handover.simulation.scenario import Scenario
-from sms_handover.types import TaskPhase
+from sms_handover.types import BaseWrench, TaskPhase
 
 Progress = Callable[[int, TaskPhase], None]
 
@@ -17,19 +17,22 @@ def simulate(
     *,
     controller: Controller | None = None,
     progress: Progress | None = None,
+    base_wrenches: Sequence[BaseWrench] = (),
 ) -> RunData:
     """Return the run of a scenario, by default the shipped one.
 
     ``controller`` replaces that of the scenario and is reset first. ``progress`` is called each reference
-    period with the time in ns and the phase. Raises what :class:`~sms_handover.simulation.loop.Loop` does.
+    period with the time in ns and the phase. ``base_wrenches`` act as if they had come by topic
+    ``base_wrench``. Raises what :class:`~sms_handover.simulation.loop.Loop` does.
     """
-    loop = Loop(scenario, controller)
+    loop = Loop(scenario, controller, base_wrenches)
     robot = loop.scenario.model.robot
-    recorder = RunRecorder(robot.joint_names, robot.arms, loop.last_tick + 1)
+    panels = tuple(panel.joint for panel in loop.scenario.truth.robot.description.flexible_panels)
+    recorder = RunRecorder(robot.joint_names, robot.arms, loop.last_tick + 1, panels)
     while not loop.finished:
         ticks = loop.advance_quietly(recorder.room)
         recorder.add(ticks)
         if progress:
             for phase in ticks.phases:
                 progress(phase.stamp_ns, phase)
-    return recorder.data()
+    return recorder.data(loop.base_wrenches, loop.applied)

@@ -7,6 +7,7 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 
 from sms_handover.clearance.distances import ClearanceModel
+from sms_handover.compiled.linearisation import CompiledDerivatives
 from sms_handover.control.mpc.plan_problem import PlanProblem
 from sms_handover.control.mpc.plan_solver import PlanSolver
 from sms_handover.errors import SmsHandoverError
@@ -21,7 +22,7 @@ def make_solver(setup: SolverSetup) -> PlanSolver:
     """Return a solver; raises ConfigurationError."""
     robot = RobotModel(setup.robot)
     clearance = ClearanceModel(robot.pin, robot.urdf, robot.arms, setup.deputy.size)
-    return PlanSolver(robot, setup.deputy, setup.gains, NearPairs(clearance))
+    return PlanSolver(robot, setup.deputy, setup.gains, NearPairs(clearance), CompiledDerivatives)
 
 
 def main() -> int:

@@ -14,6 +14,7 @@ from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepp
 from sms_handover.compiled.effects import CompiledResistedStepper
 from sms_handover.compiled.inverse_kinematics import CompiledIk
 from sms_handover.compiled.kinematics import CompiledKinematics
+from sms_handover.compiled.linearisation import CompiledDerivatives
 from sms_handover.compiled.ticks import CompiledTicks
 from sms_handover.compiled.tool_motion import CompiledToolMotion
 from sms_handover.compiled.wrench_table import WrenchTable
@@ -31,13 +32,15 @@ from sms_handover.control.stability import check_stability
 from sms_handover.errors import ConfigurationError, ScheduleError
 from sms_handover.ik.levenberg_marquardt import FindJoints, find_joints
 from sms_handover.ik.parameters import IkParameters
+from sms_handover.model.poses import se3_of
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.conditioned_stepper import Resistance, ResistedStepper
 from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics, pinocchio_dynamics
 from sms_handover.plant.effects import PlantEffects
-from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
+from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.plant.integrators import TABLEAUS, Tableau
 from sms_handover.plant.parameters import PlantParameters
+from sms_handover.plant.plant_state import InitialState
 from sms_handover.plant.sensed_plant import SensedPlant
 from sms_handover.simulation.near_pairs import NearPairs
 from sms_handover.simulation.parameters import COMPILED, MEASURED, TRUE, CommonParameters
@@ -98,8 +101,11 @@ def make_dynamics(dynamics: str, tableau: Tableau, h: float) -> MakeDynamics:
     """Return what makes the dynamics of the plant, by Pinocchio or compiled."""
     if dynamics != COMPILED:
         return pinocchio_dynamics(tableau, h)
+    by_pinocchio = pinocchio_dynamics(tableau, h)
 
     def make(robot: RobotModel) -> PlantDynamics:
+        if robot.springs:  # C knows of no springs
+            return by_pinocchio(robot)
         resisted = partial(_resisted_stepper, robot, tableau, seconds_to_ns(h))
         return PlantDynamics(CompiledStepper(robot, tableau, h), CompiledKinematics(robot), resisted)
 
@@ -190,6 +196,7 @@ def make_controller(
         reference_ns=common.reference_ns,
         preview=preview,
         distances=distances,
+        compiled_derivatives=CompiledDerivatives,
         start_solver=SolverProcess if in_real_time else None,
     )
     controller = law.make(setup)
@@ -262,10 +269,19 @@ def longest_reference_ns(common: CommonParameters, parameters: ControllerParamet
 
 
 def _check_deputy_twist(schedule: Schedule, h: float) -> None:
-    """Raise ScheduleError where a deputy turns too far in one tick of ``h`` s for its integration."""
-    rate = float(np.linalg.norm(schedule.deputy.twist_in_world.angular))
+    """Raise ScheduleError where a deputy may turn too far in one tick of ``h`` s for its integration.
+
+    A body that tumbles freely turns at most with |L| / I_min, with I_min its least moment of inertia.
+    """
+    deputy = schedule.deputy
+    rate = float(np.linalg.norm(deputy.twist_in_world.angular))
+    if deputy.inertia is not None:
+        moments = np.array(deputy.inertia.inertia)
+        turn = se3_of(deputy.deputy_in_world).rotation.T @ deputy.twist_in_world.angular
+        rate = max(rate, float(np.linalg.norm(moments @ turn) / np.linalg.eigvalsh(moments)[0]))
     if rate * h > _MOST_TURN:
         raise ScheduleError(
-            f"deputy.twist_in_world turns it at {rate:g} rad/s, must be at most {_MOST_TURN / h:g} rad/s, "
-            f"{_MOST_TURN:g} rad in a tick of {h:g} s; use a shorter tick or a slower deputy"
+            f"deputy.twist_in_world lets it turn at up to {rate:g} rad/s, must be at most "
+            f"{_MOST_TURN / h:g} rad/s, {_MOST_TURN:g} rad in a tick of {h:g} s; use a shorter tick or a "
+            "slower deputy"
         )

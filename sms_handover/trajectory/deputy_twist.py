@@ -22,21 +22,28 @@ class DeputyTwist:
     def __init__(self, deputy: DeputyDescription) -> None:
         """Begin with the twist that the deputy is known to start with."""
         at_first = deputy.twist_in_world
-        self._at_first = at_first
+        self._at_first = self._latest = at_first
         self.follows = bool(deputy.mass or np.any(at_first.linear) or np.any(at_first.angular))
         self.before: Before | None = None
 
     def at(self, stamp_ns: int, deputy_in_world: Pose) -> Twist | None:
-        """Return the twist of its origin in ``world`` axes, None if it is not followed."""
+        """Return the twist of its origin in ``world`` axes, None if it is not followed.
+
+        Asked again at the same stamp it says the same.
+        """
         if not self.follows:
             return None
-        before, self.before = self.before, (stamp_ns, deputy_in_world)
-        if before is None or before[0] >= stamp_ns:
-            return self._at_first
+        before = self.before
+        if before is not None and before[0] == stamp_ns:
+            return self._latest
+        self.before, self._latest = (stamp_ns, deputy_in_world), self._at_first
+        if before is None or before[0] > stamp_ns:
+            return self._latest
         dt = ns_to_seconds(stamp_ns - before[0])
         old, new = se3_of(before[1]), se3_of(deputy_in_world)
         turned = pin.log3(old.rotation.T @ new.rotation)
-        return Twist((new.translation - old.translation) / dt, new.rotation @ (turned / dt))
+        self._latest = Twist((new.translation - old.translation) / dt, new.rotation @ (turned / dt))
+        return self._latest
 
 
 def twist_at(twist_in_world: Twist, origin: Array, point: Array) -> Twist:

@@ -142,7 +142,7 @@ def test_the_table_says_what_came_of_everything(pair: dict[str, RunData]) -> Non
         "arm_b (hold)",
         "overshoot [% of step]",
         "arm_b_joint_2",
-        "largest |dE - W| / max E [-]",
+        "largest energy residual / max E [-]",
         "Claims of the paper: 6 of 6 hold",
     ):
         assert text in table

@@ -20,6 +20,7 @@ from sms_handover.control.protocol import Guidance
 from sms_handover.model.known_payload import Grip, KnownPayload
 from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.model.reduced import base_twist_per_joint_rate
+from sms_handover.plan_report import PlanStatus
 from sms_handover.run_data import RunData
 from sms_handover.simulation.near_pairs import NearPairs
 from sms_handover.simulation.scenario import Scenario, load_scenario
@@ -37,7 +38,6 @@ from sms_handover.types import (
     GraspStatus,
     JointReference,
     PhaseState,
-    PlanStatus,
     PreviewedTargets,
     TaskPhase,
     Twist,
@@ -125,8 +125,8 @@ def independent(program: Program) -> Array:
 def test_rates_are_those_of_an_independent_solve(smooth: Scenario, seed: int) -> None:
     """With bounds of all kinds that bind; multipliers have the right signs and only where bounds bind."""
     random = np.random.default_rng(seed)
-    law, q = law_of(smooth, clearance=0.12), start(smooth)
-    gains = Gains(arm_rate_limit=0.05, clearance=0.12)
+    law, q = law_of(smooth, keep_apart=0.12), start(smooth)
+    gains = Gains(arm_rate_limit=0.05, keep_apart=0.12)
     target = targets_of(smooth, random.uniform(-0.3, 0.3, 3))
     program = law.program(gains, motion_at(smooth, q, random.uniform(-0.05, 0.05, 14)), target)
     found = program.solve()
@@ -176,8 +176,8 @@ def carried_on(scenario: Scenario, law: Balancer, gains: Gains, target: Previewe
 
 def test_no_bound_of_distances_and_rates_is_passed(smooth: Scenario) -> None:
     """Arm A is sent into the gripper of B, which gives way and stays as far off as it has to."""
-    gains, n = Gains(clearance=0.05, arm_rate_limit=0.4), smooth.model.robot.n_joints
-    law = law_of(smooth, clearance=0.05)
+    gains, n = Gains(keep_apart=0.05, arm_rate_limit=0.4), smooth.model.robot.n_joints
+    law = law_of(smooth, keep_apart=0.05)
     tools = smooth.model.robot.tools_at(start(smooth))
     target = targets_of(smooth, tools["arm_b"].position - tools["arm_a"].position)
     model = make_clearance(smooth.model.robot, smooth.model.schedule)
@@ -198,7 +198,7 @@ def test_no_limit_of_a_joint_is_passed(smooth: Scenario) -> None:
     beyond[up], beyond[down] = robot.upper[up] + 1.0, robot.lower[down] - 1.0
     target = replace(targets_of(smooth, np.zeros(3)), tool_in_world={}, joint_position=beyond)
     law, n = law_of(smooth, moved=True), robot.n_joints
-    for row in carried_on(smooth, law, Gains(base_turn_weight=0.0, clearance=0.0), target):
+    for row in carried_on(smooth, law, Gains(base_turn_weight=0.0, keep_apart=0.0), target):
         joints = row[BASE_NQ:-n]
         assert (joints < robot.upper).all() and (joints > robot.lower).all()
     assert (robot.upper - joints)[up].max() < 0.02 and (joints - robot.lower)[down].max() < 0.02
@@ -228,6 +228,18 @@ def test_the_expected_motion_has_the_momentum_of_the_state(smooth: Scenario) -> 
     np.testing.assert_allclose(motion.drift + motion.reaction @ v[BASE_NV:], v[:BASE_NV], atol=1e-9)
     later = expected(robot, q, v, q[BASE_NQ:], v[BASE_NV:], H)
     np.testing.assert_allclose(later.q, pin.integrate(robot.pin, q, H * v), atol=1e-12)
+
+
+def test_idle_arms_take_over_the_momentum_of_the_base(smooth: Scenario) -> None:
+    """A base that turns by its momentum is slowed down, as far as the changes of rates in one period go."""
+    robot, q, law = smooth.model.robot, start(smooth), law_of(smooth)
+    v = np.zeros(robot.pin.nv)
+    v[3:BASE_NV] = [0.002, -0.001, 0.0015]  # rad/s
+    motion = expected(robot, q, v, q[BASE_NQ:], v[BASE_NV:], H)
+    target = replace(targets_of(smooth, np.zeros(3)), tool_in_world={})
+    rates = law.program(Gains(base_turn_weight=1e8), motion, target).solve().rates
+    turns = motion.drift[3:] + motion.reaction[3:] @ rates
+    assert np.linalg.norm(turns) < 0.01 * np.linalg.norm(motion.drift[3:])
 
 
 def test_a_payload_counts_from_the_state_after_its_event(smooth: Scenario) -> None:
@@ -281,7 +293,8 @@ def test_after_a_phase_led_by_joints_a_preview_begins_where_they_end() -> None:
     for arm, led in phase.targets.items():
         assert isinstance(led, JointTarget)
         ends[robot.arm_joints[arm]] = led.position
-    preview.update(TaskPhase(0, index, phase.name), JointReference(0, joints, still), robot.tools_at(q), q)
+    reference, v = JointReference(0, joints, still), np.zeros(robot.pin.nv)
+    preview.update(TaskPhase(0, index, phase.name), reference, robot.tools_at(q), q, v)
     (target,) = preview.ahead([phase.end_ns - phase.start_ns])
     expected_tool = robot.tools_at(np.concatenate([q[:BASE_NQ], ends]))["arm_b"]
     np.testing.assert_allclose(target.tool_in_world["arm_b"].position, expected_tool.position, atol=1e-9)

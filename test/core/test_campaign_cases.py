@@ -100,7 +100,14 @@ def test_masses_are_read_back_from_what_the_plant_integrates() -> None:
     [
         ("conditions.friction.viscous", 0.1),
         ("conditions.command.delay", 0.004),
+        ("conditions.sensors.encoders.step", 3e-5),
+        ("conditions.sensors.gyro.bias[1]", 1e-5),
+        ("conditions.sensors.vision.latency", 0.2),
         ("conditions.model_error.base.mass", 0.02),
+        ("conditions.wrenches.solar_pressure.constant.force[0]", -3e-5),
+        ("conditions.wrenches.gravity.gravity_gradient.radius", 6.9e6),
+        ("conditions.sensors.gyro.bias[1]", 1e-5),
+        ("conditions.sensors.vision.latency", 0.2),
     ],
 )
 def test_conditions_are_read_back_from_the_plant(path: str, value: float) -> None:

@@ -24,6 +24,7 @@ from sms_handover.campaign.engine.choice import workers_for
 from sms_handover.campaign.engine.dask_workers import DaskWorkers, answers_of
 from sms_handover.campaign.engine.run import run_campaign
 from sms_handover.campaign.engine.scheduler_url import require_safe
+from sms_handover.campaign.page.campaign_page import campaign_page
 from sms_handover.campaign.record.campaign_folder import CampaignFolder, merge, open_campaign
 from sms_handover.campaign.record.journal import JOURNAL, JournalWriter
 from sms_handover.campaign.record.manifest import Shard
@@ -74,7 +75,8 @@ def ended_at_last(child: "subprocess.Popen[str]") -> Iterator[list[psutil.Proces
 @pytest.mark.slow
 def test_rows_depend_on_no_worker_order_or_kill(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One process; the same backwards; 2 workers with kill -9 of one, then of the driver; 1 worker."""
-    file = written(tmp_path, cases=CASES)
+    values = {"common.duration": 0.04, "common.conditions": "nominal"}
+    file = written(tmp_path, cases=CASES, values=values)
     (tmp_path / "scratch").mkdir()
     monkeypatch.setenv("TMPDIR", str(tmp_path / "scratch"))
     run_here(file, tmp_path / "serial")
@@ -233,6 +235,8 @@ def test_it_stops_at_a_look_whatever_the_order(tmp_path: Path, capsys: pytest.Ca
     assert main(["campaign", "status", str(tmp_path / "out")]) == 0
     said = capsys.readouterr().out
     assert "8 of 8 rows" in said and "stopped after 8 of 40 cases: every interval is narrow enough" in said
+    page = campaign_page(CampaignFolder(tmp_path / "out"))
+    assert "It stopped after 8." in page and "8 of 8 runs." in page
     run_here(written(tmp_path / "all", cases=3, stop=stop), tmp_path / "few", program=STUB)
     assert main(["campaign", "status", str(tmp_path / "few")]) == 0
     assert "stopped" not in capsys.readouterr().out

@@ -90,7 +90,7 @@ def test_tables_say_of_how_many_cases_and_adjust_for_how_many_draws(tmp_path: Pa
     """Of six draws one matters; Holm's least p is six times what it was [Holm1979]."""
     rng = np.random.default_rng(4)
     drawn: dict[str, Any] = {f"x{k}": rng.normal(size=30) for k in range(6)}
-    values = [*drawn["x2"][:29], nan]
+    values = [*(drawn["x2"] + rng.normal(size=30))[:29], nan]
     campaign = read_campaign(written(tmp_path))
     found = {("smooth", "nmpc"): columns(values, **drawn)}
     (section,) = outcome_sections(campaign, found)
@@ -99,7 +99,7 @@ def test_tables_say_of_how_many_cases_and_adjust_for_how_many_draws(tmp_path: Pa
     ((head, table),) = sensitivity_sections(campaign, found)
     assert head[-1] == "p, Holm"
     p, adjusted = ([float(row.cells[place]) for row in table.rows] for place in (1, 2))
-    assert adjusted[2] == pytest.approx(6.0 * p[2]) and min(adjusted) == adjusted[2]
+    assert 0.0 < p[2] < 0.01 and adjusted[2] == pytest.approx(6.0 * p[2], rel=1e-3) == min(adjusted)
     assert holm([0.01, nan, 0.04, 0.03]) == pytest.approx([0.03, nan, 0.06, 0.06], nan_ok=True)
 
 

@@ -12,7 +12,8 @@ from sms_handover.model.capture import capture, carried_jacobian
 from sms_handover.model.conserved import ConservedQuantities, together
 from sms_handover.model.poses import pose_of, pose_row, se3_of, twist_in_deputy
 from sms_handover.model.robot_model import BASE_NV, RobotModel
-from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
+from sms_handover.plant.free_floating import FreeFloatingPlant
+from sms_handover.plant.plant_state import InitialState
 from sms_handover.plant.rigid_deputy import RigidDeputy
 from sms_handover.simulation.scenario import load_parameters
 from sms_handover.types import Array, GraspAction, GraspCommand, GraspStatus, Pose, Twist, read_only

@@ -4,7 +4,7 @@ import stat
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,9 @@ import pytest
 from sms_handover.compiled import library
 from sms_handover.compiled.compiler import library_of
 from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
+from sms_handover.compiled.linearisation import CompiledDerivatives
 from sms_handover.compiled.ticks import CompiledTicks
+from sms_handover.control.mpc.derivatives import MassMatrix, PinocchioDerivatives, mass_matrix
 from sms_handover.control.protocol import Guidance
 from sms_handover.errors import ConfigurationError, MissingDependencyError, UnknownNameError
 from sms_handover.model.conserved import conserved_quantities
@@ -346,3 +348,30 @@ def test_a_folder_that_others_can_write_to_is_not_used(
 def test_another_kind_of_dynamics_is_unknown() -> None:
     with pytest.raises(UnknownNameError, match="did you mean 'compiled'"):
         load_scenario("colliding", {"common": {"dynamics": "compield"}})
+
+
+def test_the_linearisation_is_that_of_pinocchio(draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Derivatives of momentum and efforts to 1e-12, with momentum; and a run that asks for them has them."""
+    robot = load_scenario("planar").model.robot
+    ours, theirs = CompiledDerivatives(robot), PinocchioDerivatives(robot)
+    for _ in range(10):
+        joints, v = draw.random.uniform(-3.0, 3.0, robot.n_joints), draw.random.normal(size=robot.pin.nv)
+        q, a = robot.configuration(draw.pose(), joints), draw.random.normal(size=robot.n_joints)
+        mass, _ = mass_matrix(robot, robot.pin.createData(), q)
+        found, expected = ours.at(q, v, a, mass), theirs.at(q, v, a, mass)
+        pairs = [(getattr(found, part.name), getattr(expected, part.name)) for part in fields(found)]
+        for one, other in (*pairs, (ours.momentum(q, v), theirs.momentum(q, v))):
+            np.testing.assert_allclose(one, other, rtol=0.0, atol=_ROUNDING * np.abs(other).max())
+    calls, call = list[Array](), CompiledDerivatives.at
+
+    def counted(self: CompiledDerivatives, q: Array, v: Array, a: Array, mass: MassMatrix) -> Any:
+        calls.append(q)
+        return call(self, q, v, a, mass)
+
+    monkeypatch.setattr(CompiledDerivatives, "at", counted)
+    values = {"common.duration": 0.3, "common.tick": 0.01, "law": "mpc"}
+    by_pinocchio = simulate(load_scenario("planar", values)).joint_velocity
+    assert not calls
+    compiled = simulate(load_scenario("planar", {**values, "controller.linearisation": "compiled"}))
+    assert len(calls) > 100 and np.abs(by_pinocchio).max() > 1e-3
+    np.testing.assert_allclose(compiled.joint_velocity, by_pinocchio, rtol=0.0, atol=1e-9)

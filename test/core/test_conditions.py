@@ -1,5 +1,6 @@
 """Conditions of a run: each acts, none moves another, all are repeated by reset, snapshot and seed."""
 
+import json
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -74,6 +75,27 @@ def ideal_run() -> RunData:
 def test_every_effect_acts(effect: str, ideal_run: RunData) -> None:
     run = simulate(_scenario(EFFECTS[effect]))
     assert np.abs(run.joint_velocity - ideal_run.joint_velocity).max() > 1e-12
+
+
+def test_values_read_back_from_the_plant_are_those_of_the_file() -> None:
+    """Of every effect, by the objects that compute with it; a drawn body is that of the description."""
+    scenario = _scenario({**EVERYTHING, "friction.stribeck_speed": 0.02, "friction.stiction": 0.07}, 0.02)
+    applied = json.loads(simulate(scenario).applied)
+    for path, asked in {**EVERYTHING, "friction.stribeck_speed": 0.02, "friction.stiction": 0.07}.items():
+        section, _, name = path.partition(".")
+        if section == "wrenches":
+            wrench, kind = name.split(".")
+            found = applied["wrenches"][wrench]
+            assert found["on"] == "base"
+            for key, value in asked.items():
+                unit = np.linalg.norm(value) if key in ("radial", "normal") else 1.0
+                assert np.array(found[kind][key]) * unit == pytest.approx(np.array(value), rel=1e-12), path
+        elif section not in ("model_error", "sensors"):
+            assert np.array(applied[section][name]) == pytest.approx(asked, rel=1e-12), path
+    true, known = (world.robot.description.base.inertia.mass for world in (scenario.truth, scenario.model))
+    assert applied["robot"]["bodies"]["root_joint"]["mass"] == pytest.approx(true)
+    assert true != known
+    assert set(applied["robot"]["rotor_inertia"].values()) == {0.31}
 
 
 def test_momentum_and_energy_are_accounted_for_with_everything_on() -> None:

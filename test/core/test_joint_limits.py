@@ -17,9 +17,10 @@ from sms_handover.model.description import load_robot
 from sms_handover.model.parts import Gripper, Inertia, JointDescription, LinkDescription, Origin
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.complementarity import solve_bounded
-from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
+from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.plant.joint_limits import ENFORCE, REPORT, JointLimitWatch
 from sms_handover.plant.joint_stops import JointStops
+from sms_handover.plant.plant_state import InitialState
 from sms_handover.simulation.scenario import load_parameters
 from sms_handover.simulation.simulate import simulate
 from sms_handover.types import Array, Pose

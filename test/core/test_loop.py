@@ -111,7 +111,7 @@ def test_what_a_snapshot_needs_is_asked_for(scenario: Scenario, overrides: Overr
     with pytest.raises(ConfigurationError, match="the snapshot has 3 phases, must have the 4"):
         Loop(load_scenario("colliding", overrides)).restore(snapshot)
     smaller = replace(snapshot.plant, q=np.zeros(14), v=np.zeros(13), joint_effort=np.zeros(7))
-    with pytest.raises(ConfigurationError, match="the snapshot has 7 joints, must have 14"):
+    with pytest.raises(ConfigurationError, match="the snapshot has 7 joints and hinges, must have 14"):
         Loop(scenario).restore(replace(snapshot, plant=smaller))
     file = tmp_path / "snapshot.json"
     save_snapshot(snapshot, file)

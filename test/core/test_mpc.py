@@ -14,14 +14,16 @@ from sms_handover.control.mpc.controller import MpcController, MpcState
 from sms_handover.control.mpc.distance_rows import DistanceModel
 from sms_handover.control.mpc.horizon import Horizon
 from sms_handover.control.mpc.momentum import BaseStart, base_start
+from sms_handover.control.mpc.patience import Patience
 from sms_handover.control.mpc.placement import placements
 from sms_handover.control.mpc.plan import Plan
+from sms_handover.control.mpc.plan_queue import PlanQueue
 from sms_handover.control.mpc.planner import Planner, PlanStart
 from sms_handover.control.mpc.prediction import Prediction, PredictionModel
-from sms_handover.control.mpc.quadratic_program import solve
+from sms_handover.control.mpc.quadratic_program import Solution, solve
 from sms_handover.control.mpc.sensitivity import Sensitivity
 from sms_handover.control.mpc.tool_errors import ToolErrorModel
-from sms_handover.errors import ConfigurationError, ControllerError, MissingDependencyError
+from sms_handover.errors import ConfigurationError, ControllerError, MissingDependencyError, NoPlanError
 from sms_handover.graph.events import PLAN_FAILED
 from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.poses import pose_of, se3_of
@@ -324,9 +326,33 @@ def test_rows_that_contradict_each_other_are_named(draw: Draw) -> None:
     )
     assert hard.status is PlanStatus.INFEASIBLE and hard.largest_slack_row == "hard 0"
     assert hard.change.size == 0
+    endless = solve(np.eye(3), np.zeros(3), [upper, lower], 1)
+    assert endless.status is PlanStatus.ITERATION_LIMIT
+    assert endless.largest_slack_row == "soft 0" and endless.largest_slack == pytest.approx(2.0)
     for wrong in (-np.eye(3), np.full((3, 3), np.nan)):
         with pytest.raises(ControllerError, match="expected a convex and finite program"):
             solve(wrong, np.zeros(3), [upper], 300)
+
+
+def test_patience_names_the_limit_that_keeps_the_arms_from_their_task() -> None:
+    """Unless plans have lasted for a horizon in between, and once the plan that brakes is over."""
+    row, nothing = "distance arm_a_gripper - arm_b_gripper", np.zeros(0)
+    stuck = Solution(PlanStatus.ITERATION_LIMIT, nothing, 300, (), 0.05, row, float("nan"))
+    patience, queue = Patience(20_000_000), PlanQueue()
+    queue.offer(Plan(1, 0, np.zeros(1), np.zeros(1), np.zeros((2, 1)), np.full(2, 0.1)))
+    for _ in range(2):
+        patience.brakes(stuck)
+    for _ in range(80):
+        patience.solved(1.6)
+    for count in range(3):
+        assert not patience.is_over, count
+        patience.brakes(stuck)
+    assert patience.is_over
+    assert not patience.is_at_rest(700_000_000, queue) and patience.is_at_rest(701_000_000, queue)
+    told = str(patience.error(720_000_000, 0.0, ""))
+    assert f"at 0.72 s: {row} exceeds its limit by 0.05 m, relax it" in told
+    told = str(patience.error(720_000_000, 0.1, "base rate about z"))
+    assert "at 0.72 s: base rate about z exceeds its limit by 0.1 rad/s" in told
 
 
 def test_without_its_solver_the_law_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -449,23 +475,31 @@ def test_a_plan_is_followed_from_node_to_node(draw: Draw) -> None:
 
 
 def test_solves_that_fail_are_carried_by_the_plan_before_then_the_arms_brake() -> None:
-    """At the limit of iterations the old plan is used and counted; after five in a row the arms brake."""
+    """At the limit of iterations the old plan is used and counted; after five in a row the arms brake.
+
+    Once they are at rest and there still is no plan the run ends and says why.
+    """
     loop = Loop(scenario_of("paper", 4.0))
     for _ in range(30):
         loop.advance_period()
     before = loop.snapshot()
     failing = Loop(scenario_of("paper", 4.0, program_iterations=1, joint_rate_limit=0.05, failed_plans=5))
     failing.restore(before)
-    reports, rates, events = list[PlanReport](), list[float](), list[str]()
     failing.advance_period()
     snapshot = failing.snapshot()
     failing.restore(before)
-    while not failing.finished and failing.state.stamp_ns < 2_000_000_000:
-        ticks = failing.advance_period()
-        assert ticks.plan is not None
-        reports.append(ticks.plan)
-        rates.append(float(np.abs(ticks.rows.v[-1, BASE_NV:]).max()))
-        events += [event.kind for told in ticks.excesses.values() for event in told]
+    reports, rates, events = list[PlanReport](), list[float](), list[str]()
+
+    def go_on() -> None:
+        while not failing.finished:
+            ticks = failing.advance_period()
+            reports.extend([ticks.plan] if ticks.plan else [])
+            rates.append(float(np.abs(ticks.rows.v[-1, BASE_NV:]).max()))
+            events.extend(event.kind for told in ticks.excesses.values() for event in told)
+
+    with pytest.raises(NoPlanError, match=r"at rest at .* s: its programs end after 1 iterations"):
+        go_on()
+    assert len(reports) == 15  # three times five solves
     statuses = [report.status for report in reports]
     assert statuses[:4] == [PlanStatus.ITERATION_LIMIT] * 4 and statuses[4] is PlanStatus.BRAKING
     assert [report.reused_plans for report in reports[:5]] == [1, 2, 3, 4, 5]

@@ -19,6 +19,8 @@ from sms_handover.control.mpc.plan_problem import PlanProblem
 from sms_handover.control.mpc.plan_queue import PlanQueue
 from sms_handover.control.mpc.plan_solver import PlanSolver
 from sms_handover.control.mpc.planner import Step
+from sms_handover.control.mpc.real_time import MpcInRealTime
+from sms_handover.errors import NoPlanError
 from sms_handover.plan_report import PlanReport, PlanStatus
 from sms_handover.simulation import loop as loop_module
 from sms_handover.simulation import wiring
@@ -36,7 +38,7 @@ class Delayed:
     """Solves in this process, and answers when it has been asked as often as ``delay`` says of a plan."""
 
     def __init__(self, delay: Callable[[int], int], setup: Any) -> None:
-        self._solver = PlanSolver(setup.robot, setup.deputy, setup.gains, setup.distances)
+        self._solver = PlanSolver(setup.robot, setup.deputy, setup.gains, setup.distances, None)
         self._delay = delay
         self.trouble = ""
         self.problems = list[PlanProblem]()
@@ -161,6 +163,19 @@ def test_without_plans_the_arms_brake_and_an_old_plan_is_not_used(in_real_time: 
     assert fastest[-1] > 0.01
 
 
+def test_without_a_solver_the_law_ends_once_the_arms_are_at_rest(in_real_time: Start) -> None:
+    """In one line that says how the solver ended."""
+    loop = in_real_time(lambda number: 1_000_000 if number > 6 else 10)
+    before, controller = Followed(loop, 130), loop.controller
+    assert isinstance(controller, MpcInRealTime) and np.abs(before.rates[-1]).max() > 0.1
+    remote, trouble = controller._remote, "the solver process was ended by SIGKILL"
+    assert isinstance(remote, Delayed)
+    remote.trouble = trouble
+    with pytest.raises(NoPlanError, match=rf"no plan .* at rest at .* s: {trouble}"):
+        Followed(loop, 2000)
+    assert np.abs(loop.state.joint_velocity).max() < 1e-4
+
+
 _PARENT = """
 import os, signal
 from sms_handover.control.law import LawSetup
@@ -193,7 +208,7 @@ def test_the_process_of_the_solver_gives_the_same_bits_and_tells_its_end(
     try:
         loop.advance()
         (answer,) = _answers(process, 1)
-        here = PlanSolver(setup.robot, setup.deputy, setup.gains, setup.distances)
+        here = PlanSolver(setup.robot, setup.deputy, setup.gains, setup.distances, None)
         delayed = in_real_time(lambda number: 1000)
         delayed.advance()
         (problem,) = delayed.controller._remote.problems  # type: ignore[attr-defined]

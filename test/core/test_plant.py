@@ -11,8 +11,9 @@ from sms_handover.errors import ConfigurationError
 from sms_handover.model.conserved import ConservedQuantities
 from sms_handover.model.poses import pose_distance, pose_of, se3_of
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
+from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.plant.integrators import TABLEAUS
+from sms_handover.plant.plant_state import InitialState
 from sms_handover.simulation.scenario import load_parameters
 from sms_handover.types import Array, GraspAction, GraspCommand, GraspStatus, Pose
 from sms_handover.units import ns_to_seconds

@@ -1,5 +1,6 @@
 """Control laws by name: ours, and one of a package that nobody here knows."""
 
+from dataclasses import make_dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ from my_controller.law import LAW
 from my_controller.task_space_pd import TaskSpaceGains, TaskSpacePd
 
 from sms_handover.analysis.equality import compare_runs
+from sms_handover.configuration.parameters import parameter
 from sms_handover.control.law import Law, LawSetup, Need
 from sms_handover.control.nmpc import NMPC
 from sms_handover.control.parameters import ControllerParameters, parameters_with
@@ -16,6 +18,7 @@ from sms_handover.control.protocol import inner_of
 from sms_handover.control.registry import law_named, law_names
 from sms_handover.errors import ConfigurationError, UnknownNameError
 from sms_handover.simulation.check import check_scenario
+from sms_handover.simulation.parameters import CommonParameters
 from sms_handover.simulation.scenario import Scenario, load_parameters, load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.simulation.wiring import gains_by_phase, make_controller
@@ -104,7 +107,7 @@ def test_an_unknown_law_is_named_with_the_nearest(tmp_path: Path) -> None:
     file.write_text("controller:\n  ros__parameters:\n    law: pdi\n", encoding="utf-8")
     with pytest.raises(UnknownNameError, match=r"mine\.yaml:3: parameter 'law': unknown control law 'pdi'"):
         load_parameters({}, [file])
-    assert parameters_with(NMPC) is ControllerParameters
+    assert parameters_with(NMPC, CommonParameters) is ControllerParameters
 
 
 @pytest.mark.parametrize(
@@ -136,6 +139,9 @@ def test_a_law_gets_what_it_declares_to_need(
     monkeypatch.syspath_prepend(offer(tmp_path, "odd", **laws))
     with pytest.raises(ConfigurationError, match="'clashing' has a parameter 'proportional', as the contr"):
         load_parameters({"controller": {"law": "clashing"}})
+    own = make_dataclass("Own", [("clearance", float, parameter("one of every node's"))], frozen=True)
+    with pytest.raises(ConfigurationError, match="'clashing' has a parameter 'clearance', as the contr"):
+        parameters_with(replace(CLASHING, parameters=own), CommonParameters)
     parameters = load_parameters({"controller": {"law": "wanting"}})
     robot, schedule = scenario.truth.robot, scenario.truth.schedule
     made = inner_of(make_controller(robot, schedule, parameters.common, parameters.controller))

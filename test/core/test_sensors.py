@@ -3,6 +3,7 @@
 from base64 import b64decode
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from math import exp, radians, sqrt
 from typing import Any
 
@@ -14,7 +15,7 @@ from sms_handover.analysis.equality import before, compare_runs
 from sms_handover.conditions.random_streams import RandomStreams
 from sms_handover.conditions.sensors.encoders import EncoderValues
 from sms_handover.conditions.sensors.gyro import GyroValues
-from sms_handover.conditions.sensors.sensor import Known, Reading, Sensor, Setting, Truth
+from sms_handover.conditions.sensors.sensor import Known, Reading, Sensor, SensorValues, Setting, Truth
 from sms_handover.conditions.sensors.star_tracker import StarTrackerValues
 from sms_handover.conditions.sensors.vision import VisionValues
 from sms_handover.errors import ConfigurationError
@@ -162,12 +163,16 @@ def test_vision_is_relative_to_the_base_as_it_is_known() -> None:
 
 def test_as_many_measurements_of_vision_are_lost_as_is_declared() -> None:
     """And a lost one leaves the one before. A run begins with one, whatever becomes of it."""
+
+    def placed(pose: Pose) -> Pose:
+        return pose
+
     camera = replace(_EXACT, period=0.0, latency=0.0, dropped=0.3).make(setting())
     readings = list[Reading | None]()
     for tick in range(2000):
         deputy = Pose(np.array([tick, 0.0, 1.0]), _DEPUTY.quaternion_xyzw)
         known = Known(np.array(_NOWHERE), np.zeros(6))
-        readings.append(camera.measure(Truth(tick, _NOWHERE, np.zeros(6), lambda at=deputy: at), known))
+        readings.append(camera.measure(Truth(tick, _NOWHERE, np.zeros(6), partial(placed, deputy)), known))
         latest = max((reading.tick for reading in readings if reading), default=0)
         assert known.deputy_in_world is not None and known.deputy_in_world.position[0] == latest
     assert readings.count(None) / 2000 == pytest.approx(0.3, abs=4 * sqrt(0.3 * 0.7 / 2000))
@@ -178,7 +183,7 @@ def test_one_sensor_moves_no_number_of_another() -> None:
     base, n = np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.2, 0.3]), np.zeros(2)
 
     def given(names: str, gyro_period: float = 0.0) -> dict[str, list[list[float]]]:
-        values = {
+        values: dict[str, SensorValues] = {
             "encoders": EncoderValues(n + 1e-4, n, 100.0),
             "gyro": GyroValues(0.003, np.zeros(3), gyro_period),
             "star_tracker": StarTrackerValues(1e-3, np.zeros(3), 0.002, 0.0),
@@ -225,6 +230,18 @@ def test_sensors_alone_change_nothing() -> None:
         assert getattr(measured, name).tobytes() != getattr(sensed, name).tobytes(), name
     assert measured.base_pose[:, :3].tobytes() == sensed.base_pose[:, :3].tobytes()
     assert measured.base_twist[:, :3].tobytes() == sensed.base_twist[:, :3].tobytes()
+
+
+def test_compiled_ticks_leave_sensors_out_where_nobody_listens() -> None:
+    """The run is that without sensors, bit for bit; who listens is given what they tell, by Python."""
+    compiled = {"common.dynamics": "compiled", "common.duration": 0.04}
+    bare, unheard, heard = (
+        simulate(load_scenario("colliding", {**compiled, **more}))
+        for more in ({}, SENSORS, {"source": "measured", **SENSORS})
+    )
+    assert unheard.measured is None and heard.measured is not None
+    assert compare_runs(bare, unheard) == ()
+    assert compare_runs(bare, heard)
 
 
 def test_a_law_of_ones_own_is_given_what_is_measured() -> None:

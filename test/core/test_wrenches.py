@@ -1,6 +1,7 @@
 """Wrenches from outside against closed forms, and the account of what they give."""
 
 from math import cos, pi, sin
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,15 +12,21 @@ from sms_handover.conditions.thruster_misfire import ThrusterMisfire
 from sms_handover.conditions.wrench import BodyAtInstant, WrenchModel
 from sms_handover.conditions.wrench_history import WrenchHistory
 from sms_handover.configuration.conditions_fields import BODY
-from sms_handover.errors import ConfigurationError
+from sms_handover.errors import ConfigurationError, MessageError
+from sms_handover.frames import BASE, WORLD
 from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.description import load_robot
+from sms_handover.model.poses import se3_of
 from sms_handover.model.robot_model import RobotModel
+from sms_handover.plant.base_wrenches import in_world
 from sms_handover.plant.conditioned_stepper import ConditionedStepper, Resistance
 from sms_handover.plant.external_wrenches import NO_ACCOUNT, ExternalAccount
+from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.plant.integrators import TABLEAUS
 from sms_handover.plant.stepper import PinocchioStepper
-from sms_handover.types import Array
+from sms_handover.simulation.scenario import load_scenario
+from sms_handover.simulation.wiring import make_plant
+from sms_handover.types import Array, BaseWrench, GraspAction, GraspCommand, GraspStatus, read_only
 
 from .conftest import Draw
 from .robots import someone_else
@@ -66,6 +73,140 @@ def test_momentum_and_energy_change_by_what_wrenches_give_and_by_nothing_else() 
         size = float(np.abs(given).max())
         assert size > 0.05
         assert np.abs(gained - given).max() < 1e-9 * size
+
+
+_ON_DEPUTY: dict[str, dict[str, Any]] = {
+    "push": {"constant": {"force": [0.3, -0.2, 0.1], "torque": [0.01, 0.02, -0.03], "point": [0.1, 0.05, 0]}},
+    "turn": {"constant": {"force": [0, 0.5, 0], "torque": [0, 0, 0.02], "axes": "body"}},
+    "told": {"history": {"rows": [[0, 0.1, 0, 0, 0, 0, 0.01], [1, 0, 0.3, 0, 0.02, 0, 0]]}},
+    "gravity": {"gravity_gradient": {"radius": 6.778e5, "radial": [1, 0.2, 0], "normal": [0, 0, 1]}},
+    "hill": {"relative_orbit": {"radius": 6.778e5, "radial": [1, 0, 0], "normal": [0, 0, 1]}},
+}
+_ON_BASE = {"leak": _ON_DEPUTY["push"], "hill": _ON_DEPUTY["hill"], "orbit": _ON_DEPUTY["gravity"]}
+
+
+def _pushed(on_deputy: dict[str, Any], on_base: dict[str, Any], tick: float = 1e-3) -> FreeFloatingPlant:
+    """Return the plant of a massive deputy that tumbles, which any tool may take from anywhere."""
+    wrenches = {**{f"d_{n}": {"on": "deputy", **w} for n, w in on_deputy.items()}, **on_base}
+    anywhere = {f"plant.grasp_{what}_tolerance": 10.0 for what in ("position", "speed", "rate")}
+    twist = {"linear": [0.01, 0.02, -0.01], "angular": [0.2, -0.1, 0.3]}
+    values = {"common.tick": tick, "plant.grasp_angle_tolerance": 3.1416, **anywhere}
+    deputy = {"deputy.twist_in_world": twist, "conditions.wrenches": wrenches}
+    scenario = load_scenario("massive", {**values, **deputy})
+    truth, parameters = scenario.truth, scenario.parameters
+    return make_plant(truth.robot, truth.schedule, parameters.common, parameters.plant, truth.conditions)
+
+
+def test_what_wrenches_on_deputy_and_base_give_is_accounted_for_before_and_after_a_grasp() -> None:
+    """P, L and E of both less the account stay, while it floats, in a hand, and after it was let go."""
+    plant = _pushed(_ON_DEPUTY, _ON_BASE)
+    effort = read_only(0.3 * np.cos(np.arange(14)))
+    worst, seen = np.zeros(3), []
+    before = plant.conserved
+    for tick in range(90):
+        if tick in (30, 60):
+            action = GraspAction.GRASP if tick == 30 else GraspAction.RELEASE
+            (event,) = plant.execute((GraspCommand(action, "arm_a", "end_a" if tick == 30 else ""),))
+            assert event.status is GraspStatus.SUCCEEDED
+        plant.apply(effort)
+        now, account = plant.conserved, plant.external_impulse
+        assert account is not None
+        energy = now.kinetic_energy - before.kinetic_energy - plant.work + plant.losses - account.work
+        worst = np.maximum(
+            worst,
+            [
+                np.abs(now.linear_momentum - before.linear_momentum - account.linear_impulse).max(),
+                np.abs(now.angular_momentum - before.angular_momentum - account.angular_impulse).max(),
+                abs(energy),
+            ],
+        )
+        seen.append(np.linalg.norm(account.linear_impulse))
+    assert np.all(np.diff(seen) > 1e-5) and seen[-1] > 0.05
+    assert np.all(worst < [1e-12, 1e-11, 1e-8])
+
+
+def test_a_deputy_that_floats_moves_under_a_constant_force_as_a_mass_point() -> None:
+    """Its centre by v t + F t^2 / 2 m; nothing moves the robot."""
+    force = np.array([0.3, -0.2, 0.1])  # N
+    plant = _pushed({"push": {"constant": {"force": force.tolist(), "torque": [0, 0, 0]}}}, {})
+    start, robot = plant.deputy, plant.q
+    for _ in range(100):
+        plant.apply(read_only(np.zeros(14)))
+    coasted = start.deputy_in_world.position + 0.1 * start.twist_deputy_in_world.linear
+    expected = coasted + 0.5 * 0.1**2 * force / 12.0  # kg
+    assert plant.deputy.deputy_in_world.position == pytest.approx(expected, abs=1e-12)
+    assert np.array_equal(plant.q, robot)
+
+
+def test_gravity_of_robot_and_deputy_apart_is_that_of_both_together() -> None:
+    """In a hand the deputy takes its part: the force on both is that on one body, and acts on it alone."""
+    hill = {"hill": _ON_DEPUTY["hill"]}
+    impulses = []
+    for on_deputy in ({}, hill):
+        plant = _pushed(on_deputy, hill)
+        plant.execute((GraspCommand(GraspAction.GRASP, "arm_a", "end_a"),))
+        plant.apply(read_only(np.zeros(14)))
+        assert plant.external_impulse is not None
+        impulses.append((plant.external_impulse, plant.v))
+    (whole, v), (apart, w) = impulses
+    assert apart.linear_impulse == pytest.approx(whole.linear_impulse, rel=1e-12)
+    assert not np.array_equal(v, w)
+
+
+def test_a_wrench_that_is_asked_for_acts_over_the_tick_of_its_stamp_alone() -> None:
+    """Its impulse is F h; ticks without one, and a plant that nobody pushes, keep their bits."""
+    pushed, alone = _pushed({}, {}), _pushed({}, {})
+    pushed.push(BaseWrench(3_400_000, WORLD, (40.0, 0.0, 0.0), (0.0, 3.0, 0.0)))
+    given, effort = [], read_only(0.3 * np.cos(np.arange(14)))
+    for tick in range(6):
+        assert (pushed.v.tobytes() == alone.v.tobytes()) == (tick <= 3)
+        pushed.apply(effort)
+        alone.apply(effort)
+        given.append(0.0 if pushed.external_impulse is None else pushed.external_impulse.linear_impulse[0])
+        assert (pushed.pushed is not None) == (tick == 3)
+    assert given == [0.0] * 3 + [0.04] * 3
+    assert alone.effects is None and pushed.effects is not None
+    with pytest.raises(MessageError, match=r"stamped 0.005 s, but the run is at 0.006 s"):
+        pushed.push(BaseWrench(5_000_000, WORLD, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    with pytest.raises(MessageError, match="in frame 'tool', must be 'world' or 'base_link'"):
+        pushed.push(BaseWrench(9_000_000, "tool", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+
+
+def test_a_wrench_in_the_frame_of_the_base_turns_with_it() -> None:
+    turn = se3_of(Draw(RobotModel(load_robot()), 4).pose()).rotation
+    wrench = in_world(BaseWrench(0, BASE, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)), turn)
+    assert wrench.force == pytest.approx(turn @ [1.0, 2.0, 3.0])
+    assert wrench.torque == pytest.approx(turn @ [4.0, 5.0, 6.0])
+    assert in_world(BaseWrench(0, WORLD, (1.0, 2.0, 3.0), (0.0,) * 3), turn).force.tolist() == [1.0, 2.0, 3.0]
+
+
+def test_a_snapshot_under_other_conditions_is_rejected() -> None:
+    """And one of the same conditions is not, with what wrenches have given."""
+    first, other = _pushed(_ON_DEPUTY, _ON_BASE), _pushed({}, _ON_BASE)
+    first.apply(read_only(np.zeros(14)))
+    for plant in (other, _pushed({}, {})):
+        with pytest.raises(ConfigurationError, match="the snapshot is of a run under other conditions"):
+            plant.restore(first.snapshot())
+    with pytest.raises(ConfigurationError, match="the snapshot is of a run under other conditions"):
+        first.restore(_pushed({}, {}).snapshot())
+    again = _pushed(_ON_DEPUTY, _ON_BASE)
+    again.restore(first.snapshot())
+    for plant in (first, again):
+        plant.apply(read_only(np.zeros(14)))
+    assert again.v.tobytes() == first.v.tobytes()
+    assert again.external_work == first.external_work != 0.0
+    ideal = _pushed({}, {})
+    ideal.push(BaseWrench(0, WORLD, (1.0, 0.0, 0.0), (0.0,) * 3))
+    ideal.apply(read_only(np.zeros(14)))
+    back = _pushed({}, {})
+    back.restore(ideal.snapshot())
+    assert back.external_work == ideal.external_work > 0.0
+
+
+def test_a_wrench_on_a_deputy_without_mass_is_an_error_of_one_line() -> None:
+    wrench: dict[str, Any] = {"conditions.wrenches.drag": {"on": "deputy", **_ON_DEPUTY["push"]}}
+    with pytest.raises(ConfigurationError, match="drag acts on the deputy, whose mass is 0 kg"):
+        load_scenario("smooth", wrench)
 
 
 @pytest.mark.parametrize("tick", [1e-3, 3e-3])

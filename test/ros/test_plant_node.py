@@ -2,15 +2,20 @@
 
 from collections.abc import Callable
 
+import numpy as np
 import pytest
+from geometry_msgs.msg import WrenchStamped
 from sms_handover_interfaces.msg import GraspEvent, RunState
 from sms_handover_interfaces.srv import StepTicks
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import Marker
 
-from sms_handover.frames import DEPUTY
+from sms_handover.errors import Reason
+from sms_handover.frames import BASE, DEPUTY, WORLD
 from sms_handover.graph.topics import (
+    APPLIED_BASE_WRENCH,
     BASE_ODOMETRY,
+    BASE_WRENCH,
     CLOCK,
     DEPUTY_MARKER,
     DEPUTY_POSE,
@@ -18,6 +23,7 @@ from sms_handover.graph.topics import (
     JOINT_COMMAND,
     JOINT_REFERENCE,
     JOINT_STATES,
+    LINEAR_IMPULSE,
     ROBOT_DESCRIPTION,
     RUN_PUBLISHED,
     RUN_READY,
@@ -26,8 +32,14 @@ from sms_handover.graph.topics import (
     TF,
     Rate,
 )
-from sms_handover.messages.values import header_ns, time_ns
+from sms_handover.messages.values import base_wrench, header_ns, time_ns, vector_values
+from sms_handover.ros.codecs.base_wrench import wrench_message
+from sms_handover.ros.codecs.loop_messages import StateCodec
+from sms_handover.ros.qos import LOSSLESS
 from sms_handover.simulation.parameters import TRANSPORTS
+from sms_handover.simulation.scenario import load_scenario
+from sms_handover.simulation.simulate import simulate
+from sms_handover.types import BASE_NQ, BaseWrench
 
 from .bench import Bench
 from .graph import TOPICS, Graph, Messages
@@ -79,9 +91,47 @@ def test_every_node_tells_how_much_it_has_published(graph: Graph) -> None:
         for name, count in zip(message.topics, message.counts, strict=True):
             told[name] = told.get(name, 0) + int(count)
     for topic in TOPICS:
-        if topic.rate is not Rate.WALL and topic.name not in (RUN_PUBLISHED, RUN_READY):  # of no run
+        of_run = topic.rate is not Rate.WALL and topic.name not in (RUN_PUBLISHED, RUN_READY)
+        if of_run and not topic.is_from_outside:
             name = topic.name if topic.name.startswith("/") else f"/{topic.name}"
             assert told[name] == len(graph.heard[topic.name]), topic.name
+
+
+def test_a_wrench_acts_over_the_tick_of_its_stamp_and_is_recorded(graph: Graph) -> None:
+    """To the bit as in one process; what is late, beyond the end or in an unknown frame is counted."""
+    asked = [
+        BaseWrench(5 * TICK_NS + 1, WORLD, (40.0, 0.0, 0.0), (0.0, 3.0, 0.0)),
+        BaseWrench(7 * TICK_NS, BASE, (0.0, -20.0, 5.0), (1.0, 0.0, 0.0)),
+    ]
+    bad = [
+        BaseWrench(7 * TICK_NS + 5, WORLD, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+        BaseWrench(END_NS, WORLD, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+        BaseWrench(9 * TICK_NS, "tool", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+    ]
+    publisher = graph.client.create_publisher(WrenchStamped, BASE_WRENCH, LOSSLESS)
+    graph.bench.until(lambda: publisher.get_subscription_count() == 2, "plant and ear")
+    for wrench in (*asked, *bad):
+        publisher.publish(wrench_message(wrench))
+    refused = graph.plant.message_filter
+    graph.bench.until(lambda: sum(refused.counts.values()) == len(bad), "what is rejected")
+    reasons = (Reason.DUPLICATE, Reason.FUTURE, Reason.FRAME)
+    assert all(any(reason.value in name for name in refused.counts) for reason in reasons)
+    graph.run()
+    publisher.publish(wrench_message(BaseWrench(0, WORLD, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))))
+    graph.bench.until(lambda: sum(refused.counts.values()) == len(bad) + 1, "what is late")
+    applied = [base_wrench(message) for message in Messages().of(graph, APPLIED_BASE_WRENCH)]
+    assert [wrench.stamp_ns // TICK_NS for wrench in applied] == [5, 7]
+    common = {"scenario": "colliding", "schedule": str(graph.bench.folder / "schedule.yaml")}
+    run = simulate(load_scenario(values={"common": common}), base_wrenches=applied)
+    assert run.base_wrenches == tuple(applied)
+    codec = StateCodec(graph.plant.robot.joint_names, WORLD, BASE)
+    last = codec.read(graph.heard[JOINT_STATES][-1], graph.heard[BASE_ODOMETRY][-1])
+    assert last.joint_position.tobytes() == run.joint_position[-1].tobytes()
+    assert last.q[:BASE_NQ].tobytes() == run.base_pose[-1].tobytes()
+    impulses = [vector_values(message) for message in Messages().of(graph, LINEAR_IMPULSE)]
+    assert np.array(impulses) == pytest.approx(run.linear_impulse[1:], abs=0.0)
+    assert run.linear_momentum[-1] == pytest.approx(run.linear_impulse[-1], abs=1e-12)
+    assert abs(run.linear_impulse[-1][0]) > 0.03
 
 
 def test_deputy_changes_hands(graph: Graph) -> None:

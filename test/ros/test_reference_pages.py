@@ -12,7 +12,7 @@ def test_every_parameter_and_topic_has_a_row() -> None:
     for group in (COMMON_GROUP, *OWN_GROUPS.values()):
         for row in parameter_rows(group):
             assert f"| `{row.name}` | {row.type} | `{row.default}` | {row.unit} |" in parameters
-    for topic in graph_topics(["ARM"], clearance=True, wrenches=True, sensors=SENSOR_TYPES):
+    for topic in graph_topics(["ARM"], clearance=True, sensors=SENSOR_TYPES):
         assert f"| `{topic.name}` | `{topic.type}` | {topic.rate.value} |" in topics
 
 

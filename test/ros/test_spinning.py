@@ -50,6 +50,14 @@ def test_it_stops_after_misses_and_tries_again_later(monkeypatch: pytest.MonkeyP
     assert AdaptiveSpin(0.002).find(lambda: True)
 
 
+def test_it_does_not_look_for_what_others_have_to_work_for_first() -> None:
+    near, looked = [False], list[int]()
+    spin = AdaptiveSpin(1.0, lambda: near[0])
+    assert not spin.find(lambda: bool(looked.append(1))) and not looked  # type: ignore[func-returns-value]
+    near[0] = True
+    assert spin.find(lambda: True)
+
+
 def test_what_comes_keeps_it_going(monkeypatch: pytest.MonkeyPatch) -> None:
     Clock(monkeypatch)
     spin = AdaptiveSpin(0.002)
@@ -62,7 +70,7 @@ def test_only_plant_and_controller_spin_with_a_processor_each(monkeypatch: pytes
     def spinning_nodes(processors: int, *peers: str, **values: object) -> set[str]:
         monkeypatch.setattr(os, "sched_getaffinity", lambda pid: set(range(processors)))
         common = load_scenario(values={"common": {"peers": peers, **values}}).parameters.common
-        return {node for node in NODES if spin_of(node, common) is not None}
+        return {node for node in NODES if spin_of(node, common, lambda: True) is not None}
 
     loop, both = (PLANT, TRAJECTORY, IK, CONTROLLER), {PLANT, CONTROLLER}
     assert spinning_nodes(2, *loop) == spinning_nodes(3, *loop, RECORDER) == both

@@ -123,8 +123,10 @@ def test_compiled_dynamics(schedule: Path, simulated: dict[str, RunData], tmp_pa
 
 def test_a_run_under_harsh_conditions(schedule: Path, tmp_path: Path) -> None:
     """With noise, delay, friction, wrenches, model error, and sensors that all go by: twice, and verified."""
-    given = ("--conditions", "harsh", "-p", "seed:=4", "-p", "conditions.command.delay:=0.003")
-    given += ("-p", "source:=measured", "-p", "conditions.sensors.vision.latency:=0.03")
+    given = (
+        *("--conditions", "harsh", "-p", "seed:=4", "-p", "conditions.command.delay:=0.003"),
+        *("-p", "source:=measured", "-p", "conditions.sensors.vision.latency:=0.03"),
+    )
     values = {"common": {"schedule": str(schedule), "conditions": "harsh", "seed": 4, "source": "measured"}}
     sooner = {"conditions.command.delay": 0.003, "conditions.sensors.vision.latency": 0.03}
     expected = simulate(load_scenario(values={**values, **sooner}))

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import balancer
 import my_law
 import numpy as np
 import pytest
@@ -32,11 +33,15 @@ _ROUNDING = 1e-9  # [rad, N m] of the same law in other operations, within a sec
 
 
 @pytest.fixture(scope="module", autouse=True)
-def example_on_path(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Let processes import the examples and find the law of one, as if both were installed."""
-    examples = [str(Path(task_space_pd.__file__).parent.parent), str(Path(my_law.__file__).parent)]
-    entry_points = str(offer(tmp_path_factory.mktemp("site"), "my_law", joint_pd="my_law:LAW"))
+def examples_on_path(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Let processes import the examples and find the laws of two, as if all were installed."""
+    inside = (task_space_pd.__file__, balancer.__file__)
+    examples = [*(str(Path(file).parent.parent) for file in inside), str(Path(my_law.__file__).parent)]
+    site = tmp_path_factory.mktemp("site")
+    entry_points = str(offer(site, "my_law", joint_pd="my_law:LAW"))
+    offer(site, "balancer", balancer="balancer.law:LAW")
     os.environ["PYTHONPATH"] = os.pathsep.join([*examples, entry_points, os.environ.get("PYTHONPATH", "")])
+    sys.path.append(entry_points)
 
 
 @pytest.fixture(scope="module")
@@ -91,6 +96,18 @@ def test_a_law_of_a_small_package_is_as_one_of_ours(
     assert list(dict.fromkeys(runs)) == ["mine", "nmpc", "pid"]
     assert called("report", "mine", recorded["nmpc"][0], "-o", "page", cwd=tmp_path).code == 0
     assert "law joint_pd" in (tmp_path / "page" / "index.html").read_text(encoding="utf-8")
+
+
+def test_a_law_with_every_need_has_the_same_bits_over_dds(schedule: Path, tmp_path: Path) -> None:
+    """What it gets from its setup it gets in our node too; the bag has its solves."""
+    task = ("--controller", "balancer", "--schedule", schedule, "--duration", "0.3")
+    ended = sms_handover("run", *task, "-o", "mine", cwd=tmp_path)
+    assert ended.code == 0, ended
+    recorded = read_run(tmp_path / "mine" / "bag")
+    common = {"schedule": str(schedule), "duration": 0.3}
+    again = simulate(load_scenario(values={"common": common, "law": "balancer"}))
+    assert compare_runs(recorded, again) == ()
+    assert [plan.active for plan in recorded.plans] == [plan.active for plan in again.plans] != []
 
 
 def test_a_bare_node_does_the_same(own: dict[str, tuple[Path, Ended]], in_one_process: RunData) -> None:

@@ -22,6 +22,7 @@ from sms_handover.bag.info import BagInfo, read_info
 from sms_handover.bag.run.reader import read_run
 from sms_handover.bag.writer import BagWriter
 from sms_handover.frames import DEPUTY, target_frame
+from sms_handover.graph.events import PLAN_FAILED
 from sms_handover.graph.topics import LOOP_NODES, NODES, Rate, graph_topics
 from sms_handover.plan_report import PlanStatus
 from sms_handover.run_data import RunData
@@ -71,6 +72,8 @@ def test_no_message_is_missing(bag: Path) -> None:
     assert ledger is not None and ledger.complete
     accounts = {account.name: account for account in ledger.topics}
     for topic in TOPICS:
+        if topic.is_from_outside:
+            continue  # what the plant makes of it is recorded
         account = accounts[f"/{topic.name.lstrip('/')}"]
         if topic.rate in COUNTS:
             assert account.received == account.published == COUNTS[topic.rate] * len(topic.publishers), topic
@@ -197,34 +200,30 @@ def test_a_report_is_one_page_on_the_runs(recorded: Recorded, tmp_path: Path, ca
         assert part in text, part
 
 
-def test_real_time_goes_on_to_the_end_without_a_solver(tmp_path: Path) -> None:
-    """Paced by the wall clock, with plans from a process that is killed: the arms brake, the bag is whole.
-
-    It lasts longer than what a busy machine takes to make some plans.
-    """
+def test_real_time_ends_in_one_line_without_its_solver(tmp_path: Path) -> None:
+    """Paced by the wall clock, with plans from a process that is killed: the arms brake, the bag is whole."""
     law = ("--controller", "mpc", "-p", "controller.failed_plans:=40")
     run = tmp_path / "run"
-    with running(
-        "run", "paper", "--real-time", *law, "--duration", "4", "-o", "run", cwd=tmp_path
-    ) as command:
+    with running("run", "paper", "--real-time", *law, "--duration=20", "-o", "run", cwd=tmp_path) as command:
         command.until(lambda: solvers_of(command.pid), "the process of the solver")
         command.until_recorded(run / "bag", 300_000)
         (solver,) = solvers_of(command.pid)
         os.kill(solver, signal.SIGKILL)
         code = command.end()
         printed = command.text
-    assert code == 0, printed
-    (line,) = [line for line in printed.splitlines() if "SIGKILL" in line]
-    assert "no plan for too long: the arms brake to rest; the solver process was ended by SIGKILL" in line
+    assert code == 1, printed
+    (line,) = [line for line in printed.splitlines() if "controller: error:" in line]
+    assert "no plan" in line and line.endswith("the solver process was ended by SIGKILL")
+    braking = "no plan for too long: the arms brake to rest; the solver process was ended by SIGKILL"
     info, data = read_info(run / "bag"), read_run(run / "bag")
+    assert [event.detail for event in data.run_events if event.kind == PLAN_FAILED][-1] == braking
     assert info.topics["/loop_timing"].message_count > 0
-    assert info.topics["/joint_states"].message_count == 4001
     assert info.parameters["plant"]["mode"] == "realtime"
     numbers = [plan.plan for plan in data.plans]
     assert len(numbers) > 1 and numbers == sorted(set(numbers))
     assert data.plans[-1].status is PlanStatus.BRAKING and data.plans[-1].late_plans > 0
-    assert np.abs(data.joint_velocity[-1]).max() < 0.05 < np.abs(data.joint_velocity).max()
-    limit = load_scenario("paper").model.robot.effort_limit
+    rates, limit = np.abs(data.joint_velocity), load_scenario("paper").model.robot.effort_limit
+    assert np.nanmax(rates[-1]) < 0.05 < np.nanmax(rates)
     assert np.nanmax(np.abs(data.joint_command) - limit) <= 0.0  # NaN where no command came in time
 
 

@@ -15,8 +15,9 @@ from sms_handover.control.nmpc import MAX_CONTROL_ORDER, NmpcGains, NmpcLaw
 from sms_handover.control.pid import PidGains, PidLaw
 from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
-from sms_handover.plant.free_floating import FreeFloatingPlant, InitialState
+from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.plant.integrators import TABLEAUS, LieGroupIntegrator
+from sms_handover.plant.plant_state import InitialState
 from sms_handover.simulation.scenario import load_parameters
 from sms_handover.types import Array, Pose
 from test.core.conftest import Draw, slope

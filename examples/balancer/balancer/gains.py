@@ -22,7 +22,7 @@ class Gains:
         minimum=0.0,
         default=0.0,
     )
-    clearance: float = sms.parameter(
+    keep_apart: float = sms.parameter(
         "least distance between two bodies; 1 mm for those of one arm, and for a gripper and the deputy that "
         "it may touch",
         unit="m",

@@ -190,7 +190,7 @@ class Balancer:
         self, program: Program, gains: Gains, motion: Motion, target: sms.PreviewedTargets
     ) -> None:
         """Let no two bodies come nearer than is allowed; those that are come apart."""
-        bodies = sms.DistanceGradients(self._setup.robot, self._distances, gains.clearance)
+        bodies = sms.DistanceGradients(self._setup.robot, self._distances, gains.keep_apart)
         left = bodies.at(motion.q, target) - bodies.least(target)
         near = np.flatnonzero(left < _NEAR).tolist()
         if not near:

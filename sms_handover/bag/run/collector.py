@@ -13,6 +13,7 @@ from sms_handover.graph.events import RunEvent
 from sms_handover.messages.layout import joint_state, odometry
 from sms_handover.messages.stamps import stamp_ns
 from sms_handover.messages.values import (
+    base_wrench,
     energy_values,
     grasp_event,
     plan_report,
@@ -25,7 +26,7 @@ from sms_handover.messages.values import (
     vector_values,
 )
 from sms_handover.plan_report import PlannedPaths, PlanReport
-from sms_handover.types import GraspEvent, TaskPhase
+from sms_handover.types import BaseWrench, GraspEvent, TaskPhase
 
 JOINT_TOPICS = (
     topics.JOINT_STATES,
@@ -44,7 +45,7 @@ class RunCollector:
 
     def __init__(self, info: BagInfo, prefix: str) -> None:
         """Prepare for each topic of a run; ``prefix`` is the namespace, '' for the root."""
-        self._info = info
+        self.info = info
         self._prefix = prefix
         self.arms = tuple(self._found_arms())
         self._check_types()
@@ -70,6 +71,8 @@ class RunCollector:
         self.events: list[GraspEvent] = []
         self.run_events: list[RunEvent] = []
         self.plans: list[PlanReport] = []
+        self.base_wrenches: list[BaseWrench] = []
+        self.applied = ""
         self.planned_paths: list[PlannedPaths] = []
         self._first_ns: int | None = None
         self._newest_ns = 0
@@ -80,6 +83,8 @@ class RunCollector:
             topics.TASK_PHASE: lambda message: self.phases.append(task_phase(message)),
             topics.GRASP_EVENT: lambda message: self.events.append(grasp_event(message)),
             topics.RUN_EVENTS: lambda message: self.run_events.append(run_event(message)),
+            topics.APPLIED_VALUES: self._take_applied,
+            topics.APPLIED_BASE_WRENCH: lambda message: self.base_wrenches.append(base_wrench(message)),
             topics.MPC_STATUS: lambda message: self.plans.append(plan_report(message)),
             topics.PLANNED_PATHS: lambda message: self.planned_paths.append(planned_paths(message)),
             **{name: rows.add for name, rows in self.rows.items()},
@@ -89,11 +94,15 @@ class RunCollector:
             topics.JOINT_STATES: self._take_state,
             topics.BASE_ODOMETRY: self.odometry.add,
             topics.MEASURED_BASE_ODOMETRY: self.measured_odometry.add,
-            **{name: decoder(self._info, self.full_name(name), take) for name, take in decoders.items()},
+            **{name: decoder(self.info, self.full_name(name), take) for name, take in decoders.items()},
         }
         by_name = {self.full_name(name): taker for name, taker in takers.items()}
-        for message in read_messages(self._info.path, by_name):
+        for message in read_messages(self.info.path, by_name):
             by_name[message.topic](message.data)
+
+    def _take_applied(self, message: Any) -> None:
+        """Take what acts in the plant; a run after a reset tells it again."""
+        self.applied = str(message.data)
 
     def _take_state(self, data: bytes) -> None:
         """Take a joint state; one that begins a new run, after a reset, drops the events so far."""
@@ -104,6 +113,7 @@ class RunCollector:
             self.events.clear()
             self.run_events.clear()
             self.plans.clear()
+            self.base_wrenches.clear()
             self.planned_paths.clear()
         self._newest_ns = time_ns
         self.joints[topics.JOINT_STATES].add(data)
@@ -113,19 +123,17 @@ class RunCollector:
         return f"{self._prefix}/{name}"
 
     def _check_types(self) -> None:
-        for topic in topics.graph_topics(
-            self.arms, clearance=True, wrenches=True, sensors=topics.SENSOR_TYPES
-        ):
-            recorded = self._info.topics.get(self.full_name(topic.name))
+        for topic in topics.graph_topics(self.arms, clearance=True, sensors=topics.SENSOR_TYPES):
+            recorded = self.info.topics.get(self.full_name(topic.name))
             if recorded is not None and (recorded.type, recorded.encoding) != (topic.type, "cdr"):
                 raise BagError(
-                    f"{self._info.path} holds no run of sms_handover: {recorded.name} has the type"
+                    f"{self.info.path} holds no run of sms_handover: {recorded.name} has the type"
                     f" {recorded.type} ({recorded.encoding}), expected is {topic.type} (cdr)"
                 )
 
     def _found_arms(self) -> Iterator[str]:
         head, tail = f"{self._prefix}/", topics.tool_pose("")
-        for name in self._info.topics:
+        for name in self.info.topics:
             arm = name.removeprefix(head).removesuffix(tail)
             if f"{head}{arm}{tail}" == name and "/" not in arm:  # else it is of another namespace
                 yield arm

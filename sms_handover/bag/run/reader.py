@@ -12,6 +12,7 @@ from sms_handover.bag.run.series import Series
 from sms_handover.errors import BagError
 from sms_handover.frames import arm_of_joint
 from sms_handover.graph import topics
+from sms_handover.model.hinges import hinges_in
 from sms_handover.run_data import Array, MeasuredRows, RunData, Stamps
 from sms_handover.types import TaskPhase
 
@@ -43,36 +44,45 @@ def read_run(path: Path, namespace: str | None = None) -> RunData:
 
 
 def _assemble(collector: RunCollector) -> RunData:
-    joint_names = collector.joints[topics.JOINT_STATES].first_names()
+    names = collector.joints[topics.JOINT_STATES].first_names()
+    panel_names, springs = hinges_in(collector.info.urdf_text)
+    joint_names = tuple(name for name in names if name not in panel_names)
 
-    def joint(topic: str, block: int) -> Series:
-        return collector.joints[topic].series(block, joint_names).settled()
+    def joint(topic: str, block: int, columns: tuple[str, ...]) -> Series:
+        return collector.joints[topic].series(block, columns).settled()
 
     def rows(topic: str) -> Array:
         return collector.rows[topic].series().settled().at(periods)
 
-    position = joint(topics.JOINT_STATES, POSITION)
+    def impulse(topic: str) -> Array:
+        found = collector.rows[topic].series().settled()
+        first_ns = found.stamp_ns[0] if len(found.stamp_ns) else np.inf
+        values = found.at(periods)
+        values[periods < first_ns] = 0.0  # nothing had acted
+        return values
+
+    position = joint(topics.JOINT_STATES, POSITION, joint_names)
     pose = collector.odometry.series(BASE_POSE, 7).settled()
     twist = collector.odometry.series(BASE_TWIST, 6).settled()
     ticks: Stamps = np.intersect1d(position.stamp_ns, pose.stamp_ns)
-    reference = joint(topics.JOINT_REFERENCE, POSITION)
+    reference = joint(topics.JOINT_REFERENCE, POSITION, joint_names)
     periods = reference.stamp_ns
     arms = _by_first_joint(collector.arms, joint_names)
     energy = rows(topics.ENERGY)
-    has_wrenches = bool(len(collector.rows[topics.LINEAR_IMPULSE].series().stamp_ns))
+    angles = joint(topics.JOINT_STATES, POSITION, panel_names).at(periods)
     return RunData(
         joint_names=joint_names,
         arms=tuple(arms),
         tick_ns=ticks,
         joint_position=position.at(ticks),
-        joint_velocity=joint(topics.JOINT_STATES, VELOCITY).at(ticks),
-        joint_effort=joint(topics.JOINT_STATES, EFFORT).at(ticks),
-        joint_command=joint(topics.JOINT_COMMAND, EFFORT).at(ticks),
+        joint_velocity=joint(topics.JOINT_STATES, VELOCITY, joint_names).at(ticks),
+        joint_effort=joint(topics.JOINT_STATES, EFFORT, joint_names).at(ticks),
+        joint_command=joint(topics.JOINT_COMMAND, EFFORT, joint_names).at(ticks),
         base_pose=pose.at(ticks),
         base_twist=twist.at(ticks),
         reference_ns=periods,
         reference_position=reference.at(periods),
-        reference_velocity=joint(topics.JOINT_REFERENCE, VELOCITY).at(periods),
+        reference_velocity=joint(topics.JOINT_REFERENCE, VELOCITY, joint_names).at(periods),
         target_pose={arm: rows(topics.target_pose(arm)) for arm in arms},
         tool_pose={arm: rows(topics.tool_pose(arm)) for arm in arms},
         deputy_pose=rows(topics.DEPUTY_POSE),
@@ -83,13 +93,19 @@ def _assemble(collector: RunCollector) -> RunData:
         work=energy[:, 1].copy(),
         external_work=energy[:, 2].copy(),
         lost=energy[:, 3].copy(),
-        linear_impulse=rows(topics.LINEAR_IMPULSE) if has_wrenches else np.zeros((len(periods), 3)),
-        angular_impulse=rows(topics.ANGULAR_IMPULSE) if has_wrenches else np.zeros((len(periods), 3)),
+        elastic_energy=springs.energy(angles),
+        panel_position=angles,
+        panel_velocity=joint(topics.JOINT_STATES, VELOCITY, panel_names).at(periods),
+        panel_names=panel_names,
+        applied=collector.applied,
+        linear_impulse=impulse(topics.LINEAR_IMPULSE),
+        angular_impulse=impulse(topics.ANGULAR_IMPULSE),
         ik_status=np.nan_to_num(rows(topics.IK_STATUS)[:, 0], nan=_NO_IK).astype(np.int64),
         phases=_last_run(collector.phases),
         grasp_events=tuple(collector.events),
         run_events=tuple(collector.run_events),
         plans=tuple(collector.plans),
+        base_wrenches=tuple(collector.base_wrenches),
         planned_paths=tuple(collector.planned_paths),
         measured=_measured(collector, joint_names, ticks, periods),
     )

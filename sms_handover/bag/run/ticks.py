@@ -5,10 +5,20 @@ from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
+from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import read_info
+from sms_handover.bag.run.collector import decoder
 from sms_handover.bag.time_order import messages_by_time
 from sms_handover.errors import BagError
-from sms_handover.graph.topics import BASE_ODOMETRY, JOINT_COMMAND, JOINT_STATES, TASK_PHASE
+from sms_handover.graph.topics import (
+    APPLIED_BASE_WRENCH,
+    BASE_ODOMETRY,
+    JOINT_COMMAND,
+    JOINT_STATES,
+    TASK_PHASE,
+)
+from sms_handover.messages.values import base_wrench
+from sms_handover.types import BaseWrench
 
 _TOPICS = tuple(f"/{name}" for name in (JOINT_STATES, BASE_ODOMETRY, JOINT_COMMAND, TASK_PHASE))
 
@@ -33,6 +43,17 @@ def recorded_ticks(path: Path) -> Iterator[RecordedTick]:
     if missing:
         raise BagError(f"{path} holds no run of sms_handover: it has no topic {', '.join(missing)}")
     return _ticks(path)
+
+
+def recorded_base_wrenches(path: Path) -> tuple[BaseWrench, ...]:
+    """Return the wrenches that others asked for and that acted in a run, in order of time."""
+    name, found = f"/{APPLIED_BASE_WRENCH}", list[BaseWrench]()
+    info = read_info(path)
+    if name in info.topics:
+        take = decoder(info, name, lambda message: found.append(base_wrench(message)))
+        for message in read_messages(path, {name}):
+            take(message.data)
+    return tuple(found)
 
 
 def _ticks(path: Path) -> Iterator[RecordedTick]:

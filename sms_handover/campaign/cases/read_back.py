@@ -178,10 +178,20 @@ def _of_conditions(world: World, steps: Sequence[str]) -> Any:
     """Return a value of the conditions; of one that every joint has, that of the first."""
     if steps[0] == "model_error":
         return getattr(getattr(world.model_error, steps[1]), steps[2])
+    conditions = world.conditions
+    if steps[0] == "wrenches":
+        model: Any = {**conditions.wrenches, **conditions.deputy_wrenches}[steps[1]]
+        return _entry(getattr(model if hasattr(model, steps[3]) else model.orbit, steps[3]), steps[4:])
+    if steps[0] == "sensors":
+        return _entry(getattr(conditions.sensors[steps[1]], steps[2]), steps[3:] or "0")
     if steps[0] not in ("friction", "torque", "command"):
         raise KeyError(steps[0])
-    value = getattr(getattr(world.conditions, steps[0]), steps[1])
-    return float(value[int(steps[2]) if len(steps) > 2 else 0]) if isinstance(value, np.ndarray) else value
+    return _entry(getattr(getattr(conditions, steps[0]), steps[1]), steps[2:] or "0")
+
+
+def _entry(value: Any, steps: Sequence[str]) -> Any:
+    """Return an entry of an array, or a value that is none."""
+    return float(value[int(steps[0])]) if isinstance(value, np.ndarray) else value
 
 
 def _of_schedule(world: World, steps: Sequence[str]) -> Any:

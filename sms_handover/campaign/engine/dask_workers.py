@@ -8,6 +8,7 @@ import json
 import logging
 import os
 import signal
+import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
@@ -32,6 +33,7 @@ _WAITING = 2  # [-] chunks of each worker that are handed out
 _DEATHS = 20  # [-] of workers that one chunk survives
 _CLOSE_S = 1.5  # [s] that a cluster has to end by itself
 _TIMEOUT = "30s"  # to reach a scheduler
+_COUNT_S = 1.0  # [s] between two looks at how many workers there are
 _GOES_ON = "the same command goes on"
 _Answer = tuple[str, dict[str, Any], bytes]
 
@@ -109,6 +111,7 @@ class DaskWorkers:
         Raises SmsHandoverError if there is no scheduler.
         """
         self._cluster: Any = None
+        self._threads, self._next_count = 1, 0.0
         campaign = frozen.campaign(cases)
         plugin = CasePlugin(
             dict(frozen.files), cases, campaign.seed, campaign.limits, program, is_here=not scheduler
@@ -161,7 +164,7 @@ class DaskWorkers:
             return True
 
         while True:
-            while waiting < _WAITING * max(self._threads, 1) and hand_out():
+            while waiting < _WAITING * self._count_threads() and hand_out():
                 pass
             if not waiting:
                 return
@@ -196,10 +199,13 @@ class DaskWorkers:
             with suppress(OSError, TypeError):  # it has none, or that has ended
                 os.kill(nanny.pid, signal.SIGKILL)
 
-    @property
-    def _threads(self) -> int:
-        """The number of cases that run at the same time."""
-        return sum(self._client.nthreads().values())
+    def _count_threads(self) -> int:
+        """Return the number of cases that run at the same time; the scheduler is asked once a while."""
+        now = time.monotonic()
+        if now >= self._next_count:
+            self._threads = max(sum(self._client.nthreads().values()), 1)
+            self._next_count = now + _COUNT_S
+        return self._threads
 
 
 def answers_of(future: Any) -> list[_Answer]:

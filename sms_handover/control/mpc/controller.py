@@ -18,6 +18,7 @@ from sms_handover.control.mpc.braking import braking_plan
 from sms_handover.control.mpc.horizon import Horizon
 from sms_handover.control.mpc.momentum import base_start, base_velocity
 from sms_handover.control.mpc.parameters import MpcGains
+from sms_handover.control.mpc.patience import Patience, PatienceState
 from sms_handover.control.mpc.plan import Plan
 from sms_handover.control.mpc.plan_problem import PlanProblem
 from sms_handover.control.mpc.plan_queue import PlanQueue
@@ -37,7 +38,8 @@ from sms_handover.units import ns_to_seconds, seconds_to_ns
 class MpcState:
     """Everything that later efforts depend on: plans, counts, the preview, and the initial attitude (3, 3).
 
-    ``coming`` takes the place of ``plan`` when it begins; ``failures`` counts solves in a row without a plan;
+    ``coming`` takes the place of ``plan`` when it begins; ``failures`` counts solves in a row without a plan,
+    ``patience`` has what comes of that;
     ``news`` are grasps that count from the next state on, ``observed`` is the memory of the compensation.
     """
 
@@ -47,6 +49,7 @@ class MpcState:
     solves: int
     failures: int
     reused: int
+    patience: PatienceState
     initial_rotation: Array
     preview: PreviewState | None
     grip: Grip
@@ -65,8 +68,11 @@ class MpcController:
                 "control law 'mpc' needs a preview of targets and the distances of bodies"
             )
         self._gains, self._preview, self._make_efforts = setup.gains, setup.preview, setup.computed_torque
-        self._solver = PlanSolver(setup.robot, setup.deputy, setup.gains, setup.distances)
+        self._solver = PlanSolver(
+            setup.robot, setup.deputy, setup.gains, setup.distances, setup.compiled_derivatives
+        )
         self._period_ns, self._queue = setup.reference_ns, PlanQueue()
+        self._patience = Patience(setup.reference_ns)
         self._horizons: dict[MpcGains, Horizon] = {}
         self._efforts = self._make_efforts(setup.robot)
         self._payload = KnownPayload(setup.robot, setup.deputy)
@@ -88,6 +94,7 @@ class MpcController:
         self._phase_index = 0
         self._queue.restore(None, None, 0)
         self._solves = self._failures = 0
+        self._patience.reset()
         self._initial_rotation: Array = np.zeros((3, 3))
         self._guidance: Guidance | None = None
         self._news: tuple[GraspEvent, ...] = ()
@@ -102,13 +109,19 @@ class MpcController:
         self._phase_index = guidance.phase.index
 
     def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
-        """Return the efforts (n,) N m for a state, read-only; zero until first guidance has come."""
+        """Return the efforts (n,) N m for a state, read-only; zero until first guidance has come.
+
+        Raises NoPlanError when the arms are at rest where there is no plan again and again.
+        """
         if self._news:
             self._heed_news(stamp_ns)
         self._queue.advance(stamp_ns)
         if self._guidance is not None:
             guidance, self._guidance = self._guidance, None
-            self._replan(stamp_ns, q, v, guidance)
+            if self._patience.is_over:
+                self._give_up(stamp_ns, q, v, guidance)
+            else:
+                self._replan(stamp_ns, q, v, guidance)
         plan = self._queue.plan
         if plan is None:
             return self._rest
@@ -146,6 +159,7 @@ class MpcController:
             self._solves,
             self._failures,
             self._queue.reused,
+            self._patience.state,
             read_only(self._initial_rotation),
             self._preview.state,
             self._payload.grip,
@@ -158,6 +172,7 @@ class MpcController:
         self.reset()
         self._queue.restore(state.plan, state.coming, state.reused)
         self._phase_index, self._solves, self._failures = state.phase_index, state.solves, state.failures
+        self._patience.restore(state.patience)
         self._initial_rotation = state.initial_rotation
         self._preview.restore(state.preview)
         self._news = state.news
@@ -188,6 +203,13 @@ class MpcController:
         step = self._solver.solve(problem)
         status = self._use(step, problem)
         self._report = self._reported(problem, status, step, perf_counter() - begun)
+
+    def _give_up(self, stamp_ns: int, q: Array, v: Array, guidance: Guidance) -> None:
+        """Raise NoPlanError once the arms are at rest, with the limit that they exceed even there."""
+        if self._patience.is_at_rest(stamp_ns, self._queue):
+            self._look_ahead(stamp_ns, q, v, guidance)
+            excess, row = self._solver.exceeded(self._problem(stamp_ns, q, v))
+            raise self._patience.error(stamp_ns, excess, row)
 
     def _look_ahead(self, stamp_ns: int, q: Array, v: Array, guidance: Guidance) -> None:
         """Take guidance; the first plan of a run is to rest where the joints are."""
@@ -225,12 +247,15 @@ class MpcController:
         status, most = step.solution.status, self._gains[problem.phase_index].failed_plans
         if status is PlanStatus.SOLVED:
             self._failures = 0
+            self._patience.solved(self._gains[problem.phase_index].plan_horizon)
             self._queue.offer(problem.plan(step))
             return status
         self._failures += 1
         self._queue.reused += 1
         if self._failures < most:
             return status
+        if self._failures % most == 0:
+            self._patience.brakes(step.solution)
         if self._failures == most:
             self._queue.offer(self._braking(problem.start, problem.number, problem.begin_ns))
         return PlanStatus.BRAKING

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from sms_handover.configuration.parameters import parameter
+from sms_handover.control.mpc.derivatives import LINEARISATIONS
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,11 @@ class MpcGains:
     )
     plan_velocity_gain: float = parameter(
         "mpc: feedback of joint rate about the plan", unit="1/s", minimum=0.0
+    )
+    linearisation: str = parameter(
+        "mpc: derivatives of the dynamics; pinocchio: its analytic ones; compiled: the same as C code, made "
+        "once for this robot: faster, needs CasADi and a C compiler",
+        choices=LINEARISATIONS,
     )
     program_iterations: int = parameter(
         "mpc: most iterations of the quadratic program; a solve that needs more gives no plan",

@@ -1,11 +1,12 @@
 """Planner: one real-time iteration, a sequential quadratic step about the plan before [Diehl2005]."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
 from sms_handover.control.mpc.constraints import Constraint, Limits
 from sms_handover.control.mpc.cost import PlanCost
+from sms_handover.control.mpc.derivatives import DynamicsDerivatives, PinocchioDerivatives
 from sms_handover.control.mpc.distance_rows import DistanceModel
 from sms_handover.control.mpc.horizon import Horizon
 from sms_handover.control.mpc.momentum import BaseStart
@@ -64,12 +65,17 @@ class Planner:
     """Plans under one set of parameters; owns work space, so it is not to be shared between threads."""
 
     def __init__(
-        self, robot: RobotModel, gains: MpcGains, distances: Distances | None, initial_rotation: Array
+        self,
+        robot: RobotModel,
+        gains: MpcGains,
+        distances: Distances | None,
+        initial_rotation: Array,
+        derivatives: Callable[[RobotModel], DynamicsDerivatives] = PinocchioDerivatives,
     ) -> None:
         """Keep the base's attitude about an initial one (3, 3); raises ConfigurationError."""
         self.gains = gains
         self.horizon = horizon_of(gains)
-        self.prediction = PredictionModel(robot)
+        self.prediction = PredictionModel(robot, derivatives)
         self._tools, self._cost = ToolErrorModel(robot), PlanCost(robot, gains, self.horizon)
         self._limits = Limits(robot, gains, initial_rotation)
         self._distances: DistanceModel | None = None

@@ -9,15 +9,16 @@ joints are exact double integrators. The base's twist nu = (v, omega) follows fr
 
 in its own axes, with P and L (about the centre of mass) conserved and c the centre of mass in the base; its
 position is that of the centre of mass less R c. Joint efforts are an output, u = H* a + c*: the inverse
-dynamics are the better transcription [Ferrolho2021]. Derivatives are Pinocchio's analytic ones
-[Carpentier2018].
+dynamics are the better transcription [Ferrolho2021].
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
+from sms_handover.control.mpc.derivatives import DynamicsDerivatives, PinocchioDerivatives, mass_matrix
 from sms_handover.control.mpc.horizon import Horizon
 from sms_handover.control.mpc.momentum import BaseStart
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
@@ -67,11 +68,14 @@ class Prediction:
 class PredictionModel:
     """Predicts a robot; owns work space of Pinocchio, so it is not to be shared between threads."""
 
-    def __init__(self, robot: RobotModel) -> None:
-        self._robot = robot
-        self._model, self._data = robot.pin, robot.pin.createData()
-        self._q = pin.neutral(robot.pin)
-        self._still = np.zeros(robot.pin.nv)
+    def __init__(
+        self,
+        robot: RobotModel,
+        derivatives: Callable[[RobotModel], DynamicsDerivatives] = PinocchioDerivatives,
+    ) -> None:
+        """Predict with derivatives that are made for the robot."""
+        self._robot, self._data = robot, robot.pin.createData()
+        self._q, self._derivatives = pin.neutral(robot.pin), derivatives(robot)
 
     def predict(
         self, horizon: Horizon, start: BaseStart, q: Array, w: Array, accelerations: Array
@@ -84,15 +88,13 @@ class PredictionModel:
         rotation = np.zeros((nodes, 3, 3))
         omega_by = Derivatives(*(np.zeros((nodes, 3, k)) for k in (n, n, 3)))
         effort_by = Derivatives(*(np.zeros((nodes - 1, n, k)) for k in (n, n, 3, n)))
-        velocity, acceleration = np.zeros(BASE_NV + n), np.zeros(BASE_NV + n)
+        velocity = np.zeros(BASE_NV + n)
         flow = np.zeros(3)
-        model, data, full = self._model, self._data, self._q
+        full = self._q
         for k in range(nodes):
             full[BASE_NQ:] = angles[k]
-            inertia = pin.crba(model, data, full, pin.Convention.LOCAL)
-            base, coupling = np.array(inertia[:BASE_NV, :BASE_NV]), np.array(inertia[:BASE_NV, BASE_NV:])
-            inverse = np.linalg.inv(base)
-            mass = base[0, 0]
+            matrix, base = mass_matrix(self._robot, self._data, full)
+            inverse, coupling, mass = matrix.inverse, matrix.coupling, base[0, 0]
             c = np.array([base[1, 5], base[2, 3], base[0, 4]]) / mass
             of_joints = coupling @ rates[k]
             if k:
@@ -110,25 +112,20 @@ class PredictionModel:
             twist[k], centre[k], centre_per_q[k] = nu, c, coupling[:3] / mass
             rotation[k] = start.rotation @ pin.exp3(phi[k])
             velocity[:BASE_NV], velocity[BASE_NV:] = nu, rates[k]
-            by_q = pin.computeRNEADerivatives(model, data, full, self._still, velocity)[0]
-            nu_q = inverse @ (momentum_by_c @ centre_per_q[k] - by_q[:BASE_NV, BASE_NV:])
+            last = k == nodes - 1
+            there = None if last else self._derivatives.at(full, velocity, accelerations[k], matrix)
+            by_q = there.momentum if there else self._derivatives.momentum(full, velocity)
+            nu_q = inverse @ (momentum_by_c @ centre_per_q[k] - by_q)
             nu_w, nu_phi = -inverse @ coupling, inverse @ momentum_by_phi
             omega_by.q[k], omega_by.w[k], omega_by.phi[k] = nu_q[3:], nu_w[3:], nu_phi[3:]
-            if k == nodes - 1:
-                break
-            acceleration[:BASE_NV], acceleration[BASE_NV:] = 0.0, accelerations[k]
-            forces = pin.rnea(model, data, full, velocity, acceleration)
-            acceleration[:BASE_NV] = -inverse @ forces[:BASE_NV]
-            by_q, by_v, _ = pin.computeRNEADerivatives(model, data, full, velocity, acceleration)
-            effort[k] = data.tau[BASE_NV:]
-            yielding = coupling.T @ inverse
-            of_v = by_v[BASE_NV:] - yielding @ by_v[:BASE_NV]
-            of_q = by_q[BASE_NV:, BASE_NV:] - yielding @ by_q[:BASE_NV, BASE_NV:]
-            effort_by.q[k] = of_q + of_v[:, :BASE_NV] @ nu_q
-            effort_by.w[k] = of_v[:, BASE_NV:] + of_v[:, :BASE_NV] @ nu_w
-            effort_by.phi[k] = of_v[:, :BASE_NV] @ nu_phi
-            assert effort_by.a is not None
-            effort_by.a[k] = inertia[BASE_NV:, BASE_NV:] - yielding @ coupling
+            if there:
+                of_twist, of_rates = there.by_v[:, :BASE_NV], there.by_v[:, BASE_NV:]
+                effort[k] = there.effort
+                effort_by.q[k] = there.by_q + of_twist @ nu_q
+                effort_by.w[k] = of_rates + of_twist @ nu_w
+                effort_by.phi[k] = of_twist @ nu_phi
+                assert effort_by.a is not None
+                effort_by.a[k] = there.by_a
         drift = start.linear_momentum / self._robot.mass
         in_world = start.centre_of_mass + horizon.times[:, None] * drift
         return Prediction(

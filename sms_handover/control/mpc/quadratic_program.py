@@ -48,7 +48,8 @@ def solve(
 ) -> Solution:
     """Return the minimum of x^T P x / 2 + g^T x under the constraints, with slack where a row is soft.
 
-    Without a solution that keeps the hard rows the one is named that would have to be exceeded most. Raises
+    Without a solution that keeps the hard rows the one is named that would have to be exceeded most; without
+    one after all iterations, the soft one that is exceeded most without a change. Raises
     ControllerError on a program that is not convex or not finite, which no state of a robot makes.
     """
     matrix = np.vstack([item.matrix for item in constraints])
@@ -60,13 +61,14 @@ def solve(
     )
     if flag > 0 and np.isfinite(change).all():
         active = _active(constraints, multipliers)
-        slack, row = _worst(constraints, change, soft=True)
+        slack, row = worst_excess(constraints, change, soft=True)
         residual = times_vector(hessian, change) + gradient + times_vector(matrix.T, multipliers)
         scaled = float(np.abs(residual).max() / max(1.0, float(np.abs(gradient).max())))
         return Solution(PlanStatus.SOLVED, change, iterations, active, slack, row, scaled)
     nothing = np.zeros(0)
     if flag in _ENDLESS:
-        return Solution(PlanStatus.ITERATION_LIMIT, nothing, iterations, (), 0.0, "", float("nan"))
+        slack, row = worst_excess(constraints, np.zeros(len(gradient)), soft=True)
+        return Solution(PlanStatus.ITERATION_LIMIT, nothing, iterations, (), slack, row, float("nan"))
     if flag != _INFEASIBLE:
         raise ControllerError(
             f"control law 'mpc': DAQP ended with flag {flag} and {np.isnan(hessian).sum()} numbers of the "
@@ -74,7 +76,7 @@ def solve(
         )
     softened = np.full(len(high), _SOFT, dtype=np.int32)
     change, _, flag, _ = _daqp(hessian, gradient, matrix, high, low, softened, most_iterations)
-    slack, row = _worst(constraints, change, soft=False) if flag > 0 else (float("nan"), "")
+    slack, row = worst_excess(constraints, change, soft=False) if flag > 0 else (float("nan"), "")
     return Solution(PlanStatus.INFEASIBLE, nothing, iterations, (), slack, row, float("nan"))
 
 
@@ -96,7 +98,7 @@ def _active(constraints: Sequence[Constraint], multipliers: Array) -> tuple[str,
     return tuple(dict.fromkeys(names[row] for row in binding.tolist()))
 
 
-def _worst(constraints: Sequence[Constraint], change: Array, *, soft: bool) -> tuple[float, str]:
+def worst_excess(constraints: Sequence[Constraint], change: Array, *, soft: bool) -> tuple[float, str]:
     """Return by how much the worst soft or hard limit is exceeded, in its unit, and the name of its row."""
     worst, found = _EXCEEDED, (0.0, "")
     for item in constraints:

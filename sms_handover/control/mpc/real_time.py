@@ -12,6 +12,7 @@ from time import perf_counter
 from sms_handover.control.law import LawSetup
 from sms_handover.control.mpc.controller import MpcController
 from sms_handover.control.mpc.parameters import MpcGains
+from sms_handover.control.mpc.patience import no_plan
 from sms_handover.control.mpc.plan_problem import PlanProblem
 from sms_handover.control.mpc.planner import Step
 from sms_handover.control.protocol import Guidance
@@ -51,11 +52,17 @@ class MpcInRealTime(MpcController):
         self._remote.forget()
 
     def effort(self, stamp_ns: int, q: Array, v: Array) -> Array:
-        """Return the efforts (n,) N m for a state, read-only; zero until first guidance has come."""
+        """Return the efforts (n,) N m for a state, read-only; zero until first guidance has come.
+
+        Raises NoPlanError when the arms are at rest and the solver has ended, or there is no plan again and
+        again.
+        """
         self._queue.advance(stamp_ns)
         if self._awaited:
             self._hear(stamp_ns, self._awaited)
         self._brake_if_overdue(stamp_ns, q, v)
+        if self._brakes and self.trouble and self._patience.is_at_rest(stamp_ns, self._queue):
+            raise no_plan(stamp_ns, self.trouble)
         return super().effort(stamp_ns, q, v)
 
     @property
@@ -83,9 +90,14 @@ class MpcInRealTime(MpcController):
         """Take over a plan that has come, unless the arms have begun to brake since it was asked for."""
         status = step.solution.status
         if status is PlanStatus.SOLVED and self._queue.offer(problem.plan(step)):
-            self._brakes = False
+            self._brakes, self._failures = False, 0
+            self._patience.solved(self._gains[problem.phase_index].plan_horizon)
             return status
         self._queue.reused += 1
+        if status is not PlanStatus.SOLVED:
+            self._failures += 1
+            if self._failures % self._gains[problem.phase_index].failed_plans == 0:
+                self._patience.brakes(step.solution)
         return PlanStatus.BRAKING if self._brakes else status
 
     def _brake_if_overdue(self, stamp_ns: int, q: Array, v: Array) -> None:

@@ -10,6 +10,7 @@ from sms_handover.frames import BASE, DEPUTY, WORLD
 from sms_handover.graph.topics import (
     ANGULAR_IMPULSE,
     ANGULAR_MOMENTUM,
+    APPLIED_BASE_WRENCH,
     BASE_ODOMETRY,
     CLOCK,
     CLOCK_PERIOD_NS,
@@ -29,6 +30,7 @@ from sms_handover.model.robot_model import RobotModel
 from sms_handover.nodes.parts.measured_outputs import MeasuredOutputs
 from sms_handover.plant.free_floating import FreeFloatingPlant
 from sms_handover.plant.sensed_plant import SensedPlant
+from sms_handover.ros.codecs.base_wrench import wrench_message
 from sms_handover.ros.codecs.loop_messages import (
     OdometryCodec,
     PoseCodec,
@@ -41,7 +43,7 @@ from sms_handover.simulation.parameters import LOCKSTEP, CommonParameters
 
 _LOOP = (JOINT_STATES, BASE_ODOMETRY, SAMPLED_JOINT_STATES, SAMPLED_BASE_ODOMETRY, DEPUTY_POSE)
 _PERIOD = (DEPUTY_ODOMETRY, LINEAR_MOMENTUM, ANGULAR_MOMENTUM, ENERGY)
-_IMPULSE = (LINEAR_IMPULSE, ANGULAR_IMPULSE)
+_OUTSIDE = (LINEAR_IMPULSE, ANGULAR_IMPULSE, APPLIED_BASE_WRENCH)
 
 
 class PlantOutputs:
@@ -59,14 +61,15 @@ class PlantOutputs:
         names = (
             *_LOOP,
             *_PERIOD,
-            *(_IMPULSE if conditions.wrenches else ()),
+            *_OUTSIDE,
             CLOCK,
             *(tool_pose(arm) for arm in robot.arms),
         )
         sensors = conditions.sensors
         self._measured = MeasuredOutputs(robot, publisher, sensors) if sensors else None
         self._publish: dict[str, Callable[[Any], None]] = {name: publisher(name).publish for name in names}
-        self._state_codec = StateCodec(robot.joint_names, WORLD, BASE)
+        hinges = tuple(panel.joint for panel in robot.description.flexible_panels)
+        self._state_codec = StateCodec((*robot.joint_names, *hinges), WORLD, BASE)
         self._pose_codec, self._vector_codec = PoseCodec(WORLD), vector_codec(WORLD)
         self._energy_codec = energy_codec(WORLD)
         self._deputy_codec = OdometryCodec(WORLD, DEPUTY)
@@ -91,7 +94,11 @@ class PlantOutputs:
     def _publish_truth(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
         """Publish the state as it is."""
         publish = self._publish
-        joints, odometry = self._state_codec.pack_arrays(plant.stamp_ns, plant.q, plant.v, plant.joint_effort)
+        q, v, effort = plant.q, plant.v, plant.joint_effort
+        if panels := plant.panels:
+            beside = (panels.angle, panels.rate, panels.torque)
+            q, v, effort = map(np.concatenate, zip((q, v, effort), beside, strict=True))
+        joints, odometry = self._state_codec.pack_arrays(plant.stamp_ns, q, v, effort)
         if with_reference and self._lockstep:
             self._publish_sample(plant, joints, odometry)
         publish[JOINT_STATES](joints)
@@ -109,6 +116,8 @@ class PlantOutputs:
     def publish_rest(self, plant: FreeFloatingPlant, *, with_reference: bool) -> None:
         """Publish what nobody in the loop waits for: tools, momenta, energy, the clock."""
         now_ns, publish = plant.stamp_ns, self._publish
+        if plant.pushed:
+            publish[APPLIED_BASE_WRENCH](wrench_message(plant.pushed))
         if self._measured and isinstance(plant, SensedPlant):
             self._measured.publish_readings(plant)
         if with_reference:

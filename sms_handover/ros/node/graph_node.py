@@ -109,6 +109,11 @@ class GraphNode(LifecycleNode, Generic[P]):
         """The input that the loop waits for, "" if it has none."""
         return ""
 
+    @property
+    def answer_is_near(self) -> bool:
+        """Whether what the loop waits for comes from one node that has all it needs for it."""
+        return True
+
     def turn(self, executor: Executor) -> None:
         """Handle what has come, or wait a little for something to come."""
         self.inputs.loop.spin_once(executor, WAIT_S)
@@ -133,7 +138,6 @@ class GraphNode(LifecycleNode, Generic[P]):
         topics = graph_topics(
             self.robot.arms,
             clearance=self.common.measures_clearance,
-            wrenches=bool(world.conditions.wrenches),
             sensors=[sensor_topic(name) for name in world.conditions.sensors],
             measured=self.common.uses_measurements,
         )
@@ -147,7 +151,7 @@ class GraphNode(LifecycleNode, Generic[P]):
         self.create_timer(_DIAGNOSTICS_PERIOD_S, self.publish_diagnostics)
         if self.get_name() in LOOP_NODES:  # processor and priority are for those
             settle(self.common)
-        self.inputs.loop.spin = spin_of(self.get_name(), self.common)
+        self.inputs.loop.spin = spin_of(self.get_name(), self.common, lambda: self.answer_is_near)
 
     def activate(self) -> None:
         """Take part in the run: what has waited in lock step is worked on now."""

@@ -39,6 +39,11 @@ class NodeInputs:
         """Hand to ``on_message`` what ``decode`` returns of the good messages of a topic's own publisher."""
         self._subscribe(self.loop, name, on_message, decode)
 
+    def subscribe_to_all(self, name: str, on_message: OnMessage[T], decode: Decode[T]) -> None:
+        """Hand to ``on_message`` the good messages of a topic, whoever publishes it."""
+        filtered = self._filter.wrap(name, on_message, decode)
+        self._endpoints.subscribe_serialized(name, self.loop, filtered)
+
     def subscribe_news(self, name: str, kind: Any, on_news: Callable[[Any], None]) -> None:
         """Hand to ``on_news`` the good messages of a topic that comes seldom and counts in every state."""
         self._subscribe(

@@ -119,12 +119,12 @@ def publishers_of(topic: Topic) -> tuple[str, ...]:
 
 def subscribers_of(topic: Topic) -> tuple[str, ...]:
     """Return the nodes that subscribe to a topic, with the recorder, which the table leaves out."""
-    return (*topic.subscribers, RECORDER)
+    return topic.subscribers if topic.is_from_outside else (*topic.subscribers, RECORDER)
 
 
 def topics_of(node: str) -> tuple[tuple[Topic, ...], tuple[Topic, ...]]:
     """Return the topics of the graph that a node publishes, and those that it subscribes to."""
-    table = graph_topics([ANY_ARM], clearance=True, wrenches=True, sensors=SENSOR_TYPES)
+    table = graph_topics([ANY_ARM], clearance=True, sensors=SENSOR_TYPES)
     published = tuple(topic for topic in table if node in publishers_of(topic))
     return published, tuple(topic for topic in table if node in subscribers_of(topic))
 
