@@ -6,7 +6,7 @@ from sms_handover.compiled.c_function import CFunction
 from sms_handover.compiled.example import example_of, require_equal
 from sms_handover.compiled.library import dynamics_library
 from sms_handover.compiled.names import COMPUTED_TORQUE, step_name
-from sms_handover.compiled.tree import body_tree, inertial_parameters
+from sms_handover.compiled.tree import body_tree, parameters_of
 from sms_handover.control.computed_torque import ComputedTorque
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.integrators import TABLEAUS, Tableau
@@ -28,7 +28,7 @@ class CompiledStepper:
         self._force = np.zeros(BASE_NV + size)  # no wrench on the base
         self._q_next, self._v_next = np.zeros_like(self._q), np.zeros_like(self._v)
         duration = np.array([_EXAMPLE_S])
-        parameters = inertial_parameters(body_tree(robot))
+        parameters = parameters_of(body_tree(robot))
         arguments = (self._q, self._v, self._force, parameters, duration)
         self._function = CFunction(library, step_name(scheme), arguments, (self._q_next, self._v_next))
         example = example_of(robot)
@@ -55,7 +55,7 @@ class CompiledComputedTorque:
         self._q, self._v = np.zeros(BASE_NQ + size), np.zeros(BASE_NV + size)
         self._desired, self._feedback = np.zeros((3, size)), np.zeros(2)
         self._efforts = np.zeros(size)
-        parameters = inertial_parameters(body_tree(robot))
+        parameters = parameters_of(body_tree(robot))
         arguments = (self._q, self._v, self._desired, self._feedback, parameters)
         self._function = CFunction(library, COMPUTED_TORQUE, arguments, (self._efforts,))
         q, v, wanted = example_of(robot)

@@ -10,7 +10,7 @@ from sms_handover.compiled.c_function import NativeFunction
 from sms_handover.compiled.example import example_of, require_equal
 from sms_handover.compiled.library import dynamics_library
 from sms_handover.compiled.names import RESISTED_STEP, SETTLE
-from sms_handover.compiled.tree import body_tree, inertial_parameters
+from sms_handover.compiled.tree import body_tree, parameters_of
 from sms_handover.compiled.wrench_table import WrenchTable
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.conditioned_stepper import ConditionedStepper, Resistance, ResistedStepper
@@ -107,7 +107,7 @@ class CompiledResistedStepper(ResistedStepper):
         self._scheme, self._start_ns = tuple(TABLEAUS.values()).index(tableau), 0
         shapes = (BASE_NQ + size, BASE_NV + size, size, BASE_NQ + size, BASE_NV + size)
         self._arrays = tuple(map(np.zeros, shapes))
-        self._parameters, self._h = inertial_parameters(body_tree(robot)), np.zeros(1)
+        self._parameters, self._h = parameters_of(body_tree(robot)), np.zeros(1)
         pointer, number = ctypes.c_void_p, ctypes.c_long
         self._step = NativeFunction(library, RESISTED_STEP, (pointer, number, number, *[pointer] * 7))
         self._settle = NativeFunction(library, SETTLE, [pointer] * 5)

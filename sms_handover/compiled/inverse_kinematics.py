@@ -9,6 +9,7 @@ from sms_handover.compiled.c_function import NativeFunction
 from sms_handover.compiled.kinematics import POSE_ROW
 from sms_handover.compiled.library import dynamics_library
 from sms_handover.compiled.names import FIND_JOINTS
+from sms_handover.compiled.tree import body_tree, parameters_of
 from sms_handover.ik.levenberg_marquardt import Solution
 from sms_handover.ik.parameters import IkParameters
 from sms_handover.ik.residual import Residual
@@ -33,9 +34,10 @@ class CompiledIk:
         self._led = np.zeros(count, dtype=np.int64)
         self._settings = ik_settings(robot, parameters)
         self._solution = np.zeros((), _layout(robot.n_joints, count))
-        library, arguments = dynamics_library(robot), 5
+        library, arguments = dynamics_library(robot), 6
         self._call = NativeFunction(library, FIND_JOINTS, [ctypes.c_void_p] * arguments)
-        given = (self._base, self._rows, self._led, self._settings, self._solution)
+        self._parameters = parameters_of(body_tree(robot))
+        given = (self._base, self._parameters, self._rows, self._led, self._settings, self._solution)
         self._at = tuple(array.ctypes.data for array in given)
 
     def __call__(self, request: IkRequest) -> Solution:

@@ -10,7 +10,7 @@ from sms_handover.compiled.c_function import CFunction, NativeFunction
 from sms_handover.compiled.example import example_of, require_equal
 from sms_handover.compiled.library import dynamics_library
 from sms_handover.compiled.names import CONSERVED, MOTION_ROWS, TOOL_ROWS
-from sms_handover.compiled.tree import body_tree, inertial_parameters
+from sms_handover.compiled.tree import body_tree, parameters_of
 from sms_handover.model.conserved import ConservedQuantities, conserved_quantities
 from sms_handover.model.poses import pose_row
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
@@ -34,9 +34,11 @@ class CompiledKinematics:
         self._in_tool, self._deputy = np.zeros(POSE), np.zeros(POSE_ROW + TWIST)
         self._sums = np.zeros(CONSERVED_SIZE)
         pointer, number = ctypes.c_void_p, ctypes.c_long
-        self._tools = NativeFunction(library, TOOL_ROWS, (pointer, pointer))
-        self._motion = NativeFunction(library, MOTION_ROWS, (pointer, pointer, number, *[pointer] * 5))
-        given = (self._q, self._v, inertial_parameters(body_tree(robot)))
+        self._tools = NativeFunction(library, TOOL_ROWS, [pointer] * 3)
+        self._motion = NativeFunction(library, MOTION_ROWS, (*[pointer] * 3, number, *[pointer] * 5))
+        self._parameters = parameters_of(body_tree(robot))
+        self._parameters_at = self._parameters.ctypes.data
+        given = (self._q, self._v, self._parameters)
         self._conserved = CFunction(library, CONSERVED, given, (self._sums,))
         self._at = tuple(a.ctypes.data for a in (self._q, self._v, self._rows, self._twists, self._in_tool))
         self._deputy_at = self._deputy.ctypes.data
@@ -49,7 +51,7 @@ class CompiledKinematics:
     def tools_at(self, q: Array, arms: Iterable[str] | None = None) -> dict[str, Pose]:
         """Return the pose of the tools of some arms in ``world``, by default of all."""
         self._q[:] = q
-        self._tools(self._at[0], self._at[2])
+        self._tools(self._at[0], self._parameters_at, self._at[2])
         rows = frozen(self._rows.copy())
         poses = {arm: Pose(row[:3], row[3:]) for arm, row in zip(self._arms, rows, strict=True)}
         return poses if arms is None else {arm: poses[arm] for arm in arms}
@@ -77,7 +79,9 @@ class CompiledKinematics:
         self._q[:], self._v[:] = q, v
         at_q, at_v, rows, twists, in_tool = self._at
         deputy = self._deputy_at
-        self._motion(at_q, at_v, holder, in_tool, rows, twists, deputy, deputy + POSE_ROW * 8)
+        self._motion(
+            at_q, at_v, self._parameters_at, holder, in_tool, rows, twists, deputy, deputy + POSE_ROW * 8
+        )
 
 
 def numbers_in(pose: pin.SE3) -> Array:

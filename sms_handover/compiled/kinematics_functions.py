@@ -36,10 +36,10 @@ def kinematics_functions(
 ) -> list[Any]:
     """Return the functions of a robot whose ``bodies`` have ``parameters`` in place of numbers.
 
-    Of q (7 + n,): the poses of the tools, each the rows of its rotation and its origin (12), in ``world``;
-    the same with their Jacobians for a base at rest, per joint of an arm after the other: the velocity of the
-    origin of the tool in ``world`` axes (3), and its angular velocity in axes of the tool (3). Of q and v:
-    the poses, and the twists (6) of the origins in ``world`` axes. Of q, v and parameters, in ``world``:
+    Of q (7 + n,) and parameters: the poses of the tools, each the rows of its rotation and its origin (12),
+    in ``world``; the same with their Jacobians for a base at rest, per joint of an arm after the other: the
+    velocity of the origin of the tool in ``world`` axes (3), its angular velocity in axes of the tool (3).
+    With v too: the poses, and the twists (6) of the origins in ``world`` axes; and in ``world`` the
     linear momentum (3), angular momentum about the centre of mass (3), centre of mass (3), kinetic energy.
     Of q and parameters: the generalised Jacobian (6 arms, n), row by row. Of q, v and parameters: the twists
     that the tools have by the momentum alone, with joints at rest.
@@ -53,9 +53,9 @@ def kinematics_functions(
     linear, angular = (ca.vertcat(*(column[part] for column in columns)) for part in range(2))
     twists = _twists(tools, placed, columns, v)
     functions = {
-        TOOLS: ([q], [poses]),
-        TOOL_JACOBIANS: ([q], [poses, linear, angular]),
-        MOTION: ([q, v], [poses, twists]),
+        TOOLS: ([q, parameters], [poses]),
+        TOOL_JACOBIANS: ([q, parameters], [poses, linear, angular]),
+        MOTION: ([q, v, parameters], [poses, twists]),
         CONSERVED: ([q, v, parameters], [_conserved(placed, robot)]),
         GENERALIZED_JACOBIAN: ([q, parameters], [_generalized(tools, placed, columns, robot)]),
         CARRIED: ([q, v, parameters], [_carried(placed, robot)]),

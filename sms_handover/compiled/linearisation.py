@@ -8,7 +8,7 @@ from sms_handover.compiled.c_function import CFunction
 from sms_handover.compiled.example import example_of, require_equal
 from sms_handover.compiled.library import linearisation_library
 from sms_handover.compiled.names import LINEARISATION
-from sms_handover.compiled.tree import body_tree, inertial_parameters
+from sms_handover.compiled.tree import body_tree, parameters_of
 from sms_handover.control.mpc.derivatives import (
     InstantDerivatives,
     MassMatrix,
@@ -32,7 +32,7 @@ class CompiledDerivatives:
         self._still = np.zeros(n)
         self._momentum, self._effort = np.zeros((BASE_NV, n)), np.zeros(n)
         self._by_q, self._by_v, self._by_a = np.zeros((n, n)), np.zeros((n, BASE_NV + n)), np.zeros((n, n))
-        parameters = inertial_parameters(body_tree(robot))
+        parameters = parameters_of(body_tree(robot))
         self._function = CFunction(
             library,
             LINEARISATION,

@@ -98,7 +98,7 @@ class RigidBodies:
             steps.append((ca.cross(velocity, axis) * rate, ca.cross(spin, axis) * rate))
         for index in range(len(self._bodies) - 1, 0, -1):
             body, place = self._bodies[index], self._bodies[index].place
-            axis, across = ca.SX(body.axis), ca.SX(np.array(ca.skew(place)))
+            axis, across = ca.SX(body.axis), ca.densify(ca.skew(ca.SX(place)))
             pull, turn = mixed[index] @ axis, angular[index] @ axis
             wanted = force[BASE_NV + index - 1] - ca.dot(axis, moments[index])
             inverse = -1.0 / (ca.dot(axis, turn) + body.rotor)

@@ -19,7 +19,7 @@ from sms_handover.compiled.names import (
 from sms_handover.compiled.resisted_functions import ResistedFunctions
 from sms_handover.compiled.rigid_bodies import Factors, RigidBodies, substituted
 from sms_handover.compiled.step import Acceleration, held_step_function, step_function
-from sms_handover.compiled.tree import PER_BODY, Body, Tool
+from sms_handover.compiled.tree import PER_BODY, PER_MOUNT, Body, Tool, mounts_of, parameter_count
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV
 from sms_handover.plant.integrators import Tableau
 
@@ -129,7 +129,7 @@ def _computed_torque(bodies: Sequence[Body], by: Acceleration | None = None) -> 
         found.append(_kept(robot.bias(), robot.inertia_factors()))
     inner = ca.Function("efforts", [*turn, v, wanted, parameters], ca.cse(found))
     name = PREPARED_TORQUE if by else COMPUTED_TORQUE
-    return _by_feedback(name, inner, joints, [PER_BODY * len(bodies)])
+    return _by_feedback(name, inner, joints, [parameter_count(bodies)])
 
 
 def _loaded_torque(bodies: Sequence[Body], arm: int, last: int) -> Any:
@@ -150,7 +150,7 @@ def _loaded_torque(bodies: Sequence[Body], arm: int, last: int) -> Any:
     )
     found = [model.joint_efforts(wanted), _kept(truth.bias(), truth.inertia_factors())]
     inner = ca.Function("efforts", [*turn, v, wanted, parameters, *own], ca.cse(found))
-    return _by_feedback(loaded_name(arm), inner, joints, [PER_BODY * len(bodies), PER_BODY, PER_BODY])
+    return _by_feedback(loaded_name(arm), inner, joints, [parameter_count(bodies), PER_BODY, PER_BODY])
 
 
 def _by_feedback(name: str, inner: Any, joints: int, numbers: Sequence[int]) -> Any:
@@ -168,12 +168,17 @@ def _by_feedback(name: str, inner: Any, joints: int, numbers: Sequence[int]) -> 
 
 
 def with_parameters(bodies: Sequence[Body]) -> tuple[Any, tuple[Body, ...]]:
-    """Return inertial parameters (11 N,), and the bodies that have them in place of numbers."""
-    parameters = ca.SX.sym("parameters", PER_BODY * len(bodies))
-    known = (
+    """Return the parameters, and the bodies that have them in place of numbers."""
+    parameters = ca.SX.sym("parameters", parameter_count(bodies))
+    known = [
         _body_of(body, parameters[PER_BODY * index : PER_BODY * (index + 1)])
         for index, body in enumerate(bodies)
-    )
+    ]
+    first = PER_BODY * len(bodies)
+    for index, at in enumerate(mounts_of(bodies)):
+        mount = parameters[first + PER_MOUNT * index : first + PER_MOUNT * (index + 1)]
+        rotation: Any = ca.reshape(mount[:9], 3, 3).T  # CasADi has columns where NumPy has rows
+        known[at] = replace(known[at], rotation=rotation, place=mount[9:])
     return parameters, tuple(known)
 
 

@@ -5,7 +5,6 @@ from typing import Any
 
 import casadi as ca
 
-from sms_handover.compiled.tree import PER_BODY
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV
 from sms_handover.plant.integrators import Tableau
 
@@ -26,6 +25,11 @@ class Acceleration:
     later: Any
 
     @property
+    def parameters(self) -> int:
+        """How many parameters there are."""
+        return int(self.inertia.size1_in(3))
+
+    @property
     def kept(self) -> int:
         """How many numbers a tick keeps."""
         return int(self.inertia.size1_out(0))
@@ -40,7 +44,7 @@ def step_function(name: str, by: Acceleration, tableau: Tableau, joints: int, *,
     """
     q, v = ca.MX.sym("q", BASE_NQ + joints), ca.MX.sym("v", BASE_NV + joints)
     force, h = ca.MX.sym("f", BASE_NV + joints), ca.MX.sym("h")
-    parameters = ca.MX.sym("p", PER_BODY * (joints + 1))
+    parameters = ca.MX.sym("p", by.parameters)
     velocities: list[Any] = []
     accelerations: list[Any] = []
     kept = ca.MX.sym("kept", by.kept)
@@ -77,7 +81,7 @@ def held_step_function(name: str, by: Acceleration, tableau: Tableau, joints: in
     """
     q, v = ca.MX.sym("q", BASE_NQ + joints), ca.MX.sym("v", BASE_NV + joints)
     force, h = ca.MX.sym("f", BASE_NV + joints), ca.MX.sym("h")
-    parameters = ca.MX.sym("p", PER_BODY * (joints + 1))
+    parameters = ca.MX.sym("p", by.parameters)
     first = ca.MX.sym("a", BASE_NV + joints)
     turned_back = _turned_back()
     velocities, accelerations, wrenches = [v], [first], [force[:BASE_NV]]

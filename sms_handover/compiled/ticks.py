@@ -11,7 +11,7 @@ from sms_handover.compiled.c_function import NativeFunction, address_of
 from sms_handover.compiled.effects import TickEffects
 from sms_handover.compiled.library import dynamics_library
 from sms_handover.compiled.names import COMPUTED_TORQUE, OBSERVE, TICKS
-from sms_handover.compiled.tree import PER_BODY, body_tree, inertial_parameters, tools_of
+from sms_handover.compiled.tree import PER_BODY, body_tree, parameters_of, tools_of
 from sms_handover.compiled.wrench_table import WrenchTable
 from sms_handover.control.compensation import CompensatedTorque
 from sms_handover.control.controller import JointController
@@ -132,18 +132,25 @@ class CompiledTicks:
     def _use(self, true: RobotModel, known: RobotModel) -> None:
         """Pass on the inertial parameters of the robot in truth, and as it is known."""
         self._robots = true, known
-        ours, theirs = (inertial_parameters(body_tree(robot)) for robot in (true, known))
+        ours, theirs = (parameters_of(body_tree(robot)) for robot in (true, known))
         self._parameters = ours, theirs
         self._at["true_parameters"][...], self._at["known_parameters"][...] = (
             ours.ctypes.data,
             theirs.ctypes.data,
         )
-        different = np.flatnonzero(np.any((ours != theirs).reshape(-1, PER_BODY), axis=1)).tolist()
-        if self._apart:
-            different = list(range(len(ours)))
+        different = self._different()
         self._at["one_robot"][...] = not different
         arms = [arm for arm, body in enumerate(self._tool_bodies) if [body] == different]
         self._at["loaded"][...] = arms[0] if arms else _NO_ARM
+
+    def _different(self) -> list[int]:
+        """Return the bodies that differ in truth and model; all of them if mounts do."""
+        ours, theirs = self._parameters
+        end = PER_BODY * (self.plant.robot.n_joints + 1)
+        if self._apart or np.any(ours[end:] != theirs[end:]):
+            return list(range(end // PER_BODY))
+        rows = (ours != theirs)[:end].reshape(-1, PER_BODY)
+        return [int(body) for body in np.flatnonzero(np.any(rows, axis=1))]
 
     @property
     def address(self) -> tuple[int, int]:

@@ -10,7 +10,7 @@ from sms_handover.compiled.c_function import NativeFunction
 from sms_handover.compiled.kinematics import POSE_ROW, TWIST, CompiledKinematics, numbers_in
 from sms_handover.compiled.library import dynamics_library
 from sms_handover.compiled.names import ON_PATH, PLACED, RESOLVE_RATES, WITHOUT_DRIFT
-from sms_handover.compiled.tree import body_tree, inertial_parameters
+from sms_handover.compiled.tree import body_tree, parameters_of
 from sms_handover.model.poses import pose_row
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.trajectory.time_law import Progress
@@ -31,7 +31,7 @@ class CompiledToolMotion:
         self._row, self._twist = np.zeros(POSE_ROW), np.zeros(TWIST)
         self._placed = NativeFunction(library, PLACED, [ctypes.c_void_p] * 3)
         self._on_path = NativeFunction(library, ON_PATH, [ctypes.c_void_p] * 5)
-        self._q, self._parameters = np.zeros(BASE_NQ + robot.n_joints), inertial_parameters(body_tree(robot))
+        self._q, self._parameters = np.zeros(BASE_NQ + robot.n_joints), parameters_of(body_tree(robot))
         self._twists, self._led = np.zeros((count, TWIST)), np.zeros(count, dtype=np.int64)
         self._damping, self._v = np.zeros(1), np.zeros(BASE_NV + robot.n_joints)
         self._without = NativeFunction(library, WITHOUT_DRIFT, [ctypes.c_void_p] * 5)

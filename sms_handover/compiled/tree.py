@@ -52,16 +52,36 @@ class Tool:
 
 
 PER_BODY = 11  # mass, first moment (3), inertia (6: xx xy xz yy yz zz), rotor
+PER_MOUNT = 12  # rotation, row by row, and place
 
 
-def inertial_parameters(bodies: Sequence[Body]) -> Array:
-    """Return the inertial parameters (11 N,) of bodies, the argument of the compiled functions.
+def mounts_of(bodies: Sequence[Body]) -> tuple[int, ...]:
+    """Return the bodies whose place on the base is an argument of the compiled functions.
 
-    Of each: mass kg, first moment (3) kg m, inertia xx xy xz yy yz zz kg m^2 and rotor kg m^2, as in Body.
+    Those are all that it carries if one of them is turned at an odd angle, as errors of mounts lead to: one
+    library then serves robots that differ in their mounts. Where each turn is one by quarters, constants save
+    time.
+    """
+    carried = tuple(index for index, body in enumerate(bodies) if body.parent == 0)
+    is_odd = any(np.any(np.abs(bodies[index].rotation) % 1.0) for index in carried)
+    return carried if is_odd else ()
+
+
+def parameter_count(bodies: Sequence[Body]) -> int:
+    """Return how many parameters the compiled functions of a robot have."""
+    return PER_BODY * len(bodies) + PER_MOUNT * len(mounts_of(bodies))
+
+
+def parameters_of(bodies: Sequence[Body]) -> Array:
+    """Return the parameters of bodies, the argument of the compiled functions.
+
+    Of each mass kg, first moment (3) kg m, inertia xx xy xz yy yz zz kg m^2 and rotor kg m^2, as in Body;
+    then rotation and place m of mounts that are arguments.
     """
     upper = np.triu_indices(3)
     rows = [(body.mass, *body.first_moment, *body.inertia[upper], body.rotor) for body in bodies]
-    return read_only(np.array(rows).ravel())
+    mounts = [(*bodies[at].rotation.ravel(), *bodies[at].place) for at in mounts_of(bodies)]
+    return read_only(np.concatenate([np.ravel(rows), np.ravel(mounts)]))
 
 
 @lru_cache(maxsize=8)  # a loop asks a dozen times for the same robots, in truth and model, bare and loaded

@@ -1,6 +1,7 @@
 """Random streams: one for each model, which no other model, law, worker or wall clock moves."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable
+from dataclasses import dataclass
 from hashlib import sha256
 
 import numpy as np
@@ -9,6 +10,7 @@ from sms_handover.types import Array, frozen
 
 _DIGEST_BYTES = 16  # of the name of a model: no two names share a stream
 _BLOCK = 1024  # [ticks] drawn at once: a draw of few numbers costs a call as well
+_PER_COUNT = 4  # [-] uniform numbers that one count of Philox gives
 _COUNTER = 2**64  # [-] draws by which two blocks are apart, far more than one of them takes
 
 
@@ -45,51 +47,60 @@ class TickNoise:
 
     def __init__(self, sequence: np.random.SeedSequence, size: int) -> None:
         self._sequence, self._size = sequence, size
-        self._block = -1
-        self._normal = self._uniform = frozen(np.empty((0, size)))
+        nothing = _Block(-1, frozen(np.empty((0, size))))
+        self._normal = self._uniform = nothing
 
     def normal(self, tick: int) -> Array:
         """Return the standard normal numbers (size,) of a tick."""
-        self._draw(tick)
-        row: Array = self._normal[tick % _BLOCK]
+        row: Array = self._normals_of(tick // _BLOCK)[tick % _BLOCK]
         return row
 
     def uniform(self, tick: int) -> Array:
         """Return the numbers (size,) in [0, 1) of a tick."""
-        self._draw(tick)
-        row: Array = self._uniform[tick % _BLOCK]
+        row: Array = self._uniforms_of(tick // _BLOCK)[tick % _BLOCK]
         return row
 
     def normals(self, first: int, ticks: int) -> Array:
         """Return the standard normal numbers (ticks, size) of ticks from a first one on."""
-        return self._joined(self._normal[rows] for rows in self._blocks(first, ticks))
+        return self._joined(first, ticks, self._normals_of)
 
     def uniforms(self, first: int, ticks: int) -> Array:
         """Return the numbers (ticks, size) in [0, 1) of ticks from a first one on."""
-        return self._joined(self._uniform[rows] for rows in self._blocks(first, ticks))
+        return self._joined(first, ticks, self._uniforms_of)
 
-    def _joined(self, parts: Iterable[Array]) -> Array:
-        """Return the rows of some blocks as one array."""
-        return np.concatenate([np.empty((0, self._size)), *parts])
+    def _joined(self, first: int, ticks: int, of_block: Callable[[int], Array]) -> Array:
+        """Return the rows of ticks out of their blocks."""
+        found, tick = np.empty((ticks, self._size)), first
+        while tick < first + ticks:
+            rows = of_block(tick // _BLOCK)[tick % _BLOCK :][: first + ticks - tick]
+            found[tick - first :][: len(rows)] = rows
+            tick += len(rows)
+        return found
 
-    def _blocks(self, first: int, ticks: int) -> Iterator[slice]:
-        """Draw the blocks of some ticks one after the other, and yield which rows of each are theirs."""
-        tick, end = first, first + ticks
-        while tick < end:
-            self._draw(tick)
-            start = tick % _BLOCK
-            stop = min(_BLOCK, start + end - tick)
-            yield slice(start, stop)
-            tick += stop - start
+    def _uniforms_of(self, block: int) -> Array:
+        """Return the uniform numbers of a block, which come first in its part of the stream."""
+        if block != self._uniform.index:
+            drawn = self._at(block, 0).random((_BLOCK, self._size))
+            self._uniform = _Block(block, frozen(drawn))
+        return self._uniform.rows
 
-    def _draw(self, tick: int) -> None:
-        """Draw the block of a tick, unless it is there."""
-        block = tick // _BLOCK
-        if block == self._block:
-            return
+    def _normals_of(self, block: int) -> Array:
+        """Return the standard normal numbers of a block, which come behind its uniform ones."""
+        if block != self._normal.index:
+            drawn = self._at(block, _BLOCK * self._size).standard_normal((_BLOCK, self._size))
+            self._normal = _Block(block, frozen(drawn))
+        return self._normal.rows
+
+    def _at(self, block: int, skipped: int) -> np.random.Generator:
+        """Return a generator at the part of a block in the stream, behind so many uniform numbers."""
         bits = np.random.Philox(self._sequence)
-        bits.advance(block * _COUNTER)
-        generator = np.random.Generator(bits)
-        self._uniform = frozen(generator.random((_BLOCK, self._size)))  # first: it takes a known number
-        self._normal = frozen(generator.standard_normal((_BLOCK, self._size)))
-        self._block = block
+        bits.advance(block * _COUNTER + skipped // _PER_COUNT)
+        return np.random.Generator(bits)
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """The numbers (_BLOCK, size) of the ticks of a block."""
+
+    index: int
+    rows: Array

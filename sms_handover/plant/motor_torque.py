@@ -44,4 +44,5 @@ class MotorTorque:
         """Return the noise (ticks, n) N m of some ticks from a first one on."""
         if not self._noisy:
             return np.zeros((ticks, self._sigma.size))
-        return self._sigma * self._noise.normals(first, ticks)
+        normals = self._noise.normals(first, ticks)
+        return np.multiply(self._sigma, normals, out=normals)

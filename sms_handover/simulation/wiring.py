@@ -117,7 +117,7 @@ def _resisted_stepper(
 ) -> ResistedStepper | None:
     """Return compiled steps under friction and wrenches, None where C does not have one of these."""
     if not WrenchTable.knows(resistance.wrenches):
-        _say_once("steps under wrenches are Pinocchio's: C does not have one of their kinds")
+        say_once("steps under wrenches are Pinocchio's: C does not have one of their kinds")
         return None
     return CompiledResistedStepper(robot, resistance, tableau, tick_ns)
 
@@ -252,13 +252,13 @@ def make_runner(
         return by_python
     obstacle = CompiledTicks.obstacle(plant, controller, known)
     if obstacle:
-        _say_once(f"ticks are carried out by Python: C does not have {obstacle}")
+        say_once(f"ticks are carried out by Python: C does not have {obstacle}")
         return by_python
     return CompiledTicks(plant, controller, known, parameters.integrator, common.tick_ns)
 
 
 @cache
-def _say_once(text: str) -> None:
+def say_once(text: str) -> None:
     """Warn once in a process, however many loops it makes."""
     _LOG.warning(text)
 

@@ -19,7 +19,7 @@ from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.simulation.snapshot import plain
 
-_ROTOR: dict[str, Any] = {"rotor_inertia": 0.31}
+ROTOR: dict[str, Any] = {"rotor_inertia": 0.31}
 _FORCE = {"force": [0.5, 0.1, 0.0], "torque": [0.0, 0.1, 0.0]}
 _ORBIT = {"radius": 6.778e6, "radial": [1.0, 0.2, 0.0], "normal": [0.0, 0.0, 1.0]}
 EFFECTS: dict[str, dict[str, Any]] = {
@@ -61,7 +61,7 @@ def _scenario(effects: dict[str, Any], seconds: float = 0.06, **more: Any) -> Sc
     """
     if any(path.startswith("sensors") for path in effects):
         more = {"common.source": "measured", **more}
-    conditions = {f"conditions.{path}": value for path, value in {**_ROTOR, **effects}.items()}
+    conditions = {f"conditions.{path}": value for path, value in {**ROTOR, **effects}.items()}
     return load_scenario("colliding", {"common.duration": seconds, **conditions, **more})
 
 
@@ -86,7 +86,7 @@ def test_values_read_back_from_the_plant_are_those_of_the_file() -> None:
         if section == "wrenches":
             wrench, kind = name.split(".")
             found = applied["wrenches"][wrench]
-            assert found["on"] == "base"
+            assert found["acts_on"] == "base"
             for key, value in asked.items():
                 unit = np.linalg.norm(value) if key in ("radial", "normal") else 1.0
                 assert np.array(found[kind][key]) * unit == pytest.approx(np.array(value), rel=1e-12), path

@@ -7,6 +7,7 @@ from math import exp, log
 import numpy as np
 import pytest
 
+from sms_handover.compiled.effects import CompiledResistedStepper
 from sms_handover.conditions.joint_values import FrictionValues, TorqueErrors
 from sms_handover.conditions.random_streams import RandomStreams
 from sms_handover.errors import ConfigurationError
@@ -14,12 +15,14 @@ from sms_handover.model.conserved import conserved_quantities
 from sms_handover.model.description import load_robot
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.command_path import CommandPath
-from sms_handover.plant.conditioned_stepper import ConditionedStepper, Resistance
+from sms_handover.plant.conditioned_stepper import ConditionedStepper, Resistance, ResistedStepper
 from sms_handover.plant.integrators import TABLEAUS
 from sms_handover.plant.joint_friction import JointFriction
 from sms_handover.plant.motor_torque import MotorTorque
 from sms_handover.plant.stepper import PinocchioStepper
+from sms_handover.simulation.scenario import load_scenario
 from sms_handover.types import BASE_NQ, Array, Pose
+from sms_handover.units import seconds_to_ns
 
 from .conftest import Draw
 from .robots import someone_else
@@ -82,15 +85,36 @@ def _friction(viscous: float, coulomb: float, stiction: float | None = None) -> 
     return FrictionValues(_ones(viscous, 1), _ones(coulomb, 1), _ones(bound, 1), _ones(0.01, 1))
 
 
+Make = Callable[[RobotModel, FrictionValues, str, float], ResistedStepper]
+
+
+def _by_python(robot: RobotModel, values: FrictionValues, scheme: str, tick: float) -> ResistedStepper:
+    resistance, tableau = Resistance(JointFriction(values, tick), ()), TABLEAUS[scheme]
+    return ConditionedStepper(robot, resistance, PinocchioStepper(robot, tableau, tick), tableau, tick)
+
+
+def _in_c(robot: RobotModel, values: FrictionValues, scheme: str, tick: float) -> ResistedStepper:
+    resistance = Resistance(JointFriction(values, tick), ())
+    return CompiledResistedStepper(robot, resistance, TABLEAUS[scheme], seconds_to_ns(tick))
+
+
+@pytest.fixture(params=[_by_python, _in_c], ids=["python", "c"])
+def make(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
+) -> Make:
+    """Return what makes the steps, with the folder of all modules for libraries."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp() / "compiled"))
+    given: Make = request.param
+    return given
+
+
 class Wheel1:
     """The wheel under friction, moved on tick by tick from an angle of 0 and a rate."""
 
-    def __init__(self, values: FrictionValues, tick: float, rate: float = 0.0) -> None:
+    def __init__(self, make: Make, values: FrictionValues, tick: float, rate: float = 0.0) -> None:
         wheel = Wheel(upper=100.0)
         self.robot, self.inertia, self.tick = wheel.robot, wheel.inertia, tick
-        resistance = Resistance(JointFriction(values, tick), ())
-        inner = PinocchioStepper(self.robot, TABLEAUS["rk4"], tick)
-        self._stepper = ConditionedStepper(self.robot, resistance, inner, TABLEAUS["rk4"], tick)
+        self._stepper = make(self.robot, values, "rk4", tick)
         self.q = self.robot.configuration(HOME, np.zeros(1))
         self.v = np.array([*_ones(0.0, 5), wheel.reaction * rate, rate])
         self.lost = 0.0
@@ -108,12 +132,12 @@ def _errors(run: Callable[[float], float], exact: float) -> list[float]:
     return [abs(run(tick) - exact) for tick in (4e-3, 1e-3, 0.25e-3)]
 
 
-def test_a_slipping_joint_speeds_up_as_its_closed_form_with_an_order_of_at_least_one() -> None:
+def test_a_slipping_joint_speeds_up_as_its_closed_form_with_an_order_of_at_least_one(make: Make) -> None:
     """I* w' = u - tau_c - f_v w: w = (u - tau_c) / f_v (1 - exp(-f_v t / I*))."""
     viscous, coulomb, effort, seconds = 0.8, 0.5, 1.5, 0.4  # [N m s/rad], [N m], [N m], [s]
 
     def rate(tick: float) -> float:
-        return Wheel1(_friction(viscous, coulomb), tick).run(effort, seconds)[1]
+        return Wheel1(make, _friction(viscous, coulomb), tick).run(effort, seconds)[1]
 
     inertia = Wheel().inertia
     exact = (effort - coulomb) / viscous * (1.0 - exp(-viscous * seconds / inertia))
@@ -122,7 +146,7 @@ def test_a_slipping_joint_speeds_up_as_its_closed_form_with_an_order_of_at_least
     assert all(fine < 0.26 * coarse for coarse, fine in pairwise(errors))
 
 
-def test_a_joint_comes_to_rest_when_and_where_its_closed_form_says_and_stays() -> None:
+def test_a_joint_comes_to_rest_when_and_where_its_closed_form_says_and_stays(make: Make) -> None:
     """I* w' = -tau_c - f_v w stops at t = I* / f_v ln(1 + f_v w_0 / tau_c); half a second later it rests."""
     viscous, coulomb, start = 0.2, 0.5, 1.2  # [N m s/rad], [N m], [rad/s]
     inertia = Wheel().inertia
@@ -130,7 +154,7 @@ def test_a_joint_comes_to_rest_when_and_where_its_closed_form_says_and_stays() -
     way = inertia * start / viscous - coulomb / viscous * stops
 
     def angle(tick: float) -> float:
-        wheel = Wheel1(_friction(viscous, coulomb), tick, start)
+        wheel = Wheel1(make, _friction(viscous, coulomb), tick, start)
         found, rate = wheel.run(0.0, stops + 0.5)
         assert abs(rate) < 1e-14
         assert wheel.lost == pytest.approx(0.5 * inertia * start**2, rel=1e-9)
@@ -142,10 +166,10 @@ def test_a_joint_comes_to_rest_when_and_where_its_closed_form_says_and_stays() -
     assert errors[2] < errors[0] / 16.0
 
 
-def test_a_joint_at_rest_bears_its_stiction_and_then_falls_to_coulomb_friction() -> None:
+def test_a_joint_at_rest_bears_its_stiction_and_then_falls_to_coulomb_friction(make: Make) -> None:
     values = _friction(0.0, 0.3, 0.5)
-    assert Wheel1(values, 1e-3).run(0.49, 0.1) == pytest.approx((0.0, 0.0), abs=1e-14)
-    wheel = Wheel1(values, 0.25e-3)
+    assert Wheel1(make, values, 1e-3).run(0.49, 0.1) == pytest.approx((0.0, 0.0), abs=1e-14)
+    wheel = Wheel1(make, values, 0.25e-3)
     wheel.run(0.51, 0.5)
     before = wheel.v[-1]
     wheel.run(0.51, 0.1)
@@ -173,6 +197,31 @@ def test_friction_keeps_the_balance_of_energy_and_momentum(draw: Draw) -> None:
     assert abs(after.kinetic_energy - work + lost) < 1e-9 * gross
     assert np.abs(after.linear_momentum).max() < 1e-11
     assert np.abs(after.angular_momentum).max() < 1e-11
+
+
+@pytest.mark.parametrize(("scheme", "order"), [("rk4", 4), ("midpoint", 2)])
+def test_the_balance_of_energy_closes_with_the_order_of_the_scheme(
+    make: Make, scheme: str, order: int
+) -> None:
+    """At ticks of 8 and 2 ms, with rotors, from rest over slipping to sticking joints."""
+    robot = load_scenario("smooth", {"conditions.rotor_inertia": 0.31}).truth.robot
+    count, apart = robot.n_joints, []
+    values = FrictionValues(*(_ones(x, count) for x in (0.3, 0.2, 0.3, 0.01)))
+    for tick in (8e-3, 2e-3):
+        stepper, q = (
+            make(robot, values, scheme, tick),
+            robot.configuration(HOME, np.linspace(-1.0, 1.0, count)),
+        )
+        v, work, gross, lost = np.zeros(robot.pin.nv), 0.0, 0.0, 0.0
+        for k in range(round(0.4 / tick)):
+            effort, before = 3.0 * np.sin(10.0 * k * tick + np.arange(count)), q
+            q, v = stepper.step(q, v, effort)
+            parts = effort * (q - before)[BASE_NQ:]
+            work, gross, lost = work + parts.sum(), gross + np.abs(parts).sum(), lost + stepper.lost
+        assert lost > 0.02 * gross
+        apart.append(abs(conserved_quantities(robot, q, v).kinetic_energy - work + lost) / gross)
+    assert apart[0] < 1e-4
+    assert apart[1] < apart[0] / 4.0 ** (order - 0.5)
 
 
 def test_stiction_is_at_least_the_coulomb_friction() -> None:

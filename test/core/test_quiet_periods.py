@@ -12,9 +12,16 @@ import pytest
 import yaml
 
 from sms_handover.compiled.c_function import CFunction, NativeFunction
+from sms_handover.compiled.effects import CompiledResistedStepper
+from sms_handover.compiled.ticks import CompiledTicks
+from sms_handover.conditions.joint_values import FrictionValues
 from sms_handover.control.controller import JointController
 from sms_handover.control.nmpc import NmpcLaw
 from sms_handover.control.protocol import Guidance
+from sms_handover.plant.conditioned_stepper import ConditionedStepper, Resistance
+from sms_handover.plant.integrators import TABLEAUS
+from sms_handover.plant.joint_friction import JointFriction
+from sms_handover.plant.stepper import PinocchioStepper
 from sms_handover.run_data import RunData
 from sms_handover.simulation import loop as loop_module
 from sms_handover.simulation.loop import Loop
@@ -24,12 +31,13 @@ from sms_handover.simulation.recorder import RunRecorder
 from sms_handover.simulation.scenario import Overrides, Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.simulation.snapshot import plain
-from sms_handover.simulation.wiring import make_controller, make_plant, make_runner
+from sms_handover.simulation.wiring import make_controller, make_plant, make_runner, say_once
 from sms_handover.types import GraspStatus, JointReference, TaskPhase
 
 from ..ros.short_handover import short_handover
-from .conftest import SCHEDULE
+from .conftest import SCHEDULE, Draw
 from .retried_handover import LAWS, retried_handover
+from .test_conditions import EFFECTS, ROTOR
 
 COMPILED: Overrides = {"common": {"dynamics": "compiled"}}
 UNLIKE: dict[str, Any] = {"deputy.mass": 2.0, "model.deputy.mass": 2.2}  # [kg]
@@ -239,6 +247,83 @@ def test_a_deputy_changes_hands(law: str, deputy: dict[str, Any], follows: bool,
     assert fewer < (calls / 2 if deputy else calls / 4)  # the way to a deputy with mass is Python's
     reference = simulate(load_scenario(values=values))
     assert np.abs(found.joint_position - reference.joint_position).max() < 1e-9
+
+
+# Those of sensors are left to Python.
+IN_C = {name: values for name, values in EFFECTS.items() if not name.startswith("sensors")}
+EVERYTHING = {path: value for values in IN_C.values() for path, value in values.items()}
+
+
+def conditioned(effects: dict[str, Any], dynamics: str, **more: Any) -> Scenario:
+    """Return a short run under some effects, towards step targets."""
+    values = {f"conditions.{path}": value for path, value in {**ROTOR, **effects}.items()}
+    return load_scenario("colliding", {"common.duration": 0.1, "common.dynamics": dynamics, **values, **more})
+
+
+@pytest.mark.parametrize("effect", IN_C)
+def test_an_effect_acts_in_c_as_by_pinocchio(effect: str) -> None:
+    loop = Loop(conditioned(IN_C[effect], "compiled"))
+    assert isinstance(loop._runner, CompiledTicks)
+    found, calls = rest_of(loop)
+    assert calls <= 3
+    expected, ideal = (simulate(conditioned(effects, "pinocchio")) for effects in (IN_C[effect], {}))
+    acting = np.abs(expected.joint_velocity - ideal.joint_velocity).max()
+    assert acting > 1e-11
+    assert np.abs(found.joint_velocity - expected.joint_velocity).max() < 0.01 * acting
+    for name in ("joint_position", "joint_velocity", "joint_effort", "base_pose"):
+        assert np.abs(getattr(found, name) - getattr(expected, name)).max() < 1e-11, name
+    for name in ("lost", "work", "external_work", "linear_impulse", "angular_impulse"):
+        size = np.abs(getattr(expected, name)).max()
+        assert np.abs(getattr(found, name) - getattr(expected, name)).max() <= 1e-11 * size, name
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_ticks_under_conditions_are_those_of_python(law: str) -> None:
+    """Whatever the calls in which they are carried out, and again after a snapshot and a reset."""
+    scenario = conditioned(EVERYTHING, "compiled", law=law)
+    ours, theirs = Loop(scenario), python_loop(scenario)
+    expected, _ = rest_of(theirs)
+    found, _ = rest_of(ours)
+    require_same(found, expected)
+    assert plain(ours.snapshot()) == plain(theirs.snapshot())
+    ours.reset()
+    ours.advance_quietly()
+    ours.advance_period()
+    theirs.restore(ours.snapshot())
+    require_same(rest_of(ours)[0], rest_of(theirs)[0])
+    ours.reset()
+    require_same(rest_of(ours)[0], expected)
+
+
+def test_joints_stick_in_c_as_by_python() -> None:
+    """With friction that brings joints to rest, one after the other, and lets some break away."""
+    robot, tick_ns = conditioned({}, "compiled").truth.robot, 1_000_000
+    count, h = robot.n_joints, 1e-3
+    values = FrictionValues(*(np.full(count, x) for x in (0.3, 0.2, 0.3, 0.01)))
+    resistance, tableau = Resistance(JointFriction(values, h), ()), TABLEAUS["rk4"]
+    python = ConditionedStepper(robot, resistance, PinocchioStepper(robot, tableau, h), tableau, h)
+    steppers = python, CompiledResistedStepper(robot, resistance, tableau, tick_ns)
+    draw = Draw(robot, 6)
+    start = robot.configuration(draw.pose(), draw.joints()), draw.v(0.01)
+    states, resting = [start, start], 0
+    for k in range(300):
+        effort = 0.35 * np.sin(0.02 * k + np.arange(count))
+        states = [stepper.step(*state, effort) for stepper, state in zip(steppers, states, strict=True)]
+        resting += int(np.count_nonzero(np.abs(states[0][1][6:]) < 1e-9))
+        for ours, one in zip(states[1], states[0], strict=True):
+            assert np.abs(ours - one).max() < 1e-11
+        assert steppers[1].lost == pytest.approx(python.lost, abs=1e-12)
+    assert 50 < resting < 300 * count - 50
+
+
+def test_what_c_does_not_have_is_said_once(caplog: pytest.LogCaptureFixture) -> None:
+    """One line for all loops of a process, which names what is not there."""
+    say_once.cache_clear()
+    values = {"plant.joint_limits": "enforce", "common.dynamics": "compiled", "common.duration": 0.04}
+    for _ in range(2):
+        runner_of(load_scenario(values=values))
+    lines = [line for line in caplog.messages if "carried out by Python" in line]
+    assert lines == ["ticks are carried out by Python: C does not have enforced joint limits"]
 
 
 @pytest.mark.parametrize("time_law", ["step", "quintic"])

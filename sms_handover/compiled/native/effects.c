@@ -173,6 +173,7 @@ static void resist(const effects_t *e, const double *numbers, const double *v, d
                    double *acceleration, double *friction, double *w) {
   enum { TRIES = 3, MOST = 50 * N };
   const double rounding = 8.0 * 2.220446049250313e-16;
+  const double *bias = numbers + NUMBERS - N;
   double added[N], bound[N], free[N], given[N], holding[N], right[NV], factors[FACTORS];
   int side[N], fewest = N + 1, tries = TRIES, changed = 1; /* way in which a joint slips, 0: it sticks */
   for (int j = 0; j < N; j++) {
@@ -181,8 +182,9 @@ static void resist(const effects_t *e, const double *numbers, const double *v, d
   }
   for (int j = 0; j < N; j++) added[j] = h * e->viscous[j];
   for (int j = 0; j < N; j++) {
-    int rests = fabs(v[6 + j]) * numbers[diagonal[j]] <= h * bound[j] && bound[j] > 0.0;
-    side[j] = rests ? 0 : v[6 + j] < 0.0 ? -1 : 1;
+    /* a guess, as if the others stood still: a good one saves passes and changes nothing else */
+    double inertia = numbers[diagonal[j]], reached = v[6 + j] * inertia + h * (force[6 + j] - bias[j]);
+    side[j] = fabs(reached) <= h * bound[j] && bound[j] > 0.0 ? 0 : reached < 0.0 ? -1 : 1;
   }
   memcpy(right, force, 6 * sizeof *right);
   for (int pass = 0; pass < MOST; pass++) {

@@ -48,11 +48,11 @@ static double logarithm(const double *R, double *vector) {
   return scale * s;
 }
 
-static void evaluate(const double *base, const double *joints, const double *targets, const long long *led,
-                     residual_t *r, double *w) {
+static void evaluate(const double *base, const double *parameters, const double *joints, const double *targets,
+                     const long long *led, residual_t *r, double *w) {
   double q[NQ], poses[ARMS * POSE], sum = 0.0;
   memcpy(q, base, 7 * sizeof *q), memcpy(q + 7, joints, N * sizeof *q);
-  const double *arguments[ARGUMENTS] = {q};
+  const double *arguments[ARGUMENTS] = {q, parameters};
   double *results[ARGUMENTS] = {poses, r->linear, r->angular};
   sms_tool_jacobians(arguments, results, 0, w, 0);
   r->position_error = r->orientation_error = 0.0;
@@ -133,9 +133,9 @@ static void jacobian_of(const residual_t *r, const double *joints, const ik_sett
 }
 
 /* Find the first damped step that lowers the energy; return whether there is one. */
-static int descend(const double *base, const double *joints, const residual_t *r, const double *targets,
-                   const long long *led, const ik_settings_t *s, double *candidate, residual_t *found,
-                   double *w) {
+static int descend(const double *base, const double *parameters, const double *joints, const residual_t *r,
+                   const double *targets, const long long *led, const ik_settings_t *s, double *candidate,
+                   residual_t *found, double *w) {
   double J[ARMS][ROWS][MOST_JOINTS], undamped[ARMS][ROWS][ROWS], damped[ROWS][ROWS], growth = 1.0;
   for (int arm = 0; arm < ARMS; arm++) {
     if (!led[arm]) continue;
@@ -163,25 +163,25 @@ static int descend(const double *base, const double *joints, const residual_t *r
         candidate[joint] = within(joints[joint] - step, s->lower[joint], s->upper[joint]);
       }
     }
-    evaluate(base, candidate, targets, led, found, w);
+    evaluate(base, parameters, candidate, targets, led, found, w);
     if (found->energy < r->energy) return 1;
   }
   return 0;
 }
 
 /* Bring the tools that are led to their targets (ARMS, 12) in world, or nearest from the seed. */
-static void find_joints(const double *base, const double *targets, const long long *led,
+static void find_joints(const double *base, const double *parameters, const double *targets, const long long *led,
                         const ik_settings_t *s, ik_solution_t *solution, double *w) {
   residual_t first, second, *r = &first, *found = &second, *other;
   double candidate[N], *joints = solution->joints;
   long long k;
   for (int j = 0; j < N; j++) joints[j] = within(joints[j], s->lower[j], s->upper[j]);
-  evaluate(base, joints, targets, led, r, w);
+  evaluate(base, parameters, joints, targets, led, r, w);
   solution->status = ITERATION_LIMIT;
   for (k = 0; k < s->max_iterations; k++) {
     if (has_converged(r, s)) break;
     double largest = 0.0;
-    if (descend(base, joints, r, targets, led, s, candidate, found, w))
+    if (descend(base, parameters, joints, r, targets, led, s, candidate, found, w))
       for (int j = 0; j < N; j++) {
         double moved = fabs(candidate[j] - joints[j]);
         if (moved > largest) largest = moved;
@@ -201,10 +201,10 @@ static void find_joints(const double *base, const double *targets, const long lo
 }
 
 /* The same for targets that are rows (ARMS, 7). */
-void sms_find_joints(const double *base, const double *rows, const long long *led, const ik_settings_t *s,
-                     ik_solution_t *solution, double *w) {
+void sms_find_joints(const double *base, const double *parameters, const double *rows, const long long *led,
+                     const ik_settings_t *s, ik_solution_t *solution, double *w) {
   double targets[ARMS * POSE];
   for (int arm = 0; arm < ARMS; arm++)
     if (led[arm]) pose_of(rows + POSE_ROW * arm, targets + POSE * arm);
-  find_joints(base, targets, led, s, solution, w);
+  find_joints(base, parameters, targets, led, s, solution, w);
 }

@@ -30,10 +30,10 @@ void sms_observe(const ticks_t *t, void *of_periods, void *of_period, double *w)
   period_t *p = of_period;
   double twists[ARMS * TWIST];
   if (quiet->holder >= 0)
-    sms_motion_rows(t->q, t->v, quiet->holder, quiet->in_tool, p->tools, twists, quiet->deputy,
+    sms_motion_rows(t->q, t->v, t->true_parameters, quiet->holder, quiet->in_tool, p->tools, twists, quiet->deputy,
                     quiet->deputy_twist, w);
   else
-    sms_tool_rows(t->q, p->tools, w);
+    sms_tool_rows(t->q, t->true_parameters, p->tools, w);
   memcpy(p->deputy, quiet->deputy, sizeof p->deputy);
   memcpy(p->deputy_twist, quiet->deputy_twist, sizeof p->deputy_twist);
   const double *arguments[ARGUMENTS] = {t->q, t->v, t->true_parameters};
@@ -78,7 +78,7 @@ static void refer(const ticks_t *t, const ik_settings_t *settings, quiet_t *quie
   if (any) {
     ik_solution_t solution;
     memcpy(solution.joints, p->reference, sizeof solution.joints);
-    sms_find_joints(t->q, p->targets, led, settings, &solution, w);
+    sms_find_joints(t->q, t->known_parameters, p->targets, led, settings, &solution, w);
     memcpy(p->reference, solution.joints, sizeof p->reference);
     p->status = (double)solution.status;
     quiet->failures = solution.status == CONVERGED ? 0 : quiet->failures + 1;
@@ -86,7 +86,7 @@ static void refer(const ticks_t *t, const ik_settings_t *settings, quiet_t *quie
   if (!all) {
     double rows[ARMS * POSE_ROW];
     memcpy(q, t->q, 7 * sizeof *q), memcpy(q + 7, p->reference, sizeof p->reference);
-    sms_tool_rows(q, rows, w);
+    sms_tool_rows(q, t->known_parameters, rows, w);
     for (int arm = 0; arm < ARMS; arm++)
       if (!led[arm]) memcpy(p->targets + POSE_ROW * arm, rows + POSE_ROW * arm, POSE_ROW * sizeof *rows);
   }

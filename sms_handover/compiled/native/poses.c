@@ -59,9 +59,9 @@ void sms_placed(const double *body, const double *in_body, double *row, double *
 }
 
 /* Rows (ARMS, 7) of the tools at q. */
-void sms_tool_rows(const double *q, double *rows, double *w) {
+void sms_tool_rows(const double *q, const double *parameters, double *rows, double *w) {
   double poses[ARMS * POSE];
-  const double *arguments[ARGUMENTS] = {q};
+  const double *arguments[ARGUMENTS] = {q, parameters};
   double *results[ARGUMENTS] = {poses};
   sms_tools(arguments, results, 0, w, 0);
   for (int arm = 0; arm < ARMS; arm++) row_of(poses + POSE * arm, rows + POSE_ROW * arm);
@@ -69,10 +69,11 @@ void sms_tool_rows(const double *q, double *rows, double *w) {
 
 /* Rows (ARMS, 7) and twists (ARMS, 6) of the tools. With a holder >= 0 also row and twist of the deputy,
  * whose pose in the tool is `in_tool`: it moves with the tool as one body. */
-void sms_motion_rows(const double *q, const double *v, long holder, const double *in_tool, double *rows,
-                     double *twists, double *deputy, double *deputy_twist, double *w) {
+void sms_motion_rows(const double *q, const double *v, const double *parameters, long holder,
+                     const double *in_tool, double *rows, double *twists, double *deputy, double *deputy_twist,
+                     double *w) {
   double poses[ARMS * POSE];
-  const double *arguments[ARGUMENTS] = {q, v};
+  const double *arguments[ARGUMENTS] = {q, v, parameters};
   double *results[ARGUMENTS] = {poses, twists};
   sms_motion(arguments, results, 0, w, 0);
   for (int arm = 0; arm < ARMS; arm++) row_of(poses + POSE * arm, rows + POSE_ROW * arm);
