@@ -167,7 +167,7 @@ def trials(trial: Trial) -> Iterator[Tried]:
     for count in (1, 2, 4):
         path = trial.run(f"dask_{count}", lambda count=count: trial.dask(count))  # type: ignore[misc]
         trial.require_rows(path, f"{count} workers of Dask")
-        yield tried(f"a cluster of {count} workers", rows)
+        yield tried(f"a cluster, workers: {count}", rows)
 
     parts = [
         trial.run(f"shard_{number}", lambda: trial.dask(2), Shard(number, _SHARDS))
