@@ -167,7 +167,7 @@ def trials(trial: Trial) -> Iterator[Tried]:
     for count in (1, 2, 4):
         path = trial.run(f"dask_{count}", lambda count=count: trial.dask(count))  # type: ignore[misc]
         trial.require_rows(path, f"{count} workers of Dask")
-        yield tried(f"a cluster of {count} workers", rows)
+        yield tried(f"a cluster, workers: {count}", rows)
 
     parts = [
         trial.run(f"shard_{number}", lambda: trial.dask(2), Shard(number, _SHARDS))
@@ -180,7 +180,9 @@ def trials(trial: Trial) -> Iterator[Tried]:
 
     killed = kill(trial, options.kills)
     words = ", ".join(f"{times} of a {what}" for what, times in sorted(killed.items()))
-    yield tried(f"2 workers and {options.kills} times `kill -9` ({words}), a torn last line each", rows)
+    yield tried(
+        f"2 workers and {options.kills} times `kill -9` ({words}), torn last lines after the driver", rows
+    )
 
     yield tried("every draw read back from plant or model", f"{draws_read_back(trial)} values")
     more_draws_and_cases(trial, folder)

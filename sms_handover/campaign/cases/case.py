@@ -99,7 +99,9 @@ class Cases:
             if is_exact(loop, path) and not is_same(asked, inputs[path]):
                 raise RuntimeError(f"{path} was drawn as {asked}, and is {inputs[path]}")
         most = campaign.limits.ticks
-        recorder = RunRecorder(scenario.model.robot.joint_names, scenario.model.robot.arms)
+        panels = tuple(panel.joint for panel in scenario.truth.robot.description.flexible_panels)
+        robot = scenario.model.robot
+        recorder = RunRecorder(robot.joint_names, robot.arms, loop.last_tick + 1, panels)
         done = 0
         while not loop.finished:
             ticks = loop.advance_quietly()
@@ -107,7 +109,7 @@ class Cases:
             done += len(ticks.rows.stamp_ns)
             if most and done > most:
                 return Status.LIMIT, f"more than {most} ticks", None
-        run = recorder.data()
+        run = recorder.data(loop.base_wrenches, loop.applied)
         if not _is_finite(run):
             return Status.NUMERIC_FAILURE, "numbers that are not finite", None
         found, lacking = metrics_of(run, scenario, (*campaign.metrics, *campaign.success.names))
