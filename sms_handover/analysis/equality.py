@@ -101,7 +101,7 @@ def as_far_as_recorded(recorded: RunData, again: RunData) -> tuple[RunData, tupl
         if isinstance(theirs, np.ndarray) and theirs.shape == ours.shape and _lacks([theirs], [ours]):
             values[item.name] = theirs
             missing.append(item.name)
-    if not recorded.applied:
+    if again.applied and not recorded.applied:
         values["applied"] = ""
         missing.append("applied")
     events, lacking = recorded.grasp_events, {}

@@ -141,7 +141,7 @@ def _wrenches(section: Section, body: str) -> dict[str, WrenchModel]:
     found = {}
     for name in section.keys:
         wrench = section.section(name)
-        if (wrench.name("on", "body", BODIES) if "on" in wrench else ON_BASE) != body:
+        if (wrench.name("acts_on", "body", BODIES) if "acts_on" in wrench else ON_BASE) != body:
             continue
         kind = wrench.one_of(f"wrench {name!r}")
         inner = wrench.section(kind)

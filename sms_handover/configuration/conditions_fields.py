@@ -76,7 +76,7 @@ _ORBIT = {
 _WRENCH = MappingSpec(
     "a wrench on the base or the deputy",
     optional={
-        "on": text("body that it acts on, by default the base; the deputy must have mass", BODIES),
+        "acts_on": text("body that it acts on, by default the base; the deputy must have mass", BODIES),
         "constant": MappingSpec(
             "a constant force and torque",
             {"force": _FORCE, "torque": _TORQUE_OF_WRENCH},

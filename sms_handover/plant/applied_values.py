@@ -57,7 +57,7 @@ def _of_effects(effects: PlantEffects) -> dict[str, Any]:
     if path:
         found["command"] = {"delay": effects.delay_s, "dropped": path.dropped}
     wrenches = {
-        name: {"on": body, _KINDS[type(model)]: _of_wrench(model)}
+        name: {"acts_on": body, _KINDS[type(model)]: _of_wrench(model)}
         for body, names, models in (
             (ON_BASE, effects.names[0], resistance.wrenches),
             (ON_DEPUTY, effects.names[1], resistance.deputy_wrenches),

@@ -86,7 +86,7 @@ def test_values_read_back_from_the_plant_are_those_of_the_file() -> None:
         if section == "wrenches":
             wrench, kind = name.split(".")
             found = applied["wrenches"][wrench]
-            assert found["on"] == "base"
+            assert found["acts_on"] == "base"
             for key, value in asked.items():
                 unit = np.linalg.norm(value) if key in ("radial", "normal") else 1.0
                 assert np.array(found[kind][key]) * unit == pytest.approx(np.array(value), rel=1e-12), path

@@ -87,7 +87,7 @@ _ON_BASE = {"leak": _ON_DEPUTY["push"], "hill": _ON_DEPUTY["hill"], "orbit": _ON
 
 def _pushed(on_deputy: dict[str, Any], on_base: dict[str, Any], tick: float = 1e-3) -> FreeFloatingPlant:
     """Return the plant of a massive deputy that tumbles, which any tool may take from anywhere."""
-    wrenches = {**{f"d_{n}": {"on": "deputy", **w} for n, w in on_deputy.items()}, **on_base}
+    wrenches = {**{f"d_{n}": {"acts_on": "deputy", **w} for n, w in on_deputy.items()}, **on_base}
     anywhere = {f"plant.grasp_{what}_tolerance": 10.0 for what in ("position", "speed", "rate")}
     twist = {"linear": [0.01, 0.02, -0.01], "angular": [0.2, -0.1, 0.3]}
     values = {"common.tick": tick, "plant.grasp_angle_tolerance": 3.1416, **anywhere}
@@ -204,7 +204,7 @@ def test_a_snapshot_under_other_conditions_is_rejected() -> None:
 
 
 def test_a_wrench_on_a_deputy_without_mass_is_an_error_of_one_line() -> None:
-    wrench: dict[str, Any] = {"conditions.wrenches.drag": {"on": "deputy", **_ON_DEPUTY["push"]}}
+    wrench: dict[str, Any] = {"conditions.wrenches.drag": {"acts_on": "deputy", **_ON_DEPUTY["push"]}}
     with pytest.raises(ConfigurationError, match="drag acts on the deputy, whose mass is 0 kg"):
         load_scenario("smooth", wrench)
 
