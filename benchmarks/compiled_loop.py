@@ -25,12 +25,13 @@ RUNS = tuple((scenario, law) for scenario in ("paper", "smooth") for law in ("nm
 _TICKS, _CALLS = 20, 50  # ticks of a period, and calls of a part in a row
 _DEPUTY_KG, _HELD_S = 4.0, 21.0  # mass of the payload; a time at which it is held
 _ROLLOUT = "paper, nmpc: efforts replayed by MuJoCo's rollout"
+_NOMINAL, _ITS_IDEAL = "smooth, nmpc: conditions nominal", "smooth, nmpc"
 _LONG = 1000  # ticks in a row
 
 
-def compiled(name: str, law: str) -> Scenario:
-    """Return a scenario with compiled dynamics."""
-    return load_scenario(name, {"law": law, "common.dynamics": "compiled"})
+def compiled(name: str, law: str, conditions: str = "ideal") -> Scenario:
+    """Return a scenario with compiled dynamics, under some conditions."""
+    return load_scenario(name, {"law": law, "common.dynamics": "compiled", "common.conditions": conditions})
 
 
 def by_period(scenario: Scenario) -> None:
@@ -102,6 +103,7 @@ def main() -> None:
     for name, law in RUNS:
         runs[f"{name}, {law}"] = partial(simulate, compiled(name, law))
     first = compiled(*RUNS[0])
+    runs[_NOMINAL] = partial(simulate, compiled("smooth", "nmpc", "nominal"))
     runs["paper, nmpc: periods by Python"] = partial(by_period, first)
     runs["paper, nmpc: periods and ticks by Python"] = partial(by_tick, first)
     runs[_ROLLOUT] = replay_of(first)
@@ -136,7 +138,11 @@ def main() -> None:
                 Table(("part of a reference period", "us"), cells),
                 Table(("payload", "us per tick", "time over the first"), loaded),
             ],
-            values={**speed, "tick with payload over tick without": ticks.ratio(*reversed([*payloads]))},
+            values={
+                **speed,
+                "tick with payload over tick without": ticks.ratio(*reversed([*payloads])),
+                "nominal over ideal": times.ratio(_NOMINAL, _ITS_IDEAL),
+            },
         )
     )
 

@@ -364,6 +364,6 @@ def test_ticks_in_c_allocate_nothing() -> None:
 def test_a_deputy_that_drifts_after_a_release_moves_on() -> None:
     """C does not move it, so each period is Python's, and the run is the same."""
     scenario = load_scenario("planar", COMPILED)
-    run = simulate(scenario)
+    run, _ = rest_of(Loop(scenario))
     require_same(run, rest_of(python_loop(scenario))[0])
     assert run.grasp_events[-1].command.arm and np.ptp(run.deputy_pose[-100:, 0]) > 1e-6  # m in 2 s
