@@ -1,5 +1,6 @@
 """What the tests of the core share: the robot, random states, schedules in files, and two whole runs."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -107,6 +108,13 @@ def row_distance(a: Array, b: Array) -> tuple[float, float]:
     )
     angle = 2.0 * np.arctan2(np.linalg.norm(vector), abs(x * p + y * q + z * r + w * s))
     return float(np.linalg.norm(a[:3] - b[:3])), float(angle)
+
+
+@pytest.fixture(scope="session")
+def compiled_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder for the libraries of this run, of all workers of pytest-xdist, so that each is made once."""
+    base = tmp_path_factory.getbasetemp()
+    return (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "compiled"
 
 
 @pytest.fixture(scope="session")

@@ -40,12 +40,11 @@ _ROUNDING = 1e-12  # [-] of the largest value: ten frames of a dozen operations,
 
 
 @pytest.fixture(autouse=True, scope="module")
-def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """A folder of this module for the libraries, so that each is made here once."""
-    folder = tmp_path_factory.getbasetemp() / "compiled"  # that of all modules
+def cache(compiled_cache: Path) -> Iterator[None]:
+    """The folder of all modules for the libraries, so that each is made once."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(folder))
-        yield folder / "sms_handover"
+        patch.setenv("XDG_CACHE_HOME", str(compiled_cache))
+        yield
 
 
 def _one_armed() -> RobotModel:
@@ -230,8 +229,8 @@ def test_another_robot_of_a_kind_compiles_nothing(
     code = (
         "import logging; logging.basicConfig()\n"
         "from sms_handover.compiled.library import dynamics_library\n"
-        "from sms_handover.model.robot_model import RobotModel\n"
-        "dynamics_library(RobotModel.load())"
+        "from sms_handover.simulation.scenario import load_scenario\n"
+        "dynamics_library(load_scenario('planar').truth.robot)"
     )
     call = [sys.executable, "-c", code]
     four = [subprocess.Popen(call, stderr=subprocess.PIPE, text=True) for _ in range(4)]
@@ -240,17 +239,18 @@ def test_another_robot_of_a_kind_compiles_nothing(
     for index in range(10):
         mass = 200.0 + index
         scenario = load_scenario(
-            values={"robot.base.mass": mass, "robot.arms.arm_a.gripper.mass": 0.5 + index}
+            "planar", {"robot.base.mass": mass, "robot.arms.arm_a.gripper.mass": 0.5 + index}
         )
         CompiledStepper(scenario.truth.robot, TABLEAUS["rk4"], _TICK)
     assert not caplog.records
 
 
 def test_a_library_is_made_once(
-    robot: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """That takes long enough to be told. Another run finds it and makes none."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    robot = load_scenario("planar").truth.robot
     CompiledComputedTorque(robot)
     assert [record.message.split(":")[0] for record in caplog.records] == [
         "compiling the dynamics of robots of this kind"
@@ -272,7 +272,7 @@ def test_a_library_is_made_once(
 
 def test_a_library_of_another_robot_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever lies under a name, what it says is held against Pinocchio before anything moves."""
-    wrong = RobotModel(someone_else(load_robot(), seed=7))
+    wrong = ROBOTS["every number changed"]()
     libraries: list[Path] = []
     made = library_of
 

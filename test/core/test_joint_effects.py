@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from itertools import pairwise
 from math import exp, log
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -99,11 +100,9 @@ def _in_c(robot: RobotModel, values: FrictionValues, scheme: str, tick: float) -
 
 
 @pytest.fixture(params=[_by_python, _in_c], ids=["python", "c"])
-def make(
-    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
-) -> Make:
+def make(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, compiled_cache: Path) -> Make:
     """Return what makes the steps, with the folder of all modules for libraries."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp() / "compiled"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(compiled_cache))
     given: Make = request.param
     return given
 

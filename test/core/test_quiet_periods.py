@@ -45,10 +45,10 @@ _PERIOD = 20  # ticks
 
 
 @pytest.fixture(autouse=True, scope="module")
-def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+def cache(compiled_cache: Path) -> Iterator[None]:
     """The folder of all modules for the libraries, so that each is made once."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp() / "compiled"))
+        patch.setenv("XDG_CACHE_HOME", str(compiled_cache))
         yield
 
 
