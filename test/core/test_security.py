@@ -23,7 +23,7 @@ FILES = [
 ]
 
 FORBIDDEN_MODULES = {"pickle", "cPickle", "marshal", "shelve", "dill", "cloudpickle", "joblib", "code", "imp"}
-# Both ends of a socket pair that nobody else can open: a solver reads what the process that started it has sent.
+# Both ends of a socket pair that nobody else can open: a solver reads what the process that made it has sent.
 OWN_SOCKETS = {f"sms_handover/simulation/{name}.py": ["pickle"] for name in ("solver_main", "solver_process")}
 FORBIDDEN_CALLS = {
     "eval", "exec", "compile", "__import__", "os.system", "os.popen", "os.umask", "tempfile.mktemp",
