@@ -1,5 +1,6 @@
 """Run every benchmark and write docs/performance.md from the results."""
 
+import re
 import subprocess
 import sys
 from argparse import ArgumentParser
@@ -28,6 +29,7 @@ SCRIPTS: tuple[str, ...] = (  # in the order of the document
 )
 TARGET = ROOT / "docs" / "performance.md"
 CONDITIONS = FOLDER / "machine.txt"
+_MEASURED_BY = re.compile(r"^`python -m benchmarks\.(\w+)`$", re.MULTILINE)
 _TIMEOUT_S = 600.0  # s of wall time for one script
 
 _INTRODUCTION = """\
@@ -38,11 +40,17 @@ it measures; nothing in it is written by hand. Times within one section come fro
 contestants took turns, so their ratios hold on other machines better than the times do."""
 
 
-def document(results: Sequence[Result], conditions: Sequence[str]) -> str:
-    """Return the whole document as Markdown."""
-    return (
-        "\n\n".join([_INTRODUCTION, bullets(conditions), *(result.markdown() for result in results)]) + "\n"
-    )
+def document(results: Sequence[Result], conditions: Sequence[str], page: str = "") -> str:
+    """Return the whole document as Markdown; sections without a result are those of ``page``."""
+    sections = sections_of(page) | {result.name: result.markdown() for result in results}
+    written = [sections[name] for name in SCRIPTS if name in sections]
+    return "\n\n".join([_INTRODUCTION, bullets(conditions), *written]) + "\n"
+
+
+def sections_of(page: str) -> dict[str, str]:
+    """Return the sections of a document by the scripts that have measured them."""
+    parts = (f"## {text.rstrip()}" for text in page.split("\n## ")[1:])
+    return {found[1]: part for part in parts if (found := _MEASURED_BY.search(part))}
 
 
 def run(script: str) -> bool:
@@ -69,7 +77,7 @@ def measure(scripts: Sequence[str]) -> list[str]:
 def main() -> int:
     """Run what is asked for, then render what was measured; return 1 if a script or the page failed.
 
-    The page of the repository has all sections or stays as it is: scripts that failed can be run again alone.
+    What is not measured stays in the page as it was: a script can be run again alone.
     """
     parser = ArgumentParser(description=__doc__)
     parser.add_argument(
@@ -81,16 +89,14 @@ def main() -> int:
     unknown = sorted(set(options.scripts) - set(SCRIPTS))
     if unknown:
         parser.error(f"no benchmark {', '.join(unknown)}; there are: {', '.join(SCRIPTS)}")
-    failed = [] if options.render else measure(options.scripts or SCRIPTS)
-    written = [FOLDER / f"{script}.json" for script in SCRIPTS if script not in failed]
-    results = [load(path) for path in written if path.exists()]
-    missing = sorted({*SCRIPTS} - {result.name for result in results})
-    if missing and options.output == TARGET:
-        print(f"{TARGET} is left as it is: there is no result of {', '.join(missing)}", file=sys.stderr)
-        return 1
+    chosen = options.scripts or SCRIPTS
+    failed = [] if options.render else measure(chosen)
+    paths = {script: FOLDER / f"{script}.json" for script in chosen if script not in failed}
+    results = [load(path) for path in paths.values() if path.exists()]
     conditions = CONDITIONS.read_text(encoding="utf-8").splitlines() if CONDITIONS.exists() else machine()
-    options.output.write_text(document(results, conditions), encoding="utf-8")
-    print(f"{options.output}: {len(results)} of {len(SCRIPTS)} sections", *failed, sep="\nfailed: ")
+    page = TARGET.read_text(encoding="utf-8") if TARGET.exists() else ""
+    options.output.write_text(document(results, conditions, page), encoding="utf-8")
+    print(f"{options.output}: {len(results)} of {len(SCRIPTS)} sections anew", *failed, sep="\nfailed: ")
     return 1 if failed else 0
 
 

@@ -1,5 +1,6 @@
 """The frame that every benchmark stands in: what it finds is written, read back and rendered unchanged."""
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from benchmarks.timing import Timings, interleaved
 @pytest.fixture
 def result() -> Result:
     return Result(
-        name="pace",
+        name="growth",
         question="How fast?",
         tables=[Table(["who", "time [us]"], [["ours | theirs", "12.5"]])],
         notes=["A note."],
@@ -24,7 +25,7 @@ def result() -> Result:
 
 def test_a_result_survives_its_file(result: Result, tmp_path: Path) -> None:
     publish(result, tmp_path)
-    again = load(tmp_path / "pace.json")
+    again = load(tmp_path / "growth.json")
     assert again == result
 
 
@@ -39,6 +40,15 @@ def test_the_document_has_every_part_of_a_result(result: Result) -> None:
     ):
         assert part in text
     assert "| ours \\| theirs | 12.5 |" in text
+
+
+def test_what_is_not_measured_again_stays_in_the_document(result: Result) -> None:
+    """In the order of the scripts; a section that was measured takes the place of the one before."""
+    other = replace(result, name="engines", question="Against others?")
+    page = document([result, other], ["Machine: a machine"])
+    again = document([replace(result, notes=["Another note."])], ["Machine: a machine"], page)
+    assert again == page.replace("A note.", "Another note.", 2).replace("Another note.", "A note.", 1)
+    assert again.index("## Against others?") < again.index("## How fast?")
 
 
 def test_a_row_of_another_width_is_refused() -> None:
