@@ -1107,8 +1107,8 @@ BREAKS: tuple[Break, ...] = (
     Break(
         "compiled: joints never stick",
         "sms_handover/compiled/native/effects.c",
-        "fabs(reached) <= h * bound[j] && bound[j] > 0.0 ? 0 :",
-        "",
+        "fabs(holding[j]) > bound[j] * (1.0 + rounding)",
+        "fabs(holding[j]) > 0.0",
         "test/core/test_joint_effects.py",
     ),
     Break(
