@@ -65,7 +65,7 @@ faults: $(VENV)/.test  ## inject every fault, check what is promised for it, wri
 
 docs: $(VENV)/.docs  ## build the documentation as a site, every warning an error, and look at it in a browser
 	rm -rf build/docs docs/api
-	$(BIN)/python -m sphinx --jobs auto --fail-on-warning --keep-going --quiet -d build/docs/doctrees docs $(SITE)
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -d build/docs/doctrees docs $(SITE)
 	$(BIN)/python -m pytest test/site --site $(SITE)
 	@echo "The site begins at $(SITE)/index.html"
 
