@@ -78,7 +78,7 @@ def rest_of(loop: Loop) -> tuple[RunData, int]:
     while not loop.finished:
         recorder.add(loop.advance_quietly(recorder.room))
         calls += 1
-    return recorder.data(), calls
+    return recorder.data(loop.base_wrenches, loop.applied), calls
 
 
 def require_same(one: RunData, other: RunData) -> None:
