@@ -35,7 +35,7 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "thruster_misfire": {
         "wrenches.misfire.thruster_misfire": {
             **{"force": [1.0, 0.0, 0.0], "point": [0.0, 0.5, 0.0]},
-            **{"start": 0.01, "duration": 0.02},
+            **{"start": 0.0103, "duration": 0.0205},
         }
     },
     "history": {"wrenches.told.history": {"rows": [[0.0, 1, 0, 0, 0, 0, 0], [1.0, 0, 1, 0, 0, 0, 1]]}},
