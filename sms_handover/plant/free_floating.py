@@ -241,9 +241,10 @@ class FreeFloatingPlant:
 
     def with_deputy(self, of_robot: ConservedQuantities) -> ConservedQuantities:
         """Return what is conserved of robot and deputy, by that of the robot with what it carries."""
-        if not isinstance(self._deputy, RigidDeputy) or self._deputy.holder:
+        deputy = self._floating
+        if deputy is None:
             return of_robot
-        return together(of_robot, self._robot.mass, self._deputy.conserved, self._deputy.inertia.mass)
+        return together(of_robot, self._robot.mass, deputy.conserved, deputy.inertia.mass)
 
     def execute(self, commands: tuple[GraspCommand, ...]) -> tuple[GraspEvent, ...]:
         """Execute grasp commands at this instant, in order, and return their events.
