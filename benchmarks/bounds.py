@@ -5,12 +5,12 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
-from statistics import median
 from tempfile import TemporaryDirectory
 
 from benchmarks.lockstep import FLOOR, GRAPH, RECORDED, SIMULATED_S, bare, graph, run_graph
 from benchmarks.ping_pong import ONE, SPINNING, WATCHED
 from benchmarks.results import Result, Table, publish, row
+from benchmarks.timing import told_in_turn
 
 ROUNDS = 5
 _LATENCY = "/dev/cpu_dma_latency"  # who holds it open with 0 us in it keeps idle processors awake
@@ -71,15 +71,12 @@ def contestants(folder: str) -> dict[str, Callable[[], float]]:
 def main() -> None:
     """Measure and publish."""
     with TemporaryDirectory() as folder:
-        measures = contestants(folder)
-        times: dict[str, list[float]] = {name: [] for name in measures}
-        for _ in range(ROUNDS):
-            for name, measure in measures.items():
-                times[name].append(measure())
-    least = times[FLOOR]
-    ratio = {name: median(a / b for a, b in zip(each, least, strict=True)) for name, each in times.items()}
-    rows = [row(name, 1e6 * min(each), 1e6 * median(each), ratio[name]) for name, each in times.items()]
-    watched = median(a / b for a, b in zip(times[RECORDED], times[BARE_WATCHED], strict=True))
+        times = told_in_turn(contestants(folder), ROUNDS)
+    rows = [
+        row(name, 1e6 * times.best(name), 1e6 * times.median(name), times.ratio(name, FLOOR))
+        for name in times.seconds
+    ]
+    watched = times.ratio(RECORDED, BARE_WATCHED)
     processors = len(os.sched_getaffinity(0))
     heading = ("what", "best [us/tick]", "median [us/tick]", "times the bare one")
     publish(
@@ -97,7 +94,7 @@ def main() -> None:
                 f"of the loop. Processors are kept awake by {_LATENCY}, where that is permitted."
             ],
             tables=[Table(heading, rows)],
-            values={"us_per_tick": {name: [1e6 * t for t in each] for name, each in times.items()}},
+            values={"us_per_tick": {name: [1e6 * t for t in each] for name, each in times.seconds.items()}},
         )
     )
 

@@ -6,11 +6,11 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from functools import partial
-from statistics import median
 from tempfile import TemporaryDirectory
 from time import perf_counter
 
 from benchmarks.results import Result, Table, publish, row
+from benchmarks.timing import told_in_turn
 from sms_handover.simulation.parameters import COMPILED as COMPILED_DYNAMICS
 from sms_handover.simulation.parameters import PINOCCHIO
 from sms_handover.simulation.scenario import load_scenario
@@ -87,15 +87,10 @@ def main() -> None:
             FALLBACK: partial(graph, folder, ["--no-record", *_EXECUTOR]),
             COMPOSED_FALLBACK: partial(graph, folder, ["--compose", "--no-record", *_EXECUTOR]),
         }
-        times: dict[str, list[float]] = {name: [] for name in contestants}
-        for _ in range(ROUNDS):
-            for name, measure in contestants.items():
-                times[name].append(measure())
-    least = times[FLOOR]
-    ratio = {name: median(a / b for a, b in zip(each, least, strict=True)) for name, each in times.items()}
+        times = told_in_turn(contestants, ROUNDS)
     rows = [
-        row(name, 1e6 * min(each), 1e6 * median(each), 1e-3 / min(each), ratio[name])
-        for name, each in times.items()
+        row(name, 1e6 * best, 1e6 * times.median(name), 1e-3 / best, times.ratio(name, FLOOR))
+        for name, best in ((name, times.best(name)) for name in times.seconds)
     ]
     heading = ("what", "best [us/tick]", "median [us/tick]", "best: times real time", "times the bare one")
     publish(
@@ -111,7 +106,7 @@ def main() -> None:
                 "includes reading the scenario."
             ],
             tables=[Table(heading, rows)],
-            values={"us_per_tick": {name: [1e6 * t for t in each] for name, each in times.items()}},
+            values={"us_per_tick": {name: [1e6 * t for t in each] for name, each in times.seconds.items()}},
         )
     )
 

@@ -25,6 +25,15 @@ class Timings:
         return median(a / b for a, b in zip(self.seconds[name], self.seconds[other], strict=True))
 
 
+def told_in_turn(contestants: Mapping[str, Callable[[], float]], rounds: int) -> Timings:
+    """Return the times in s that contestants tell of themselves, which run A B C A B C ..."""
+    seconds: dict[str, list[float]] = {name: [] for name in contestants}
+    for _ in range(rounds):
+        for name, measure in contestants.items():
+            seconds[name].append(measure())
+    return Timings({name: tuple(times) for name, times in seconds.items()})
+
+
 def interleaved(
     contestants: Mapping[str, Callable[[], object]], rounds: int, clock: Callable[[], float] = perf_counter
 ) -> Timings:
