@@ -1,6 +1,6 @@
 """Delay line: samples of a sensor that measures now and then, and gives them later."""
 
-from sms_handover.conditions.sensors.sensor import Memory, Sample
+from sms_handover.conditions.sensors.sensor import Memory, Sample, in_ticks
 from sms_handover.types import Array
 
 
@@ -11,8 +11,10 @@ class DelayLine:
     the latest one, and comes as every other too.
     """
 
-    def __init__(self, every: int, latency: int) -> None:
-        self._every, self._latency = max(1, every), latency
+    def __init__(self, sensor: str, period: float, latency: float, tick_ns: int) -> None:
+        """Take period and latency in s; raises ConfigurationError unless they are multiples of the tick."""
+        self._every = max(1, in_ticks(period, tick_ns, f"{sensor}.period"))
+        self._latency = in_ticks(latency, tick_ns, f"{sensor}.latency")
 
     def measures(self, tick: int) -> bool:
         """Whether the sensor measures in a tick."""

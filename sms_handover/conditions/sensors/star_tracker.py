@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sms_handover.conditions.sensors.delay_line import DelayLine
-from sms_handover.conditions.sensors.sensor import Known, Memory, Reading, Setting, Truth, in_ticks
+from sms_handover.conditions.sensors.sensor import Known, Memory, Reading, Setting, Truth
 from sms_handover.conditions.sensors.turns import IDENTITY, by, numbers_of, quaternion_of
 from sms_handover.types import BASE_NQ, Array, freeze
 
@@ -37,8 +37,7 @@ class StarTrackerValues:
 
     def line(self, tick_ns: int) -> DelayLine:
         """Return when it measures; raises ConfigurationError."""
-        period = in_ticks(self.period, tick_ns, "star_tracker.period")
-        return DelayLine(period, in_ticks(self.latency, tick_ns, "star_tracker.latency"))
+        return DelayLine(STAR_TRACKER, self.period, self.latency, tick_ns)
 
     def make(self, setting: Setting) -> "StarTracker":
         """Return the star tracker of a run."""

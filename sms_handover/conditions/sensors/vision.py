@@ -6,7 +6,7 @@ from math import sqrt
 import numpy as np
 
 from sms_handover.conditions.sensors.delay_line import DelayLine
-from sms_handover.conditions.sensors.sensor import EMPTY, Known, Reading, Setting, Truth, in_ticks
+from sms_handover.conditions.sensors.sensor import EMPTY, Known, Reading, Setting, Truth
 from sms_handover.conditions.sensors.turns import by, numbers_of, quaternion_of
 from sms_handover.types import BASE_NQ, Array, Pose, freeze, frozen
 
@@ -44,8 +44,7 @@ class VisionValues:
 
     def line(self, tick_ns: int) -> DelayLine:
         """Return when it measures; raises ConfigurationError."""
-        period = in_ticks(self.period, tick_ns, "vision.period")
-        return DelayLine(period, in_ticks(self.latency, tick_ns, "vision.latency"))
+        return DelayLine(VISION, self.period, self.latency, tick_ns)
 
     def make(self, setting: Setting) -> "Vision":
         """Return the camera of a run."""
