@@ -30,7 +30,8 @@ from sms_handover.control.pid import PID
 from sms_handover.errors import ConfigurationError
 from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.run_data import RunData
-from sms_handover.simulation.loop import Loop, Period
+from sms_handover.simulation.loop import Loop
+from sms_handover.simulation.observed_ticks import Period
 from sms_handover.simulation.recorder import RunRecorder
 from sms_handover.simulation.scenario import Scenario, World, load_scenario
 from sms_handover.trajectory.load import schedule_of

@@ -64,7 +64,7 @@ if TYPE_CHECKING:
     from sms_handover.run_data import RunData as RunData
     from sms_handover.simulation.check import check_scenario as check_scenario
     from sms_handover.simulation.loop import Loop as Loop
-    from sms_handover.simulation.loop import Observation as Observation
+    from sms_handover.simulation.observed_ticks import Observation as Observation
     from sms_handover.simulation.scenario import Scenario as Scenario
     from sms_handover.simulation.scenario import load_scenario as load_scenario
     from sms_handover.simulation.simulate import simulate as simulate

@@ -11,7 +11,7 @@ from sms_handover.graph.message_constants import CONSTANTS
 from sms_handover.model.poses import pose_row, twist_in_deputy
 from sms_handover.plan_report import PlannedPaths, PlanReport
 from sms_handover.run_data import MeasuredRows, RunData
-from sms_handover.simulation.loop import Period, Ticks
+from sms_handover.simulation.observed_ticks import Period, Ticks
 from sms_handover.simulation.quiet_periods import QuietPeriods
 from sms_handover.types import BASE_NQ, BASE_NV, Array, BaseWrench, GraspEvent, TaskPhase, TickRows
 

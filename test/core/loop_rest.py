@@ -7,7 +7,8 @@ import sys
 from collections.abc import Collection
 from pathlib import Path
 
-from sms_handover.simulation.loop import Loop, Observation
+from sms_handover.simulation.loop import Loop
+from sms_handover.simulation.observed_ticks import Observation
 from sms_handover.simulation.scenario import Overrides, load_scenario
 from sms_handover.simulation.snapshot import load_snapshot, plain, save_snapshot
 
