@@ -24,12 +24,13 @@ from sms_handover.control.mpc.planner import Planner, PlanStart, Program
 from sms_handover.control.mpc.prediction import PredictionModel
 from sms_handover.control.mpc.quadratic_program import solve
 from sms_handover.control.mpc.tool_errors import ToolErrorModel
+from sms_handover.previewed_targets import PreviewedTargets
 from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.near_pairs import NearPairs
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.wiring import gains_by_phase, make_clearance
 from sms_handover.trajectory.preview import TargetPreview
-from sms_handover.types import BASE_NQ, BASE_NV, Array, PreviewedTargets
+from sms_handover.types import BASE_NQ, BASE_NV, Array
 from sms_handover.units import seconds_to_ns
 
 INTERVALS = (10, 15, 20)  # [-] of the horizon

@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from sms_handover.model.robot_model import RobotModel as RobotModel
     from sms_handover.plan_report import PlanReport as PlanReport
     from sms_handover.plan_report import PlanStatus as PlanStatus
+    from sms_handover.previewed_targets import PreviewedTargets as PreviewedTargets
     from sms_handover.report.recorded_run import RecordedRun as RecordedRun
     from sms_handover.report.recorded_run import compare_recorded as compare_recorded
     from sms_handover.report.recorded_run import read_recorded as read_recorded
@@ -78,7 +79,6 @@ if TYPE_CHECKING:
     from sms_handover.types import GraspStatus as GraspStatus
     from sms_handover.types import JointReference as JointReference
     from sms_handover.types import Pose as Pose
-    from sms_handover.types import PreviewedTargets as PreviewedTargets
     from sms_handover.types import TaskPhase as TaskPhase
 else:  # hidden from type checkers, to whom a name that is not in the list is an error
 

@@ -10,7 +10,8 @@ import pinocchio as pin
 from sms_handover.control.protocol import Distances, NearPair
 from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.types import Array, Pose, PreviewedTargets
+from sms_handover.previewed_targets import PreviewedTargets
+from sms_handover.types import Array, Pose
 
 _LEAST = 0.001  # [m] that links of one arm keep, and a gripper from the deputy that it may touch
 _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED

@@ -9,13 +9,12 @@ import numpy as np
 
 from sms_handover.errors import ControllerError
 from sms_handover.plan_report import PlannedPaths, PlanReport
+from sms_handover.previewed_targets import PreviewedTargets, PreviewState
 from sms_handover.types import (
     Array,
     GraspEvent,
     JointReference,
     Pose,
-    PreviewedTargets,
-    PreviewState,
     TaskPhase,
     frozen,
 )

@@ -8,6 +8,7 @@ import pinocchio as pin
 
 from sms_handover.model.poses import pose_distance, pose_of, se3_of
 from sms_handover.model.robot_model import RobotModel
+from sms_handover.previewed_targets import PreviewedTargets, PreviewState
 from sms_handover.trajectory.generator import goal_in_world
 from sms_handover.trajectory.pose_path import AT_REST, PosePath
 from sms_handover.trajectory.schedule import ArmTarget, GraspFrameTarget, Hold, JointTarget, Schedule
@@ -20,8 +21,6 @@ from sms_handover.types import (
     GraspStatus,
     JointReference,
     Pose,
-    PreviewedTargets,
-    PreviewState,
     TaskPhase,
     Twist,
 )

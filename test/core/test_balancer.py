@@ -21,6 +21,7 @@ from sms_handover.model.known_payload import Grip, KnownPayload
 from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.model.reduced import base_twist_per_joint_rate
 from sms_handover.plan_report import PlanStatus
+from sms_handover.previewed_targets import PreviewedTargets
 from sms_handover.run_data import RunData
 from sms_handover.simulation.near_pairs import NearPairs
 from sms_handover.simulation.scenario import Scenario, load_scenario
@@ -38,7 +39,6 @@ from sms_handover.types import (
     GraspStatus,
     JointReference,
     PhaseState,
-    PreviewedTargets,
     TaskPhase,
     Twist,
 )

@@ -30,6 +30,7 @@ from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.model.reduced import reduced_inverse_dynamics
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plan_report import PlannedPaths, PlanReport, PlanStatus
+from sms_handover.previewed_targets import PreviewedTargets
 from sms_handover.run_data import RunData
 from sms_handover.scene.planned_lines import planned_lines
 from sms_handover.simulation.loop import Loop
@@ -47,7 +48,6 @@ from sms_handover.types import (
     GraspStatus,
     JointReference,
     Pose,
-    PreviewedTargets,
     TaskPhase,
     Twist,
 )

@@ -19,9 +19,10 @@ from sms_handover.control.mpc.parameters import MpcGains
 from sms_handover.control.mpc.planner import Planner, PlanStart
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plan_report import PlanStatus
+from sms_handover.previewed_targets import PreviewedTargets
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.wiring import gains_by_phase, initial_joints
-from sms_handover.types import Array, Pose, PreviewedTargets, Twist
+from sms_handover.types import Array, Pose, Twist
 
 crocoddyl: Any = pytest.importorskip("crocoddyl", reason="make crocoddyl has it, beside its Pinocchio")
 

@@ -11,7 +11,8 @@ from sms_handover.control.mpc.products import product, times_vector
 from sms_handover.control.mpc.sensitivity import Sensitivity
 from sms_handover.control.mpc.tool_errors import ROWS, ToolErrors
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.types import Array, PreviewedTargets
+from sms_handover.previewed_targets import PreviewedTargets
+from sms_handover.types import Array
 
 _DAMPING = 0.01  # [-] of the generalised Jacobian's inverse
 _REGULAR = 1e-8  # [-] added to the Hessian's diagonal

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from sms_handover.control.mpc.plan import Plan
 from sms_handover.control.mpc.planner import PlanStart, Step
 from sms_handover.model.known_payload import Grip
-from sms_handover.types import Array, PreviewedTargets, freeze
+from sms_handover.previewed_targets import PreviewedTargets
+from sms_handover.types import Array, freeze
 
 _SHOWN_EVERY = 5  # [-] plans: ten times a second with shipped parameters, which viewers keep up with
 

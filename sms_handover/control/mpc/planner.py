@@ -18,7 +18,8 @@ from sms_handover.control.mpc.sensitivity import Sensitivity
 from sms_handover.control.mpc.tool_errors import ToolErrorModel
 from sms_handover.control.protocol import Distances
 from sms_handover.model.robot_model import RobotModel
-from sms_handover.types import Array, PreviewedTargets
+from sms_handover.previewed_targets import PreviewedTargets
+from sms_handover.types import Array
 
 
 @dataclass(frozen=True, eq=False)
