@@ -26,6 +26,7 @@ from sms_handover.model.robot_model import RobotModel
 
 _STRIBECK_SPEED = 0.01  # [rad/s] where none is given; without stiction it has no effect
 _ROW = 7  # [-] time, force, torque
+_ORIGIN = (0.0, 0.0, 0.0)  # [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +104,7 @@ def model_error_of(content: YamlMapping) -> ModelError | None:
 def _numbers(section: Section, key: str, *names: str) -> tuple[float, ...]:
     """Return numbers in the section of a key, 0 for those that are not given."""
     inner = section.section(key) if key in section else None
-    return tuple(inner.number(name) if inner and name in inner else 0.0 for name in names)
+    return tuple(inner.number(name, 0.0) if inner else 0.0 for name in names)
 
 
 def _friction(root: Section, joints: int) -> FrictionValues | None:
@@ -151,7 +152,7 @@ def _wrenches(section: Section, body: str) -> dict[str, WrenchModel]:
 
 
 def _constant(section: Section) -> WrenchModel:
-    point = section.vector("point") if "point" in section else (0.0, 0.0, 0.0)
+    point = section.vector("point", missing=_ORIGIN)
     force, torque = section.vector("force"), section.vector("torque")
     return ConstantWrench(np.array(force), np.array(torque), np.array(point), _axes(section))
 
@@ -180,7 +181,7 @@ def _orbit(section: Section) -> Orbit:
 
 
 def _relative_orbit(section: Section) -> WrenchModel:
-    reference = section.vector("reference") if "reference" in section else (0.0, 0.0, 0.0)
+    reference = section.vector("reference", missing=_ORIGIN)
     return RelativeOrbit(_orbit(section), np.array(reference))
 
 

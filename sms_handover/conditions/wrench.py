@@ -18,6 +18,10 @@ class Wrench:
     def __post_init__(self) -> None:
         freeze(self, "force", "torque")
 
+    def __add__(self, other: "Wrench") -> "Wrench":
+        """Return the sum of two wrenches on one body."""
+        return Wrench(self.force + other.force, self.torque + other.torque)
+
 
 @dataclass(frozen=True, eq=False)
 class BodyAtInstant:

@@ -139,9 +139,9 @@ class Section:
             raise self.unknown(kind, name, known, key)
         return name
 
-    def number(self, key: str) -> float:
-        """Return the number of a key, as its specification allows."""
-        return float(self._checked(key))
+    def number(self, key: str, missing: float | None = None) -> float:
+        """Return the number of a key, as its specification allows; ``missing`` if the key is not given."""
+        return missing if missing is not None and key not in self else float(self._checked(key))
 
     def word(self, key: str) -> Any:
         """Return the value of a key that may have a word, or one number, in place of something else."""
@@ -150,8 +150,15 @@ class Section:
             raise TypeError(f"{self.path(key)} is not specified as one of two")
         return spec.words.check(self.value(key), self._what(key), self._kind)
 
-    def vector(self, key: str, size: int | None = None) -> tuple[float, ...]:
-        """Return the numbers of a key; ``size`` is how many where the specification does not say it."""
+    def vector(
+        self, key: str, size: int | None = None, missing: tuple[float, ...] | None = None
+    ) -> tuple[float, ...]:
+        """Return the numbers of a key; ``missing`` if it is not given.
+
+        ``size`` is how many there are, where the specification does not say it.
+        """
+        if missing is not None and key not in self:
+            return missing
         numbers: tuple[float, ...] = self._checked(key, size)
         return numbers
 

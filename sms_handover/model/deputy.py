@@ -66,7 +66,7 @@ def _read_body(section: Section, size: Floats) -> Inertia | None:
     if mass < _LEAST_MASS:
         allowed = f"must be 0 (massless) or at least {_LEAST_MASS:g} kg"
         raise section.error(f"deputy.mass is {mass:g} kg, {allowed}", "mass")
-    com = section.vector("com") if "com" in section else (0.0, 0.0, 0.0)
+    com = section.vector("com", missing=(0.0, 0.0, 0.0))
     try:
         return Inertia(DEPUTY, mass, com, _moments(section, mass, size))
     except RobotDescriptionError as error:

@@ -59,7 +59,7 @@ def _panel(section: Section) -> Panel:
     if "flexible" not in section:
         return Panel(xyz, size)
     inner = section.section("flexible")
-    damping = inner.number("damping") if "damping" in inner else 0.0
+    damping = inner.number("damping", 0.0)
     hinge = inner.vector("hinge"), inner.vector("axis"), inner.number("stiffness"), damping
     with inner.located():
         return Panel(xyz, size, inner.number("mass"), Hinge(*hinge))

@@ -85,11 +85,7 @@ def companion_of(model: pin.Model, data: pin.Data, at: tuple[Array, Array], forc
 
 def sum_over(models: Sequence[WrenchModel], start_s: float, tick_s: float, body: BodyAtInstant) -> Wrench:
     """Return the sum of some wrenches over a tick, in their order."""
-    force, torque = NO_FORCE, NO_FORCE
-    for model in models:
-        wrench = model.over(start_s, tick_s, body)
-        force, torque = force + wrench.force, torque + wrench.torque
-    return Wrench(force, torque)
+    return sum((model.over(start_s, tick_s, body) for model in models), Wrench(NO_FORCE, NO_FORCE))
 
 
 class WrenchStepper:

@@ -1,8 +1,10 @@
 """Outside wrenches of a tick on one robot: those of conditions, on what it holds too, and those asked for."""
 
 from collections.abc import Sequence
+from functools import reduce
+from operator import add
 
-from sms_handover.conditions.wrench import Wrench, WrenchModel
+from sms_handover.conditions.wrench import WrenchModel
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.base_wrenches import in_world
 from sms_handover.plant.external_wrenches import Acting, robot_as_body, sum_over
@@ -47,16 +49,8 @@ class OutsideWrenches:
                 parts.append(sum_over(self._of_bare, start_s, self._h, bare))
             if asked:
                 parts.append(in_world(asked, body.rotation))
-            base = _sum(parts)
+            base = reduce(add, parts)
         if self.held:
             body = self.held.as_body(robot.pin, robot.data, q)
             held = sum_over(self._of_held, start_s, self._h, body)
         return Acting(base, held) if base or held else None
-
-
-def _sum(wrenches: Sequence[Wrench]) -> Wrench:
-    """Return the sum of one or more wrenches on a body."""
-    total = wrenches[0]
-    for wrench in wrenches[1:]:
-        total = Wrench(total.force + wrench.force, total.torque + wrench.torque)
-    return total

@@ -76,7 +76,7 @@ def _phase(section: Section, robot: RobotModel, deputy: DeputyDescription, previ
                 "start",
             )
     duration = section.number("duration")
-    motion = section.number("motion") if "motion" in section else duration
+    motion = section.number("motion", duration)
     if motion > duration:
         raise section.error(
             f"{section.path('motion')} is {motion:g} s, must be <= {duration:g} s, the phase's duration; "

@@ -269,7 +269,7 @@ def _choice(section: Section) -> Choice:
     values = section.value("values")
     if not isinstance(values, list) or not all(isinstance(item, bool | int | float | str) for item in values):
         raise section.error(f"{section.path('values')} must be a list of numbers, texts or true and false")
-    weights = section.vector("weights") if "weights" in section else (1.0,) * len(values)
+    weights = section.vector("weights", missing=(1.0,) * len(values))
     return Choice(tuple(values), weights)
 
 

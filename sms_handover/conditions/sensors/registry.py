@@ -22,41 +22,36 @@ def sensors_of(section: Section, joints: int) -> dict[str, SensorValues]:
 
 
 def _encoders(section: Section, joints: int) -> SensorValues:
-    bandwidth = section.number("bandwidth") if "bandwidth" in section else inf
+    bandwidth = section.number("bandwidth", inf)
     return EncoderValues(per_joint(section, "step", joints), per_joint(section, "offset", joints), bandwidth)
 
 
 def _gyro(section: Section, joints: int) -> SensorValues:
-    density, period = _number(section, "noise_density"), _number(section, "period")
+    density, period = section.number("noise_density", 0.0), section.number("period", 0.0)
     return GyroValues(density, _vector(section, "bias"), period)
 
 
 def _star_tracker(section: Section, joints: int) -> SensorValues:
-    noise, bias = _number(section, "noise"), _vector(section, "bias")
-    return StarTrackerValues(noise, bias, _number(section, "period"), _number(section, "latency"))
+    noise, bias = section.number("noise", 0.0), _vector(section, "bias")
+    return StarTrackerValues(noise, bias, section.number("period", 0.0), section.number("latency", 0.0))
 
 
 def _vision(section: Section, joints: int) -> SensorValues:
     return VisionValues(
-        position_noise=_number(section, "position_noise"),
-        angle_noise=_number(section, "angle_noise"),
+        position_noise=section.number("position_noise", 0.0),
+        angle_noise=section.number("angle_noise", 0.0),
         position_bias=_vector(section, "position_bias"),
         angle_bias=_vector(section, "angle_bias"),
-        period=_number(section, "period"),
-        latency=_number(section, "latency"),
-        dropped=_number(section, "dropped"),
+        period=section.number("period", 0.0),
+        latency=section.number("latency", 0.0),
+        dropped=section.number("dropped", 0.0),
         camera=_vector(section, "camera"),
     )
 
 
-def _number(section: Section, key: str) -> float:
-    """Return a number, 0 where it is not given."""
-    return section.number(key) if key in section else 0.0
-
-
 def _vector(section: Section, key: str) -> Array:
     """Return a vector (3,), zero where it is not given."""
-    return np.array(section.vector(key)) if key in section else np.zeros(3)
+    return np.array(section.vector(key, missing=(0.0, 0.0, 0.0)))
 
 
 SENSORS: Mapping[str, Callable[[Section, int], SensorValues]] = MappingProxyType(

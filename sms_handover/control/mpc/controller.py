@@ -47,8 +47,8 @@ class MpcState:
     """Everything that later efforts depend on: plans, counts, the preview, and the initial attitude (3, 3).
 
     ``coming`` takes the place of ``plan`` when it begins; ``failures`` counts solves in a row without a plan,
-    ``patience`` has what comes of that;
-    ``news`` are grasps that count from the next state on, ``observed`` is the memory of the compensation.
+    ``patience`` has what comes of that; ``news`` are grasps that count from the next state on, ``observed``
+    is the memory of the compensation.
     """
 
     phase_index: int

@@ -8,7 +8,6 @@ from sms_handover.errors import NoPlanError
 from sms_handover.units import ns_to_seconds, seconds_to_ns
 
 _MOST = 3  # [-] times, without plans for a whole horizon in between
-
 _SETTLING = 0.5  # [s] that the joints have after the plan by which they brake
 _UNITS = {  # of rows, by how their names begin
     "effort": "N m",

@@ -50,10 +50,9 @@ class PlanSolver:
 
     def exceeded(self, problem: PlanProblem) -> tuple[float, str]:
         """Return by how much the worst soft limit is exceeded without a change, and its row, '' for none."""
-        rows = (
-            self._planner(problem).program(problem.start, problem.accelerations, problem.targets).constraints
-        )
-        return worst_excess(rows, np.zeros(problem.accelerations.size), soft=True)
+        planner = self._planner(problem)
+        program = planner.program(problem.start, problem.accelerations, problem.targets)
+        return worst_excess(program.constraints, np.zeros(problem.accelerations.size), soft=True)
 
     def _planner(self, problem: PlanProblem) -> Planner:
         """Return the planner of a problem."""
