@@ -14,8 +14,9 @@ from sms_handover.compiled.names import (
     TOOL_JACOBIANS,
     TOOLS,
 )
-from sms_handover.compiled.rigid_bodies import RigidBodies, turned_about_axis
+from sms_handover.compiled.rigid_bodies import RigidBodies
 from sms_handover.compiled.tree import Body, Tool
+from sms_handover.compiled.turns import turn_matrix, turned_about_axis
 from sms_handover.model.robot_model import BASE_NQ, BASE_NV
 
 ca: Any = casadi  # its type hints are incomplete
@@ -68,9 +69,11 @@ def _placed(tools: Sequence[Tool], bodies: Sequence[Body], base: Expression, ang
     placed = [(ca.SX.eye(3), ca.SX.zeros(3))]
     for index, body in enumerate(bodies[1:]):
         rotation, origin = placed[body.parent]
+        for turn in body.turns:
+            rotation = rotation @ turn_matrix(*turn)
         cosine, sine = ca.cos(angles[index]), ca.sin(angles[index])
-        turn = ca.SX(body.rotation) @ turned_about_axis(body, cosine, sine)
-        placed.append((rotation @ turn, origin + rotation @ ca.SX(body.place)))
+        own = ca.SX(body.rotation) @ turned_about_axis(body, cosine, sine)
+        placed.append((rotation @ own, origin + rotation @ ca.SX(body.place)))
     ends = []
     for tool in tools:
         rotation, origin = placed[tool.body]

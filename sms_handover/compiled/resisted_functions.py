@@ -27,23 +27,31 @@ class ResistedFunctions:
     """
 
     def __init__(
-        self, angles: Expression, v: Expression, parameters: Expression, bodies: Sequence[Body]
+        self,
+        turn: tuple[Expression, Expression],
+        v: Expression,
+        parameters: Expression,
+        bodies: Sequence[Body],
     ) -> None:
-        """Set up the functions of a robot whose ``bodies`` have ``parameters`` in place of numbers."""
-        robot = RigidBodies(bodies, ca.cos(angles), ca.sin(angles), v)
+        """Set up the functions of a robot whose ``bodies`` have ``parameters`` in place of numbers.
+
+        ``turn`` has cosines and sines (n,) of the joint angles.
+        """
+        robot = RigidBodies(bodies, *turn, v)
         matrix, bias = robot.inertia_matrix(), robot.bias()
         size = len(matrix)
         self._joints, self._size = size - BASE_NV, size
         places = [(k, j) for k in range(size) for j in range(k + 1) if not is_zero(matrix[k][j])]
         self._at = {place: _ONE_BODY + index for index, place in enumerate(places)}
         self._linked = _filled(places, size)
+        self._order = _tips_first(bodies)
         entries = [matrix[row][column] for row, column in places]
         found = ca.densify(ca.vertcat(robot.as_one_body(), *entries, bias))
         self.numbers = int(found.numel())
         self.factors = size + sum(map(len, self._linked)) + size
-        q = ca.vertcat(ca.SX.sym("base", BASE_NQ), angles)
+        inner = ca.Function("numbers", [*turn, v, parameters], [ca.cse(found)])
         self.functions = [
-            ca.Function(INERTIA, [q, v, parameters], [ca.cse(found)]),
+            self._inertia_function(inner),
             self._factors_function(),
             self._held_function(),
         ]
@@ -53,29 +61,36 @@ class ResistedFunctions:
         """Where the diagonal of H is among the numbers, by joint."""
         return [self._at[k, k] for k in range(BASE_NV, self._size)]
 
+    def _inertia_function(self, inner: Any) -> Any:
+        """Return the function of q, v and parameters; cosines and sines of all angles are found at once."""
+        q, v = ca.MX.sym("q", BASE_NQ + self._joints), ca.MX.sym("v", self._size)
+        parameters, angles = ca.MX.sym("parameters", inner.size1_in(3)), q[BASE_NQ:]
+        return ca.Function(
+            INERTIA, [q, v, parameters], [inner(ca.cos(angles), ca.sin(angles), v, parameters)]
+        )
+
     def _factors_function(self) -> Any:
         """Return the function for the factors, from the tips to the base as ``rigid_bodies.factored``.
 
-        Those are 1 / D, D, and the rows of D L. A joint that is not free is passed over: 1 / D is 0, and its
-        row remains, by which it pulls at the others.
+        Those are by row, in the order in which they are found: 1 / D, D, and what D L has. A joint that is
+        not free is passed over: 1 / D is 0, and its row remains, by which it pulls at the others.
         """
         numbers = ca.SX.sym("numbers", self.numbers)
         added, free = ca.SX.sym("added", self._joints), ca.SX.sym("free", self._joints)
         left = {place: numbers[index] for place, index in self._at.items()}
-        inverse = []
-        for k in range(self._size - 1, -1, -1):
+        found = []
+        for k in self._order:
             joint = k - BASE_NV
             if joint >= 0:
                 left[k, k] = left[k, k] + added[joint]
-            inverse.append((free[joint] if joint >= 0 else 1.0) / left[k, k])
+            inverse = (free[joint] if joint >= 0 else 1.0) / left[k, k]
+            found += [inverse, left[k, k], *(left[k, j] for j in self._linked[k])]
             for i in self._linked[k]:
-                factor = left[k, i] * inverse[-1]
+                factor = left[k, i] * inverse
                 for j in self._linked[k]:
                     if j <= i:
                         left[i, j] = left.get((i, j), 0.0) - factor * left[k, j]
-        diagonal = [left[k, k] for k in range(self._size)]
-        rows = [left[k, j] for k in range(self._size) for j in self._linked[k]]
-        return ca.Function(FACTORS, [numbers, added, free], [ca.vertcat(*inverse[::-1], *diagonal, *rows)])
+        return ca.Function(FACTORS, [numbers, added, free], [ca.vertcat(*found)])
 
     def _held_function(self) -> Any:
         """Return the function for v' under a force, and for what holds the joints that are not free."""
@@ -83,12 +98,15 @@ class ResistedFunctions:
         numbers, factors = ca.SX.sym("numbers", self.numbers), ca.SX.sym("factors", self.factors)
         force, given = ca.SX.sym("force", size), ca.SX.sym("given", self._joints)
         bias = self.numbers - size
-        remaining = iter(range(2 * size, self.factors))
-        rows = [{j: factors[next(remaining)] for j in self._linked[k]} for k in range(size)]
+        remaining = iter(factors[index] for index in range(self.factors))
+        inverse, diagonal, rows = {}, {}, {}
+        for k in self._order:
+            inverse[k], diagonal[k] = next(remaining), next(remaining)
+            rows[k] = {j: next(remaining) for j in self._linked[k]}
         right = [force[k] - numbers[bias + k] for k in range(size)]
         x: list[Expression] = [0.0] * size
-        for k in range(size - 1, -1, -1):
-            x[k] = factors[k] * right[k] + (given[k - BASE_NV] if k >= BASE_NV else 0.0)
+        for k in self._order:
+            x[k] = inverse[k] * right[k] + (given[k - BASE_NV] if k >= BASE_NV else 0.0)
             for j, entry in rows[k].items():
                 right[j] = right[j] - entry * x[k]
         holding = []
@@ -96,9 +114,9 @@ class ResistedFunctions:
             pulled = ca.SX(0.0)
             for j, entry in rows[k].items():
                 pulled = pulled + entry * x[j]
-            x[k] = x[k] - factors[k] * pulled
+            x[k] = x[k] - inverse[k] * pulled
             if k >= BASE_NV:
-                holding.append(pulled + factors[size + k] * given[k - BASE_NV] - right[k])
+                holding.append(pulled + diagonal[k] * given[k - BASE_NV] - right[k])
         return ca.Function(HELD, [numbers, factors, force, given], [ca.vertcat(*x), ca.vertcat(*holding)])
 
 
@@ -109,3 +127,16 @@ def _filled(places: Sequence[Place], size: int) -> list[list[int]]:
         for i in linked[k]:
             linked[i] |= {j for j in linked[k] if j < i}
     return [sorted(columns) for columns in linked]
+
+
+def _tips_first(bodies: Sequence[Body]) -> list[int]:
+    """Return the rows of H so that no joint comes before one that it carries.
+
+    Joints as far from the base follow each other: they do not wait for one another, and a processor works on
+    both arms at the same time.
+    """
+    depth = [0]
+    for body in bodies[1:]:
+        depth.append(depth[body.parent] + 1)
+    joints = sorted(range(1, len(bodies)), key=lambda index: (-depth[index], -index))
+    return [BASE_NV + index - 1 for index in joints] + [*range(BASE_NV - 1, -1, -1)]

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import casadi
-import numpy as np
 
-from sms_handover.compiled.tree import Body
+from sms_handover.compiled.tree import Body, coordinate_axis
+from sms_handover.compiled.turns import conjugated, joined, turn_matrix, turned_about_axis, turned_from_mount
 from sms_handover.model.robot_model import BASE_NV
 
 ca: Any = casadi  # its type hints are incomplete
@@ -39,13 +39,15 @@ class RigidBodies:
 
     def __init__(self, bodies: Sequence[Body], cosines: Expression, sines: Expression, v: Expression) -> None:
         """Set up expressions of cosines (n,) and sines (n,) of the joint angles."""
-        self._bodies = bodies
+        joints = zip(bodies[1:], _elements(cosines), _elements(sines), strict=True)
+        found = [joined(*joint) for joint in joints]
+        self._bodies = [bodies[0], *(body for body, _ in found)]
+        self._turns = [turn for _, turn in found]
         self._rigids = [_Rigid(body.mass, ca.SX(body.first_moment), ca.SX(body.inertia)) for body in bodies]
         self._rates = [v[BASE_NV + joint] for joint in range(len(bodies) - 1)]
         self._rotations = [ca.SX.eye(3)]  # of each body in its parent
         self._twists = [(v[:3], v[3:BASE_NV])]
-        self._turns = [*zip(_elements(cosines), _elements(sines), strict=True)]
-        for body, turn, rate in zip(bodies[1:], self._turns, self._rates, strict=True):
+        for body, turn, rate in zip(self._bodies[1:], self._turns, self._rates, strict=True):
             self._rotations.append(ca.SX(body.rotation) @ turned_about_axis(body, *turn))
             linear, angular = self._carried(len(self._twists), *self._twists[body.parent])
             self._twists.append((linear, angular + ca.SX(body.axis) * rate))
@@ -113,9 +115,10 @@ class RigidBodies:
             own, both, spun = (self._in_parent(index, part) for part in (own, both, spun))
             own, shifted = _symmetric(own), own @ across
             crossed = across @ both
-            linear[body.parent] += own
-            mixed[body.parent] += both - shifted
-            angular[body.parent] += _symmetric(spun + crossed + crossed.T - across @ shifted)
+            spun = _symmetric(spun + crossed + crossed.T - across @ shifted)
+            linear[body.parent] += _symmetric(turned_from_mount(body, own))
+            mixed[body.parent] += turned_from_mount(body, both - shifted)
+            angular[body.parent] += _symmetric(turned_from_mount(body, spun))
             passed_force, passed_moment = self._passed_on(index, own_force, own_moment)
             forces[body.parent] += passed_force
             moments[body.parent] += passed_moment
@@ -188,26 +191,16 @@ class RigidBodies:
     def _carried(self, index: int, linear: Expression, angular: Expression) -> tuple[Expression, Expression]:
         """Return a twist or acceleration of the parent in the frame of a body."""
         into = self._rotations[index].T
+        for turn in self._bodies[index].turns:
+            linear, angular = turn_matrix(*turn).T @ linear, turn_matrix(*turn).T @ angular
         return into @ (linear + ca.cross(angular, ca.SX(self._bodies[index].place))), into @ angular
 
     def _in_parent(self, index: int, matrix: Expression) -> Expression:
-        """Return R M R^T for the rotation R of a body in its parent.
-
-        A turn about an axis of the frame changes neither the trace of the block across it nor the difference
-        of its other two entries, so that half of the block is enough.
-        """
-        body, (cosine, sine) = self._bodies[index], self._turns[index - 1]
-        if np.count_nonzero(body.axis == 1.0) != 1:
+        """Return R M R^T for the rotation R of a body in its parent, but for turns of its mount."""
+        body, axis = self._bodies[index], coordinate_axis(self._bodies[index])
+        if axis is None:
             return self._rotations[index] @ matrix @ self._rotations[index].T
-        k = int(np.argmax(body.axis))
-        i, j = (k + 1) % 3, (k + 2) % 3
-        found, turn = ca.SX(matrix), turned_about_axis(body, cosine, sine)
-        row, column = turn @ matrix[:, k], matrix[k, :] @ turn.T
-        first, second = (cosine * matrix[i, at] - sine * matrix[j, at] for at in (i, j))
-        found[:, k], found[k, :], found[k, k] = row, column, matrix[k, k]
-        found[i, i], found[i, j] = cosine * first - sine * second, sine * first + cosine * second
-        found[j, j] = matrix[i, i] + matrix[j, j] - found[i, i]
-        found[j, i] = found[i, j] - (matrix[i, j] - matrix[j, i])
+        found = conjugated(matrix, axis, *self._turns[index - 1])
         return ca.SX(body.rotation) @ found @ ca.SX(body.rotation).T
 
     def _composed(self) -> list[_Rigid]:
@@ -219,10 +212,15 @@ class RigidBodies:
             turned = rotation @ own.first_moment
             half = turned + 0.5 * own.mass * place
             shift = _symmetric(2.0 * ca.dot(place, half) * ca.SX.eye(3) - place @ half.T - half @ place.T)
+            moments = [turned, own.mass * place]
+            inertias = [self._in_parent(index, own.inertia), shift]
+            for turn in reversed(body.turns):
+                moments = [turn_matrix(*turn) @ sum(moments)]
+                inertias = [_symmetric(conjugated(sum(inertias), *turn))]
             composites[body.parent] = _Rigid(
                 below.mass + own.mass,
-                below.first_moment + turned + own.mass * place,
-                _symmetric(below.inertia + self._in_parent(index, own.inertia) + shift),
+                sum(moments, below.first_moment),
+                _symmetric(sum(inertias, below.inertia)),
             )
         return composites
 
@@ -252,9 +250,12 @@ class RigidBodies:
 
     def _passed_on(self, index: int, force: Expression, moment: Expression) -> tuple[Expression, Expression]:
         """Return a wrench on a body as one on its parent."""
-        rotation = self._rotations[index]
+        body, rotation = self._bodies[index], self._rotations[index]
         turned = rotation @ force
-        return turned, rotation @ moment + ca.cross(ca.SX(self._bodies[index].place), turned)
+        spun = rotation @ moment + ca.cross(ca.SX(body.place), turned)
+        for turn in reversed(body.turns):
+            turned, spun = turn_matrix(*turn) @ turned, turn_matrix(*turn) @ spun
+        return turned, spun
 
     def _base_inertia(self) -> list[list[Expression]]:
         """Return H_b (6, 6), that of the robot with locked joints."""
@@ -338,12 +339,6 @@ def _product(row: Sequence[Expression], vector: Sequence[Expression]) -> Express
 def is_zero(value: Expression) -> bool:
     """Whether an entry is zero for every configuration."""
     return bool(ca.SX(value).is_zero())
-
-
-def turned_about_axis(body: Body, cosine: Expression, sine: Expression) -> Expression:
-    """Return the rotation about the axis of a joint by Rodrigues' formula."""
-    cross, along = np.array(ca.skew(body.axis)), np.outer(body.axis, body.axis)
-    return cosine * ca.SX(np.eye(3) - along) + sine * ca.SX(cross) + ca.SX(along)
 
 
 def _symmetric(matrix: Expression) -> Expression:

@@ -106,7 +106,7 @@ def _turned_back() -> Any:
     for part in (wrench[:3], wrench[3:]):
         term = total = part
         for order in range(1, 5):
-            term = ca.cross(term, turn) / order
+            term = ca.cross(term, turn) * (1.0 / order)
             total = total + term
         found.append(total)
     return ca.Function("turned_back", [wrench, turn], [ca.cse(ca.vertcat(*found))])

@@ -1,7 +1,7 @@
 """Body tree: the inertial and geometric data of a robot, read from its Pinocchio model."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -24,6 +24,8 @@ class Body:
     ``place`` (3,) m are those of the joint's frame at angle zero in the frame of the parent, ``axis`` (3,)
     is that of the joint. ``first_moment`` (3,) kg m is the mass times the centre of mass, ``inertia``
     (3, 3) kg m^2 is about the origin of the frame; ``rotor`` kg m^2 is the reflected inertia of the motor.
+    ``turns`` are those of a mount, about axes of the parent one after the other, each by its axis, cosine and
+    sine: ``rotation`` and ``place`` are then in the axes that they lead to.
     """
 
     parent: int
@@ -34,6 +36,7 @@ class Body:
     first_moment: Array
     inertia: Array
     rotor: float
+    turns: tuple[tuple[int, float, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +55,13 @@ class Tool:
 
 
 PER_BODY = 11  # mass, first moment (3), inertia (6: xx xy xz yy yz zz), rotor
-PER_MOUNT = 12  # rotation, row by row, and place
+PER_MOUNT = 9  # cosines and sines of three turns, and place
+_MASS, _FIRST_MOMENT, _DIAGONAL = 0, 1, (4, 7, 9)  # where they are among the numbers of a body
+
+
+def coordinate_axis(body: Body) -> int | None:
+    """Return the axis of the frame that a joint turns about, None if it is another one."""
+    return int(np.argmax(body.axis)) if np.count_nonzero(body.axis == 1.0) == 1 else None
 
 
 def mounts_of(bodies: Sequence[Body]) -> tuple[int, ...]:
@@ -67,21 +76,95 @@ def mounts_of(bodies: Sequence[Body]) -> tuple[int, ...]:
     return carried if is_odd else ()
 
 
+def lightened_of(bodies: Sequence[Body]) -> dict[int, tuple[int, ...]]:
+    """Return the bodies that leave what they can to their parents, and which of their numbers are then zero.
+
+    Mass on the axis of a joint, and inertia that is the same about all axes across it, move as if they were
+    fixed to the parent, so that they can be counted there [Khalil2004]. The equations then have fewer
+    operations, and other last digits: those of robots without odd mounts keep theirs. A body that carries no
+    other is left as it is, since a payload may change it alone.
+    """
+    if not mounts_of(bodies):
+        return {}
+    found: dict[int, tuple[int, ...]] = {}
+    for index in {body.parent for body in bodies[1:]} - {0}:
+        axis = coordinate_axis(bodies[index])
+        if axis is not None:
+            found[index] = (_MASS, _FIRST_MOMENT + axis, _DIAGONAL[(axis + 2) % 3])
+    return found
+
+
 def parameter_count(bodies: Sequence[Body]) -> int:
     """Return how many parameters the compiled functions of a robot have."""
     return PER_BODY * len(bodies) + PER_MOUNT * len(mounts_of(bodies))
 
 
-def parameters_of(bodies: Sequence[Body]) -> Array:
+@lru_cache(maxsize=8)
+def parameters_of(bodies: tuple[Body, ...]) -> Array:
     """Return the parameters of bodies, the argument of the compiled functions.
 
-    Of each mass kg, first moment (3) kg m, inertia xx xy xz yy yz zz kg m^2 and rotor kg m^2, as in Body;
-    then rotation and place m of mounts that are arguments.
+    Of each mass kg, first moment (3) kg m, inertia xx xy xz yy yz zz kg m^2 and rotor kg m^2, as in Body, but
+    for what :func:`lightened_of` leaves to the parent; then, of mounts that are arguments, cosines and sines
+    of three turns and the place m, as in :func:`mount_numbers`.
     """
     upper = np.triu_indices(3)
-    rows = [(body.mass, *body.first_moment, *body.inertia[upper], body.rotor) for body in bodies]
-    mounts = [(*bodies[at].rotation.ravel(), *bodies[at].place) for at in mounts_of(bodies)]
+    mounts = [mount_numbers(bodies[at]) for at in mounts_of(bodies)]
+    lightened = _lightened(bodies)
+    rows = [(body.mass, *body.first_moment, *body.inertia[upper], body.rotor) for body in lightened]
     return read_only(np.concatenate([np.ravel(rows), np.ravel(mounts)]))
+
+
+def mount_numbers(body: Body) -> Array:
+    """Return the rotation R of a mount as turns R_k(a) R_j(b) R_k(c), and its place in the axes after two.
+
+    Cosine and sine of a, b and c, then the place m (9,), for the axis k of the joint, or z, and j the second
+    after it. The third turn only shifts the angle of the joint; and as the origin of the joint is where its
+    axis comes nearest to that of the parent, the place has no part along k.
+    """
+    axis = coordinate_axis(body)
+    k = 2 if axis is None else axis
+    i, j = (k + 1) % 3, (k + 2) % 3
+    across = float(np.sqrt(body.rotation[i, k] ** 2 + body.rotation[j, k] ** 2))
+    first = (body.rotation[i, k] / across, body.rotation[j, k] / across) if across else (1.0, 0.0)
+    second = float(body.rotation[k, k]), across
+    turned = _turn(k, *first) @ _turn(j, *second)
+    rest, place = turned.T @ body.rotation, turned.T @ body.place
+    if axis is not None:
+        place[axis] = 0.0
+    return np.array([*first, *second, rest[i, i], rest[j, i], *place])
+
+
+def _turn(axis: int, cosine: float, sine: float) -> Array:
+    """Return the rotation about an axis of the frame."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    matrix = np.eye(3)
+    matrix[i, i] = matrix[j, j] = cosine
+    matrix[j, i], matrix[i, j] = sine, -sine
+    return matrix
+
+
+def _lightened(bodies: Sequence[Body]) -> list[Body]:
+    """Return bodies whose parents have what :func:`lightened_of` says."""
+    found, lightened = list(bodies), lightened_of(bodies)
+    for index in sorted(lightened, reverse=True):
+        body, parent = found[index], found[bodies[index].parent]
+        axis = int(np.argmax(body.axis))
+        along = np.eye(3)[axis]
+        across = body.inertia[(axis + 2) % 3, (axis + 2) % 3] * (np.eye(3) - np.outer(along, along))
+        moment = body.first_moment[axis] * along
+        found[index] = replace(
+            body, mass=0.0, first_moment=body.first_moment - moment, inertia=body.inertia - across
+        )
+        turned, place = body.rotation @ moment, body.place
+        half = turned + 0.5 * body.mass * place
+        shift = 2.0 * (place @ half) * np.eye(3) - np.outer(place, half) - np.outer(half, place)
+        found[body.parent] = replace(
+            parent,
+            mass=parent.mass + body.mass,
+            first_moment=parent.first_moment + turned + body.mass * place,
+            inertia=parent.inertia + body.rotation @ across @ body.rotation.T + shift,
+        )
+    return found
 
 
 @lru_cache(maxsize=8)  # a loop asks a dozen times for the same robots, in truth and model, bare and loaded
