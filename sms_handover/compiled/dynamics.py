@@ -1,8 +1,10 @@
 """Compiled dynamics: what plant and controller use in place of Pinocchio's algorithms."""
 
+import ctypes
+
 import numpy as np
 
-from sms_handover.compiled.c_function import CFunction
+from sms_handover.compiled.c_function import CFunction, NativeFunction
 from sms_handover.compiled.example import example_of, require_equal
 from sms_handover.compiled.library import dynamics_library
 from sms_handover.compiled.names import COMPUTED_TORQUE, step_name
@@ -57,7 +59,9 @@ class CompiledComputedTorque:
         self._efforts = np.zeros(size)
         parameters = parameters_of(body_tree(robot))
         arguments = (self._q, self._v, self._desired, self._feedback, parameters)
-        self._function = CFunction(library, COMPUTED_TORQUE, arguments, (self._efforts,))
+        self._function = NativeFunction(library, COMPUTED_TORQUE, [ctypes.c_void_p] * 6)
+        self._parameters = parameters
+        self._at = tuple(array.ctypes.data for array in (*arguments, self._efforts))
         q, v, wanted = example_of(robot)
         desired = np.array([0.9 * q[BASE_NQ:], 0.9 * v[BASE_NV:], wanted])
         example = (q, v, desired, np.array([[2.0], [3.0]]))
@@ -69,6 +73,6 @@ class CompiledComputedTorque:
         self._v[:] = v
         self._desired[:] = desired
         self._feedback[:] = feedback[:, 0]
-        self._function()
+        self._function(*self._at)
         efforts: Array = self._efforts.copy()
         return efforts

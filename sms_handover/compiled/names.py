@@ -1,6 +1,7 @@
 """Names of the C functions that are made for a kind of robot."""
 
 COMPUTED_TORQUE, PREPARED_TORQUE = "sms_computed_torque", "sms_prepared_torque"
+EFFORTS = "sms_efforts"
 TOOLS, TOOL_JACOBIANS = "sms_tools", "sms_tool_jacobians"
 MOTION, CONSERVED = "sms_motion", "sms_conserved"
 INERTIA, FACTORS, HELD = "sms_inertia", "sms_factors", "sms_held"

@@ -8,7 +8,7 @@ import casadi
 from sms_handover.compiled.names import FACTORS, HELD, INERTIA
 from sms_handover.compiled.rigid_bodies import RigidBodies, is_zero
 from sms_handover.compiled.tree import Body
-from sms_handover.model.robot_model import BASE_NQ, BASE_NV
+from sms_handover.model.robot_model import BASE_NV
 
 ca: Any = casadi  # its type hints are incomplete
 Expression = Any  # casadi.SX
@@ -20,8 +20,8 @@ _ONE_BODY = 13  # numbers of the robot as one body: mass, first moment, inertia,
 class ResistedFunctions:
     """The functions of a step whose joints may be held.
 
-    ``sms_inertia`` maps q, v and parameters to numbers: those of the robot as one body, in axes of the base,
-    then H and c. ``sms_factors`` maps numbers, what is added to the diagonal of H (n,) and which joints are
+    ``sms_inertia`` maps cosines and sines of the joint angles, v and parameters to numbers: those of the robot
+    as one body, in axes of the base, then H and c. ``sms_factors`` maps numbers, what is added to the diagonal of H (n,) and which joints are
     free (n,; 1 or 0) to factors. ``sms_held`` maps numbers, factors, a force (6 + n,) and the accelerations
     (n,) of the joints that are not free to v' (6 + n,), and to what holds those joints beside the force (n,).
     """
@@ -49,9 +49,8 @@ class ResistedFunctions:
         found = ca.densify(ca.vertcat(robot.as_one_body(), *entries, bias))
         self.numbers = int(found.numel())
         self.factors = size + sum(map(len, self._linked)) + size
-        inner = ca.Function("numbers", [*turn, v, parameters], [ca.cse(found)])
         self.functions = [
-            self._inertia_function(inner),
+            ca.Function(INERTIA, [*turn, v, parameters], [ca.cse(found)]),
             self._factors_function(),
             self._held_function(),
         ]
@@ -60,14 +59,6 @@ class ResistedFunctions:
     def diagonal(self) -> list[int]:
         """Where the diagonal of H is among the numbers, by joint."""
         return [self._at[k, k] for k in range(BASE_NV, self._size)]
-
-    def _inertia_function(self, inner: Any) -> Any:
-        """Return the function of q, v and parameters; cosines and sines of all angles are found at once."""
-        q, v = ca.MX.sym("q", BASE_NQ + self._joints), ca.MX.sym("v", self._size)
-        parameters, angles = ca.MX.sym("parameters", inner.size1_in(3)), q[BASE_NQ:]
-        return ca.Function(
-            INERTIA, [q, v, parameters], [inner(ca.cos(angles), ca.sin(angles), v, parameters)]
-        )
 
     def _factors_function(self) -> Any:
         """Return the function for the factors, from the tips to the base as ``rigid_bodies.factored``.

@@ -10,7 +10,7 @@ import casadi
 
 from sms_handover.compiled.kinematics_functions import kinematics_functions
 from sms_handover.compiled.names import (
-    COMPUTED_TORQUE,
+    EFFORTS,
     PREPARED_TORQUE,
     held_name,
     loaded_name,
@@ -59,8 +59,8 @@ def dynamics_source(bodies: Sequence[Body], tools: Sequence[Tool], schemes: Mapp
     functions = [
         *(step_function(step_name(n), by, scheme, joints, goes_on=False) for n, scheme in schemes.items()),
         *(step_function(rest_name(n), by, scheme, joints, goes_on=True) for n, scheme in schemes.items()),
-        _computed_torque(bodies),
-        _computed_torque(bodies, by),
+        _efforts(bodies, prepared=False),
+        _prepared_torque(bodies),
         *(_loaded_torque(bodies, arm, tool.body) for arm, tool in enumerate(tools)),
         *resisted.functions,
         *(held_step_function(held_name(n), by, scheme, joints) for n, scheme in schemes.items()),
@@ -136,10 +136,10 @@ def _kept(bias: Any, factors: Factors) -> Any:
     return ca.vertcat(bias, *factors.inverse, *(x for row in factors.lower for x in row.values()))
 
 
-def _computed_torque(bodies: Sequence[Body], by: Acceleration | None = None) -> Any:
-    """Return the function that maps q, v, desired motion (3, n), gains and parameters to efforts.
+def _efforts(bodies: Sequence[Body], *, prepared: bool) -> Any:
+    """Return the function that maps cosines, sines, v, joint accelerations and parameters to efforts.
 
-    With ``by`` the numbers that its first stage keeps are a second result.
+    One that is ``prepared`` has the numbers that the first stage of a step keeps as a second result.
     """
     turn, v, _ = _symbols(bodies)
     parameters, known = with_parameters(bodies)
@@ -147,11 +147,15 @@ def _computed_torque(bodies: Sequence[Body], by: Acceleration | None = None) -> 
     wanted = ca.SX.sym("wanted", joints)
     robot = RigidBodies(known, *turn, v)
     found = [robot.joint_efforts(wanted)]
-    if by:
+    if prepared:
         found.append(_kept(robot.bias(), robot.inertia_factors()))
-    inner = ca.Function("efforts", [*turn, v, wanted, parameters], ca.cse(found))
-    name = PREPARED_TORQUE if by else COMPUTED_TORQUE
-    return _by_feedback(name, inner, joints, [parameter_count(bodies)])
+    return ca.Function("prepared" if prepared else EFFORTS, [*turn, v, wanted, parameters], ca.cse(found))
+
+
+def _prepared_torque(bodies: Sequence[Body]) -> Any:
+    """Return the function of q, v, desired motion (3, n), gains and parameters, which is prepared."""
+    inner = _efforts(bodies, prepared=True)
+    return _by_feedback(PREPARED_TORQUE, inner, len(bodies) - 1, [parameter_count(bodies)])
 
 
 def _loaded_torque(bodies: Sequence[Body], arm: int, last: int) -> Any:
@@ -185,8 +189,7 @@ def _by_feedback(name: str, inner: Any, joints: int, numbers: Sequence[int]) -> 
     error, error_rate = angles - desired[:, 0], rates[BASE_NV:] - desired[:, 1]
     asked = desired[:, 2] - feedback[0] * error - feedback[1] * error_rate
     results = inner(ca.cos(angles), ca.sin(angles), rates, asked, *vectors)
-    given: list[Any] = [q, rates, desired, feedback, *vectors]
-    return ca.Function(name, given, list(results) if inner.n_out() > 1 else [results])
+    return ca.Function(name, [q, rates, desired, feedback, *vectors], list(results))
 
 
 def with_parameters(bodies: Sequence[Body]) -> tuple[Any, tuple[Body, ...]]:

@@ -10,7 +10,7 @@ import numpy as np
 from sms_handover.compiled.c_function import NativeFunction, address_of
 from sms_handover.compiled.effects import TickEffects
 from sms_handover.compiled.library import dynamics_library
-from sms_handover.compiled.names import COMPUTED_TORQUE, OBSERVE, TICKS
+from sms_handover.compiled.names import EFFORTS, OBSERVE, TICKS
 from sms_handover.compiled.tree import PER_BODY, body_tree, parameters_of, tools_of
 from sms_handover.compiled.wrench_table import WrenchTable
 from sms_handover.control.compensation import CompensatedTorque
@@ -30,7 +30,7 @@ _UNBOUNDED_NS = -1  # in place of the longest age of a reference
 # Functions of the two libraries by their fields, and whether they are those of the model.
 _FUNCTIONS: Mapping[str, tuple[str, bool]] = MappingProxyType(
     {
-        "law_of_model": (COMPUTED_TORQUE, True),
+        "efforts_of_model": (EFFORTS, True),
         "ticks_of_truth": (TICKS, False),
         "observe_truth": (OBSERVE, False),
     }

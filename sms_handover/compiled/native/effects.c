@@ -49,7 +49,7 @@ typedef struct {
 /* Whether something acts beside the motors. */
 static int resists(const effects_t *e) { return e && (e->has_friction || e->n_wrenches > 0); }
 
-static double clipped(double value, double limit) {
+SMS_INLINE double clipped(double value, double limit) {
   if (value < -limit) return -limit;
   if (value > limit) return limit;
   return value; /* NaN too, as in NumPy */
@@ -57,19 +57,19 @@ static double clipped(double value, double limit) {
 
 static const int diagonal[N] = DIAGONAL;
 
-static double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+SMS_INLINE double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-static void add_cross(const double *a, const double *b, double *sum) {
+SMS_INLINE void add_cross(const double *a, const double *b, double *sum) {
   sum[0] += a[1] * b[2] - a[2] * b[1];
   sum[1] += a[2] * b[0] - a[0] * b[2];
   sum[2] += a[0] * b[1] - a[1] * b[0];
 }
 
-static void turned(const double *R, const double *x, double *y) {
+SMS_INLINE void turned(const double *R, const double *x, double *y) {
   for (int i = 0; i < 3; i++) y[i] = dot(R + 3 * i, x);
 }
 
-static void turned_back(const double *R, const double *x, double *y) {
+SMS_INLINE void turned_back(const double *R, const double *x, double *y) {
   for (int i = 0; i < 3; i++) y[i] = R[i] * x[0] + R[3 + i] * x[1] + R[6 + i] * x[2];
 }
 
@@ -273,7 +273,7 @@ static void with_companion(const effects_t *e, const double *place, double mass,
 }
 
 /* Integral over h s of what has these values and rates at the ends, exact to order 4. */
-static double integral(double h, const double *first, const double *last, int i) {
+SMS_INLINE double integral(double h, const double *first, const double *last, int i) {
   return 0.5 * h * (first[i] + last[i]) + h * h / 12.0 * (first[3 + i] - last[3 + i]);
 }
 
@@ -314,8 +314,14 @@ static void settle(effects_t *e, const double *q, const double *v, const double 
   for (int i = 0; i < 7; i++) e->total_given[i] += given[i];
 }
 
-static void numbers_at(const double *q, const double *v, const double *parameters, double *numbers, double *w) {
-  const double *arguments[ARGUMENTS] = {q, v, parameters};
+/* Cosines and sines of the joint angles. */
+static void turns_at(const double *q, double (*turn)[N]) {
+  for (int j = 0; j < N; j++) turn[0][j] = cos(q[7 + j]);
+  for (int j = 0; j < N; j++) turn[1][j] = sin(q[7 + j]);
+}
+
+static void numbers_at(double (*turn)[N], const double *v, const double *parameters, double *numbers, double *w) {
+  const double *arguments[ARGUMENTS] = {turn[0], turn[1], v, parameters};
   double *results[ARGUMENTS] = {numbers};
   sms_inertia(arguments, results, 0, w, 0);
 }
@@ -323,14 +329,16 @@ static void numbers_at(const double *q, const double *v, const double *parameter
 /* A step that is called by Python, and its account. */
 void sms_resisted_step(effects_t *e, long stamp_ns, long scheme, const double *q, const double *v, const double *effort,
                        const double *parameters, const double *h, double *q_next, double *v_next, double *w) {
-  double numbers[NUMBERS];
-  numbers_at(q, v, parameters, numbers, w);
+  double numbers[NUMBERS], turn[2][N];
+  turns_at(q, turn);
+  numbers_at(turn, v, parameters, numbers, w);
   resisted_step(e, 0, stamp_ns, scheme, q, v, effort, parameters, h, numbers, q_next, v_next, w);
 }
 
 void sms_settle(effects_t *e, const double *q, const double *v, const double *parameters, const double *h,
                 double *w) {
-  double numbers[NUMBERS];
-  numbers_at(q, v, parameters, numbers, w);
+  double numbers[NUMBERS], turn[2][N];
+  turns_at(q, turn);
+  numbers_at(turn, v, parameters, numbers, w);
   settle(e, q, v, numbers, *h);
 }

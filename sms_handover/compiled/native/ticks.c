@@ -23,7 +23,7 @@ typedef struct ticks {
   long long one_robot, loaded;          /* truth and model alike; but for what this arm carries, -1: for more */
   const double *true_parameters, *known_parameters;
   effects_t *effects;                   /* of conditions that are not ideal, or 0 */
-  function_t law_of_model;              /* what the law computes by the model, whose joints may be elsewhere */
+  function_t efforts_of_model;          /* what the law computes by the model, whose joints may be elsewhere */
   void (*ticks_of_truth)(struct ticks *, long, double *, long, long, double *);
   void (*observe_truth)(const struct ticks *, void *, void *, double *);
   long long saturated[N];
@@ -45,6 +45,24 @@ static void desired_motion(const ticks_t *t, double (*desired)[N]) {
   }
 }
 
+/* Joint accelerations that the law asks for, from a desired motion (3, n). */
+static void ask(const double *q, const double *v, const double *desired, const double *gains, double *asked) {
+  for (int j = 0; j < N; j++) {
+    double error = q[7 + j] - desired[j], error_rate = v[6 + j] - desired[N + j];
+    asked[j] = desired[2 * N + j] - gains[0] * error - gains[1] * error_rate;
+  }
+}
+
+/* Efforts that bring them about, for Python: `desired`, gains A_1 and A_2. */
+void sms_computed_torque(const double *q, const double *v, const double *desired, const double *gains,
+                         const double *parameters, double *efforts, double *w) {
+  double turn[2][N], asked[N];
+  turns_at(q, turn), ask(q, v, desired, gains, asked);
+  const double *arguments[ARGUMENTS] = {turn[0], turn[1], v, asked, parameters};
+  double *results[ARGUMENTS] = {efforts};
+  sms_efforts(arguments, results, 0, w, 0);
+}
+
 static double sign(double x) { return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : x; }
 
 /* Whether the law works out what the step keeps of its first stage. */
@@ -53,7 +71,8 @@ static int is_prepared(const ticks_t *t) {
 }
 
 /* Efforts of the law; where truth and model share most of it, also what the step keeps of its first stage. */
-static void efforts_of(ticks_t *t, int prepared, double (*desired)[N], double *efforts, double *kept, double *w) {
+static void efforts_of(ticks_t *t, int prepared, double (*desired)[N], double (*turn)[N], double *efforts, double *kept,
+                       double *w) {
   if (t->law == LAW_NMPC) {
     /* CasADi has columns where NumPy has rows: (3, n) in memory is its (n, 3) */
     static const function_t loaded[] = LOADED;
@@ -66,8 +85,12 @@ static void efforts_of(ticks_t *t, int prepared, double (*desired)[N], double *e
       int own = PER_BODY * tool_bodies[t->loaded];
       arguments[5] = t->true_parameters + own, arguments[6] = t->known_parameters + own;
       loaded[t->loaded](arguments, results, 0, w, 0);
-    } else
-      t->law_of_model(arguments, results, 0, w, 0);
+    } else {
+      double asked[N];
+      ask(t->q, t->v, desired[0], t->gains, asked);
+      const double *given[ARGUMENTS] = {turn[0], turn[1], t->v, asked, t->known_parameters};
+      t->efforts_of_model(given, results, 0, w, 0);
+    }
     for (int j = 0; j < N; j++) efforts[j] = clipped(efforts[j], t->limit[j]);
     return;
   }
@@ -87,11 +110,13 @@ void sms_ticks(ticks_t *t, long scheme, double *rows, long ticks, long steps, do
   static const function_t schemes[] = STEPS, rests[] = RESTS;
   effects_t *e = t->effects;
   int prepared = is_prepared(t), resisted = resists(e), open = 0; /* whether the account of a step is open */
-  double kept[KEPT], numbers[NUMBERS];
+  int turning = resisted || (t->law == LAW_NMPC && !prepared);
+  double kept[KEPT], numbers[NUMBERS], turn[2][N];
   double desired[3][N], command[N], acted[N], force[NV] = {0.0}, q[NQ], v[NV];
   for (long k = 0; k < ticks; k++) {
     desired_motion(t, desired);
-    efforts_of(t, prepared, desired, command, kept, w);
+    if (turning) turns_at(t->q, turn);
+    efforts_of(t, prepared, desired, turn, command, kept, w);
     memcpy(rows, t->q, sizeof t->q), rows += NQ;
     memcpy(rows, t->v, sizeof t->v), rows += NV;
     memcpy(rows, t->effort, sizeof t->effort), rows += N;
@@ -105,7 +130,7 @@ void sms_ticks(ticks_t *t, long scheme, double *rows, long ticks, long steps, do
       force[6 + j] = acted[j];
     }
     if (resisted) {
-      numbers_at(t->q, t->v, t->true_parameters, numbers, w);
+      numbers_at(turn, t->v, t->true_parameters, numbers, w);
       if (open) settle(e, t->q, t->v, numbers, t->tick_s);
       resisted_step(e, k, t->stamp_ns, scheme, t->q, t->v, acted, t->true_parameters, &t->tick_s, numbers, q, v, w);
       open = e->n_wrenches > 0;
@@ -119,7 +144,8 @@ void sms_ticks(ticks_t *t, long scheme, double *rows, long ticks, long steps, do
     t->stamp_ns += t->tick_ns;
   }
   if (open) {
-    numbers_at(t->q, t->v, t->true_parameters, numbers, w);
+    turns_at(t->q, turn);
+    numbers_at(turn, t->v, t->true_parameters, numbers, w);
     settle(e, t->q, t->v, numbers, t->tick_s);
   }
   if (e) pass(e, steps < ticks ? steps : ticks);
