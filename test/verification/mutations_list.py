@@ -1283,9 +1283,16 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "rates of encoders not filtered",
         "conditions/sensors/encoders",
-        "self._kept = exp(-values.bandwidth * self._h)",
+        "self._kept = exp(-self._bandwidth * self._h)",
         "self._kept = 0.0",
         "sensors",
+    ),
+    _core(
+        "zeros of encoders set and not applied",
+        "conditions/sensors/encoders",
+        "= values.offset, values.bandwidth",
+        "= 0.0 * values.offset, values.bandwidth",
+        "conditions",
     ),
     _core(
         "the noise of vision the same at every range",
