@@ -229,7 +229,7 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "heat of a capture forgotten",
-        "plant/free_floating",
+        "plant/hands",
         "self._next_losses += taken.energy_lost",
         "self._next_losses += 0.0 * taken.energy_lost",
         "capture",
@@ -1093,8 +1093,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "heat of friction not booked",
         "plant/free_floating",
-        "self._losses += effects.settle(self._floating)",
-        "effects.settle(self._floating)",
+        "self._losses += effects.settle(self._hands.floating)",
+        "effects.settle(self._hands.floating)",
         "conditions",
     ),
     Break(
