@@ -247,14 +247,15 @@ def test_sensors_alone_change_nothing() -> None:
 
 
 def test_compiled_ticks_leave_sensors_out_where_nobody_listens() -> None:
-    """The run is that without sensors, bit for bit; who listens is given what they tell, by Python."""
+    """The run is that without, bit for bit, but for their values; who listens is given what they tell."""
     compiled = {"common.dynamics": "compiled", "common.duration": 0.04}
     bare, unheard, heard = (
         simulate(load_scenario("colliding", {**compiled, **more}))
         for more in ({}, SENSORS, {"source": "measured", **SENSORS})
     )
     assert unheard.measured is None and heard.measured is not None
-    assert compare_runs(bare, unheard) == ()
+    assert [difference.field for difference in compare_runs(bare, unheard)] == ["applied"]
+    assert unheard.applied == heard.applied
     assert compare_runs(bare, heard)
 
 
@@ -329,7 +330,8 @@ def test_a_comparison_of_runs_tells_where_measurements_differ() -> None:
     run, other = (handover("truth", SENSORS, seed=seed) for seed in (1, 2))
     fields = {difference.field for difference in compare_runs(run, other)}
     assert fields == {f"measured.{name}" for name in MEASURED[2:]}  # encoders draw nothing
-    assert compare_runs(run, handover("truth", {})) == ()
+    without = compare_runs(run, handover("truth", {}))
+    assert [difference.field for difference in without] == ["applied"]  # what acts has their values
     shorter = before(run, 50 * MS)
     assert shorter.measured is not None
     assert (len(shorter.measured.base_pose), len(shorter.measured.deputy_pose)) == (50, 3)
