@@ -950,6 +950,27 @@ BREAKS: tuple[Break, ...] = (
         "campaign_cases",
     ),
     _core(
+        "a law without a plan taken for a broken program",
+        "campaign/cases/case",
+        "return Status.MISSION_FAILED, str(error), run",
+        "return Status.ERROR, str(error), run",
+        "campaign_cases",
+    ),
+    _core(
+        "a worst case kept that is not the one of its row",
+        "campaign/record/kept_cases",
+        "if result.run is None or result.row.text != row.text:",
+        "if result.run is None:",
+        "campaign_commands",
+    ),
+    _core(
+        "half a bag of an interrupted case left behind",
+        "campaign/record/kept_cases",
+        "    finally:\n        _remove(unfinished)",
+        "    finally:\n        pass",
+        "campaign_commands",
+    ),
+    _core(
         "no limit of memory",
         "campaign/cases/case_process",
         "elif _resident_mb(child.pid) > self._limits.memory:",
