@@ -20,10 +20,11 @@ _ONE_BODY = 13  # numbers of the robot as one body: mass, first moment, inertia,
 class ResistedFunctions:
     """The functions of a step whose joints may be held.
 
-    ``sms_inertia`` maps cosines and sines of the joint angles, v and parameters to numbers: those of the robot
-    as one body, in axes of the base, then H and c. ``sms_factors`` maps numbers, what is added to the diagonal of H (n,) and which joints are
-    free (n,; 1 or 0) to factors. ``sms_held`` maps numbers, factors, a force (6 + n,) and the accelerations
-    (n,) of the joints that are not free to v' (6 + n,), and to what holds those joints beside the force (n,).
+    ``sms_inertia`` maps cosines and sines of the joint angles, v and parameters to numbers: those of the
+    robot as one body, in axes of the base, then H and c. ``sms_factors`` maps numbers, what is added to the
+    diagonal of H (n,) and which joints are free (n,; 1 or 0) to factors. ``sms_held`` maps numbers, factors,
+    a force (6 + n,) and the accelerations (n,) of the joints that are not free to v' (6 + n,), and to what
+    holds those joints beside the force (n,).
     """
 
     def __init__(

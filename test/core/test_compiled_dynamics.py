@@ -8,14 +8,19 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
+import casadi
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from sms_handover.compiled import library
 from sms_handover.compiled.compiler import library_of
 from sms_handover.compiled.dynamics import CompiledComputedTorque, CompiledStepper
 from sms_handover.compiled.linearisation import CompiledDerivatives
+from sms_handover.compiled.rigid_bodies import RigidBodies
+from sms_handover.compiled.source import with_parameters
 from sms_handover.compiled.ticks import CompiledTicks
+from sms_handover.compiled.tree import body_tree, lightened_of, parameters_of
 from sms_handover.control.mpc.derivatives import MassMatrix, PinocchioDerivatives, mass_matrix
 from sms_handover.control.protocol import Guidance
 from sms_handover.errors import ConfigurationError, MissingDependencyError, UnknownNameError
@@ -52,16 +57,50 @@ def _one_armed() -> RobotModel:
     return RobotModel(replace(description, arms=description.arms[:1]))
 
 
+def _badly_mounted() -> RobotModel:
+    errors = {"angle": 0.3, "position": 0.05}  # rad, m: the library is that of small errors
+    values = {f"conditions.model_error.mounts.{name}": value for name, value in errors.items()}
+    return load_scenario(values={**values, "conditions.rotor_inertia": 0.3}).truth.robot
+
+
 ROBOTS: dict[str, Callable[[], RobotModel]] = {
     "shipped": RobotModel.load,
     "every number changed": lambda: RobotModel(someone_else(load_robot(), seed=6)),
     "one arm": _one_armed,
+    "odd mounts": _badly_mounted,
 }
 
 
 @pytest.fixture(scope="module", params=ROBOTS)
 def any_robot(request: pytest.FixtureRequest) -> RobotModel:
     return ROBOTS[request.param]()
+
+
+@pytest.mark.parametrize("axis", np.eye(3).tolist(), ids="xyz")
+def test_equations_with_odd_mounts(axis: list[float]) -> None:
+    """A mount as turns, and mass that parents take over, about each axis of the frame of a joint."""
+    described = someone_else(load_robot(), seed=6)
+    arms = (
+        replace(arm, joints=tuple(replace(joint, axis=(*axis,)) for joint in arm.joints))
+        for arm in described.arms
+    )
+    robot = RobotModel(replace(described, arms=tuple(arms)))
+    bodies = body_tree(robot)
+    assert len(lightened_of(bodies)) == robot.n_joints - len(robot.arms)
+    numbers, known = with_parameters(bodies)
+    angles, v, force = (casadi.SX.sym(*of) for of in (("q", 14), ("v", 20), ("f", 20)))
+    equations = RigidBodies(known, casadi.cos(angles), casadi.sin(angles), v)
+    both = equations.acceleration(force), equations.articulated_acceleration(force)
+    found = casadi.Function("found", [angles, v, force, numbers], [*both, equations.kinetic_energy()])
+    draw = Draw(robot, seed=7)
+    for _ in range(3):
+        q, rates, pushed = draw.q(), draw.v(), draw.vector(robot.pin.nv)
+        *accelerations, energy = found(q[BASE_NQ:], rates, pushed, parameters_of(bodies))
+        expected = pin.aba(robot.pin, robot.data, q, rates, pushed, pin.Convention.LOCAL)
+        for acceleration in accelerations:
+            assert _off(np.array(acceleration).ravel(), expected) < _ROUNDING
+        expected_energy = conserved_quantities(robot, q, rates).kinetic_energy
+        assert float(energy) == pytest.approx(expected_energy, rel=_ROUNDING)
 
 
 def _off(found: Array, expected: Array) -> float:

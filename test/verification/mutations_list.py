@@ -285,6 +285,20 @@ BREAKS: tuple[Break, ...] = (
         "compiled_dynamics",
     ),
     _core(
+        "compiled: mass that parents take over without its lever",
+        "compiled/tree",
+        "inertia=parent.inertia + body.rotation @ across @ body.rotation.T + shift",
+        "inertia=parent.inertia + body.rotation @ across @ body.rotation.T",
+        "compiled_dynamics",
+    ),
+    _core(
+        "compiled: the turn of a mount about the axis of its joint forgotten",
+        "compiled/turns",
+        "turn = first * cosine - second * sine, second * cosine + first * sine",
+        "turn = cosine, sine",
+        "compiled_dynamics",
+    ),
+    _core(
         "compiled: weights of a scheme taken from its first motion alone",
         "compiled/step",
         "total = [sum(weights) for weights in zip(*tableau.b, strict=True)]",
