@@ -39,7 +39,7 @@ class ResistedFunctions:
         ``turn`` has cosines and sines (n,) of the joint angles.
         """
         robot = RigidBodies(bodies, *turn, v)
-        matrix, bias = robot.inertia_matrix(), robot.bias()
+        matrix, bias = robot.inertia_matrix(), robot.bias_by_points()
         size = len(matrix)
         self._joints, self._size = size - BASE_NV, size
         places = [(k, j) for k in range(size) for j in range(k + 1) if not is_zero(matrix[k][j])]

@@ -9,6 +9,7 @@ from typing import Any
 
 import casadi
 
+from sms_handover.compiled.points import gradient_of, turning_moment
 from sms_handover.compiled.tree import Body, coordinate_axis
 from sms_handover.compiled.turns import conjugated, joined, turn_matrix, turned_about_axis, turned_from_mount
 from sms_handover.model.robot_model import BASE_NV
@@ -79,6 +80,36 @@ class RigidBodies:
             for body, (_, moment) in zip(self._bodies[1:], wrenches[1:], strict=True)
         ]
         return ca.vertcat(*wrenches[0], *bias)
+
+    def bias_by_points(self) -> Expression:
+        """Return the same with fewer operations, by accelerations of points in place of those of bodies.
+
+        A point x of a body accelerates by a + U x, with U = [w'] + [w][w] for its angular velocity w
+        [Khalil2004]. A body of mass m, first moment h and inertia I takes m a + U h, and about its origin
+        h x a + I w' + w x (I w).
+        """
+        still, base = ca.SX.zeros(3), self._twists[0]
+        motions, wrenches = [(still, ca.cross(base[1], base[0]))], []  # w' and a
+        for index, body in enumerate(self._bodies):
+            spin = self._twists[index][1]
+            if index:
+                vectors = [self._twists[body.parent][1], *motions[body.parent]]
+                for turn in body.turns:
+                    vectors = [turn_matrix(*turn).T @ vector for vector in vectors]
+                before, gained, moved = vectors
+                into, axis = self._rotations[index].T, ca.SX(body.axis)
+                moved = into @ (moved + gradient_of(before, gained) @ ca.SX(body.place))
+                motions.append((into @ gained + ca.cross(spin, axis) * self._rates[index - 1], moved))
+            gained, moved = motions[index]
+            rigid, gradient = self._rigids[index], gradient_of(spin, gained)
+            force = rigid.mass * moved + gradient @ rigid.first_moment
+            moment = ca.cross(rigid.first_moment, moved) + turning_moment(
+                rigid.inertia, spin, gained, gradient
+            )
+            wrenches.append((force, moment))
+        self._gather(wrenches)
+        efforts = (ca.dot(ca.SX(b.axis), w[1]) for b, w in zip(self._bodies[1:], wrenches[1:], strict=True))
+        return ca.vertcat(*wrenches[0], *efforts)
 
     def inertia_factors(self) -> "Factors":
         """Return the factors of H."""
@@ -157,9 +188,7 @@ class RigidBodies:
     def momentum(self) -> tuple[Expression, Expression]:
         """Return linear momentum and angular momentum about the origin of the base, in its axes."""
         momenta = [rigid.wrench(*twist) for rigid, twist in zip(self._rigids, self._twists, strict=True)]
-        for index in range(len(self._bodies) - 1, 0, -1):
-            parent, passed = self._bodies[index].parent, self._passed_on(index, *momenta[index])
-            momenta[parent] = (momenta[parent][0] + passed[0], momenta[parent][1] + passed[1])
+        self._gather(momenta)
         return momenta[0]
 
     def as_one_body(self) -> Expression:
@@ -242,11 +271,15 @@ class RigidBodies:
             force += ca.cross(angular, momentum)
             moment += ca.cross(angular, spin) + ca.cross(linear, momentum)
             wrenches.append((force, moment))
+        self._gather(wrenches)
+        return wrenches
+
+    def _gather(self, wrenches: list[tuple[Expression, Expression]]) -> None:
+        """Add to the wrench of each body those of the bodies that it carries."""
         for index in range(len(self._bodies) - 1, 0, -1):
             parent = self._bodies[index].parent
             force, moment = self._passed_on(index, *wrenches[index])
             wrenches[parent] = (wrenches[parent][0] + force, wrenches[parent][1] + moment)
-        return wrenches
 
     def _passed_on(self, index: int, force: Expression, moment: Expression) -> tuple[Expression, Expression]:
         """Return a wrench on a body as one on its parent."""

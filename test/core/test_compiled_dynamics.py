@@ -91,14 +91,16 @@ def test_equations_with_odd_mounts(axis: list[float]) -> None:
     angles, v, force = (casadi.SX.sym(*of) for of in (("q", 14), ("v", 20), ("f", 20)))
     equations = RigidBodies(known, casadi.cos(angles), casadi.sin(angles), v)
     both = equations.acceleration(force), equations.articulated_acceleration(force)
-    found = casadi.Function("found", [angles, v, force, numbers], [*both, equations.kinetic_energy()])
+    unlike = equations.bias() - equations.bias_by_points()
+    found = casadi.Function("found", [angles, v, force, numbers], [*both, unlike, equations.kinetic_energy()])
     draw = Draw(robot, seed=7)
     for _ in range(3):
         q, rates, pushed = draw.q(), draw.v(), draw.vector(robot.pin.nv)
-        *accelerations, energy = found(q[BASE_NQ:], rates, pushed, parameters_of(bodies))
+        *accelerations, apart, energy = found(q[BASE_NQ:], rates, pushed, parameters_of(bodies))
         expected = pin.aba(robot.pin, robot.data, q, rates, pushed, pin.Convention.LOCAL)
         for acceleration in accelerations:
             assert _off(np.array(acceleration).ravel(), expected) < _ROUNDING
+        assert np.abs(np.array(apart)).max() < 1e-11  # N m, of some 10
         expected_energy = conserved_quantities(robot, q, rates).kinetic_energy
         assert float(energy) == pytest.approx(expected_energy, rel=_ROUNDING)
 
