@@ -1428,6 +1428,27 @@ BREAKS: tuple[Break, ...] = (
         "brakings = self._state.brakings",
         "mpc",
     ),
+    Break(
+        "bodies that may enter each other as shipped",
+        "config/controller.yaml",
+        "least_distance: 0.01 ",
+        "least_distance: 0.0 ",
+        "test/core/test_mpc.py",
+    ),
+    _core(
+        "plans that a live page is told again and again",
+        "scene/live",
+        "self._paths[known.plans :]",
+        "self._paths",
+        "scene_live",
+    ),
+    _core(
+        "a tool that is slow called blocked",
+        "analysis/blocked_tools",
+        " if row.startswith(_BLOCKING)",
+        "",
+        "analysis_comparison",
+    ),
     # what compensates for what a model does not know
     _core(
         "momentum observed without the Coriolis term",
