@@ -83,7 +83,7 @@ def command(options: Namespace) -> int:
             said = [recorded_verdict(engine, run.info.path) for run in runs]
             runs = tuple(replace(run, second_engine=verdict) for run, verdict in zip(runs, said, strict=True))
         progress.show("drawing")
-        content = _content(runs, campaign) if page else ""
+        content = _content(runs, campaign, page.parent) if page else ""
     if page:
         write_text(page, content, parents=True)
         print(f"{page}: {len(content.encode()) / _BYTES_PER_MB:.1f} MB; open it in a browser")
@@ -92,9 +92,9 @@ def command(options: Namespace) -> int:
     return 0
 
 
-def _content(runs: Sequence[RecordedRun], campaign: CampaignFolder | None) -> str:
-    """Return the page of runs, or of a campaign."""
-    return campaign_page(campaign) if campaign else report_page(runs)
+def _content(runs: Sequence[RecordedRun], campaign: CampaignFolder | None, place: Path) -> str:
+    """Return the page of runs, or of a campaign with links from a page in ``place``."""
+    return campaign_page(campaign, place) if campaign else report_page(runs)
 
 
 def _page(place: Path) -> Path:

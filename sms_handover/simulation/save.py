@@ -1,7 +1,7 @@
 """Save the arrays of a run as a NumPy archive."""
 
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -14,16 +14,21 @@ def save_run(run: RunData, path: Path) -> None:
 
     Raises ConfigurationError if the file exists or cannot be written.
     """
+    try:
+        with path.open("xb") as file:
+            write_arrays(run, file)
+    except FileExistsError:
+        raise ConfigurationError(f"{path} exists; choose another file") from None
+    except OSError as error:
+        raise ConfigurationError(f"{path} cannot be written: {error.strerror}") from error
+
+
+def write_arrays(run: RunData, stream: IO[bytes]) -> None:
+    """Write the arrays of a run to a stream, as :func:`save_run` does to a file."""
     arrays: dict[str, Any] = {
         name: value for name, value in vars(run).items() if isinstance(value, np.ndarray)
     }
     for name, per_arm in (("target_pose", run.target_pose), ("tool_pose", run.tool_pose)):
         arrays.update({f"{name}.{arm}": array for arm, array in per_arm.items()})
     arrays["joint_names"] = np.array(run.joint_names)
-    try:
-        with path.open("xb") as file:
-            np.savez_compressed(file, **arrays)
-    except FileExistsError:
-        raise ConfigurationError(f"{path} exists; choose another file") from None
-    except OSError as error:
-        raise ConfigurationError(f"{path} cannot be written: {error.strerror}") from error
+    np.savez_compressed(stream, **arrays)

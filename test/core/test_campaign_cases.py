@@ -17,7 +17,11 @@ from sms_handover.campaign.cases.retained import trajectory
 from sms_handover.campaign.definition.campaign_file import Limits
 from sms_handover.campaign.definition.frozen import freeze
 from sms_handover.campaign.record.campaign_folder import CampaignFolder
-from sms_handover.errors import ConfigurationError, SmsHandoverError
+from sms_handover.campaign.record.journal import Entry
+from sms_handover.campaign.statistics.case_columns import columns_of
+from sms_handover.campaign.statistics.paired_tests import paired_tests
+from sms_handover.campaign.statistics.worst_cases import failures_by_cause, worst_of
+from sms_handover.errors import ConfigurationError, NoPlanError, SmsHandoverError
 from sms_handover.simulation import loop as loops
 from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.scenario import load_scenario
@@ -106,12 +110,15 @@ def test_masses_are_read_back_from_what_the_plant_integrates() -> None:
         ("conditions.model_error.base.mass", 0.02),
         ("conditions.wrenches.solar_pressure.constant.force[0]", -3e-5),
         ("conditions.wrenches.gravity.gravity_gradient.radius", 6.9e6),
-        ("conditions.sensors.gyro.bias[1]", 1e-5),
-        ("conditions.sensors.vision.latency", 0.2),
+        ("conditions.sensors.encoders.offset", 7e-4),
+        ("conditions.sensors.star_tracker.period", 0.2),
+        ("conditions.wrenches.told.history.rows[1][2]", 3.0),
     ],
 )
 def test_conditions_are_read_back_from_the_plant(path: str, value: float) -> None:
-    nominal = {"common.conditions": "nominal"}
+    """Of sensors too, which compiled ticks do not read."""
+    told = {"conditions.wrenches.told.history": {"rows": [[0.0] * 7, [1.0] * 7]}}
+    nominal = {"common.conditions": "nominal", "common.dynamics": "compiled", **told}
     assert read_back(Loop(load_scenario("smooth", {**nominal, path: value})), path) == value
     assert read_back(Loop(load_scenario("smooth", nominal)), path) != value
 
@@ -140,6 +147,37 @@ def test_a_mission_failure_is_no_numeric_failure(tmp_path: Path) -> None:
     row = cases_of(tmp_path, success="complete").run(TASK).row
     assert (row.status, row.numeric_failure, row.mission_failure) == (Status.MISSION_FAILED, False, True)
     assert row.cause.startswith("ended at 0.04 s") and row.run_digest
+
+
+def test_a_run_without_a_plan_is_a_failed_mission_with_its_cause(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its run is there as far as it came; without metrics, and no success where laws are paired."""
+    cases = cases_of(tmp_path, laws=["nmpc", "pid"])
+    good, advance, at_rest_ns = cases.run(TASK), loops.Loop._advance, 20_000_000
+
+    def gives_up(loop: Loop, most: int) -> Any:
+        if loop.law == "pid" and loop.state.stamp_ns == at_rest_ns:
+            raise NoPlanError("no plan, at rest at 0.02 s: rate arm_a_joint_3 is 1e-3 too large")
+        return advance(loop, most)
+
+    monkeypatch.setattr(loops.Loop, "_advance", gives_up)
+    result = cases.run(TASK._replace(law="pid"))
+    row, run = result.row, result.run
+    assert (row.status, row.numeric_failure, row.mission_failure) == (Status.MISSION_FAILED, False, True)
+    assert row.metrics == {} and row.inputs == good.row.inputs
+    assert run is not None and run.tick_ns[-1] == at_rest_ns - 1_000_000 and row.run_digest == run_digest(run)
+    entries = [Entry(one.row, one.beside) for one in (good, result)]
+    assert failures_by_cause(entries) == {
+        (
+            "pid",
+            "mission failed",
+            "no plan, at rest at # s: rate arm_a_joint_3 is # too large",
+        ): 1
+    }
+    success, effort = paired_tests(columns_of(entries), ["control_effort"])
+    assert (success.cases, success.difference, effort.cases) == (1, 1.0, 0)
+    assert list(worst_of(entries, "control_effort", 5)) == [("smooth", "nmpc")]
 
 
 def test_a_run_beyond_its_ticks_is_a_row(tmp_path: Path) -> None:

@@ -1,16 +1,30 @@
 """The verbs of campaigns: run, status, rerun, merge, and check, compare and report as they take campaigns."""
 
 import json
+import os
+import re
 import shlex
+import signal
+import sys
+import time
 from pathlib import Path
+from threading import Thread
+from urllib.parse import unquote
 
 import numpy as np
+import psutil
 import pyarrow.parquet as parquet
 import pytest
 
+from sms_handover.campaign.cases.case_row import Task
 from sms_handover.campaign.definition.campaign_file import read_campaign
 from sms_handover.campaign.definition.frozen import campaign_path
+from sms_handover.campaign.record.campaign_folder import CampaignFolder
+from sms_handover.campaign.record.kept_cases import keep_worst
+from sms_handover.campaign.record.manifest import Shard
+from sms_handover.cli.campaign.outputs import record_case
 from sms_handover.cli.main import main
+from sms_handover.errors import SmsHandoverError
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
 
@@ -51,7 +65,8 @@ def test_a_folder_has_everything(finished: Path) -> None:
     run = simulate(load_scenario("smooth", values))
     with np.load(finished / "full" / worst[0], allow_pickle=False) as arrays:
         np.testing.assert_array_equal(arrays["joint_position"], run.joint_position)
-    assert "sms-handover campaign rerun" in (finished / "index.html").read_text(encoding="utf-8")
+    page = (finished / "index.html").read_text(encoding="utf-8")
+    assert "sms-handover campaign rerun" in page and page.count(f'<a href="full/{worst[0]}">') == 1
 
 
 def test_status_tells_what_failed_and_what_is_worst(
@@ -62,6 +77,7 @@ def test_status_tells_what_failed_and_what_is_worst(
     assert "campaign tiny: 4 of 4 rows" in said and "mission failed" in said
     assert main(["campaign", "status", str(finished), "--worst", "1"]) == 0
     said = capsys.readouterr().out
+    assert said.count(f"kept whole: {finished}/full/") == 2
     command = next(line.strip() for line in said.splitlines() if line.strip().startswith("sms-handover"))
     assert main(shlex.split(command)[1:]) == 0
     assert "equal to its row, bit for bit" in capsys.readouterr().out
@@ -90,7 +106,119 @@ def test_laws_are_compared_and_reported(
     ]
     assert figures["paired_tests"][0]["difference"] == -1.0
     assert main(["report", str(finished), "-o", str(tmp_path / "page.html")]) == 0
-    assert (tmp_path / "page.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert page.startswith("<!DOCTYPE html>")
+    links = [unquote(link) for link in re.findall(r'<a href="(\S+\.npz)"', page)]
+    assert len(links) == 2 and all((tmp_path / link).is_file() for link in links)
+
+
+def test_check_tells_what_the_worst_cases_take(finished: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(finished.parent / "campaign.yaml")]) == 0
+    told = re.search(r"worst 1 of each law as data (\S+) MB", capsys.readouterr().out)
+    size = sum(path.stat().st_size for path in (finished / "full").iterdir())
+    assert told and float(told[1]) == pytest.approx(size / 1e6, rel=0.05)
+
+
+def test_worst_cases_that_are_not_those_of_their_rows_are_not_kept(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The rows are made up. All else of the campaign is there, and each failure is a line with its remedy."""
+    file, out = written(tmp_path, cases=2, keep={"worst": 1}), tmp_path / "out"
+    run_here(file, out, program=STUB)
+    assert main(["campaign", "run", str(file), "-o", str(out)]) == 3
+    told, errors = capsys.readouterr()
+    assert "1 worst cases by grasp_error are run again, to be kept as data" in told
+    assert "case 1 of smooth under nmpc is not kept: run again it differs from its row" in errors
+    assert f"sms-handover campaign rerun {out} 1 --law nmpc" in errors
+    assert not list((out / "full").iterdir()) and (out / "index.html").exists()
+
+
+def recorded(tmp_path: Path) -> Path:
+    """Return a folder with made-up rows of eight cases, of which the two worst are 6 and 5, as bags."""
+    keep = {"worst": 2, "worst_as": "bag"}
+    run_here(written(tmp_path / "file", cases=8, keep=keep), tmp_path / "out", program=STUB)
+    return tmp_path / "out"
+
+
+def test_bags_of_the_worst_cases_are_made_once_and_gone_on_with(tmp_path: Path) -> None:
+    out, tried, broken = recorded(tmp_path), list[int](), {5: SmsHandoverError("a node died")}
+
+    def record(folder: CampaignFolder, task: Task, output: Path) -> None:
+        tried.append(task.case)
+        output.mkdir()
+        if task.case in broken:
+            raise broken[task.case]
+
+    first = list(keep_worst(CampaignFolder(out), record))
+    assert [one.is_lacking for one in first] == [False, False, True]
+    assert f"{out}/bags/6_smooth_nmpc: equal to its row, bit for bit (1 of 2)" in first[1].text
+    assert "case 5 of smooth under nmpc is not kept: a node died (2 of 2)" in first[2].text
+    broken[5] = KeyboardInterrupt()  # type: ignore[assignment]
+    with pytest.raises(KeyboardInterrupt):
+        list(keep_worst(CampaignFolder(out), record))
+    assert [path.name for path in (out / "bags").iterdir()] == ["6_smooth_nmpc"]
+    (out / "bags" / ".5_smooth_nmpc").mkdir()  # as a driver that was killed leaves it
+    broken.clear()
+    assert len(list(keep_worst(CampaignFolder(out), record))) == 2
+    assert list(keep_worst(CampaignFolder(out), record)) == [] and tried == [6, 5, 5, 5]
+
+
+def test_where_there_is_no_ros_bags_are_left_for_later(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is said at the start too; an interrupt says how to go on; shards leave them to merge."""
+    out, file = recorded(tmp_path), str(tmp_path / "file" / "campaign.yaml")
+    monkeypatch.setattr("sms_handover.cli.campaign.outputs.find_spec", lambda name: None)
+    assert main(["campaign", "run", file, "-o", str(out)]) == 3
+    errors = capsys.readouterr().err
+    assert "there will be no bags of the worst cases" in errors and "2 worst cases have no bag" in errors
+
+    def interrupt(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sms_handover.cli.campaign.outputs.find_spec", lambda name: name)
+    monkeypatch.setattr("sms_handover.cli.campaign.outputs.record_case", interrupt)
+    assert main(["campaign", "run", file, "-o", str(out)]) == 130
+    assert "interrupted: the same command goes on" in capsys.readouterr().err
+    run_here(Path(file), tmp_path / "part", shard=Shard(1, 2), program=STUB)
+    (told,) = keep_worst(CampaignFolder(tmp_path / "part"), interrupt)
+    assert "'campaign merge' keeps them" in told.text and not (tmp_path / "part" / "bags").exists()
+
+
+def test_an_interrupted_recording_ends_with_all_that_it_has_started(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, ready = recorded(tmp_path), tmp_path / "ready"
+    stubborn = (
+        "import os, pathlib, signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN); "
+        f"pathlib.Path({str(ready)!r}).write_text(str(os.getpid())); time.sleep(60)"
+    )
+    monkeypatch.setattr("sms_handover.cli.campaign.outputs._END_S", 0.1)
+    monkeypatch.setattr(
+        "sms_handover.cli.campaign.outputs.as_program", lambda name: (sys.executable, "-c", stubborn)
+    )
+
+    def interrupt() -> None:
+        while not (ready.exists() and ready.read_text()):
+            time.sleep(0.02)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    Thread(target=interrupt, daemon=True).start()
+    with pytest.raises(KeyboardInterrupt):
+        record_case(CampaignFolder(out), Task(6, "smooth", "nmpc"), tmp_path / "bag")
+    assert not psutil.pid_exists(int(ready.read_text()))
+
+
+def test_a_recording_that_fails_says_so_with_its_last_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = recorded(tmp_path)
+    fails = (sys.executable, "-c", "import sys; print('warning'); print(sys.argv[1:]); sys.exit(1)")
+    monkeypatch.setattr("sms_handover.cli.campaign.outputs.as_program", lambda name: fails)
+    with pytest.raises(SmsHandoverError) as error:
+        record_case(CampaignFolder(out), Task(6, "smooth", "nmpc"), tmp_path / "bag")
+    words = ["campaign", "rerun", str(out), "6", "--law", "nmpc", "--scenario", "smooth", "--bag", "--output"]
+    assert str(error.value) == str([*words, str(tmp_path / "bag")])
 
 
 @pytest.mark.parametrize(

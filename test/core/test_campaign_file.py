@@ -53,6 +53,8 @@ TWO = {MASS: {"normal": {"mean": 240, "std": 12}}, X: UNIFORM}
         ({"success": "__import__('os')"}, "is not allowed: see docs/campaigns.md for what is"),
         ({"stop": {"half_width": 0.1, "looks": [5, 2]}}, "stop.looks must be whole numbers that rise"),
         ({"stop": {"half_width": 0.1, "looks": [2.5, 5]}}, "stop.looks must be whole numbers that rise"),
+        ({"keep": {"worst": 1, "worst_as": "bags"}}, "unknown choice 'bags' (did you mean 'bag'?)"),
+        ({"keep": {"worst_as": "bag"}}, "keep.worst_as is for the cases of keep.worst, which is 0: give it"),
         ({"correlated": [{"draws": {MASS: {"mean": 1, "std": 1}}, "correlation": [[1]]}]}, "is drawn twice"),
     ],
 )

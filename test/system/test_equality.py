@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from sms_handover.analysis.equality import compare_runs
+from sms_handover.analysis.equality import compare_runs, run_digest
 from sms_handover.bag.files import read_messages
 from sms_handover.bag.info import read_info
 from sms_handover.bag.run.reader import read_run
+from sms_handover.campaign.record.campaign_folder import CampaignFolder
 from sms_handover.graph.topics import CLEARANCE, CONTAINER, RECORDER, VISION
 from sms_handover.launcher.recorded_scenario import scenario_in
 from sms_handover.messages.stamps import stamp_ns
@@ -222,8 +223,12 @@ def test_a_case_of_a_campaign_is_recorded_as_it_was_run(tmp_path: Path) -> None:
         "laws": ["nmpc"],
         "values": {"common.duration": 0.1},  # [s]
         "draws": {"truth.robot.base.mass": {"normal": {"mean": 240.0, "std": 12.0}}},  # [kg]
+        "worst_by": "peak_torque",
+        "keep": {"worst": 1, "worst_as": "bag"},
     }
     (tmp_path / "one.yaml").write_text(json.dumps(campaign), encoding="utf-8")
-    assert sms_handover("campaign", "run", "one.yaml", "-o", "out", cwd=tmp_path).code == 0
-    again = sms_handover("campaign", "rerun", "out", "0", "--bag", "-o", "again", cwd=tmp_path)
-    assert again.code == 0 and "equal to its row, bit for bit" in again.out, again
+    ended = sms_handover("campaign", "run", "one.yaml", "-o", "out", cwd=tmp_path)
+    assert ended.code == 0 and "out/bags/0_smooth_nmpc: equal to its row, bit for bit" in ended.out, ended
+    (entry,) = CampaignFolder(tmp_path / "out").entries()
+    assert run_digest(read_run(tmp_path / "out" / "bags" / "0_smooth_nmpc" / "bag")) == entry.row.run_digest
+    assert not list(tmp_path.glob("out/bags/.*"))

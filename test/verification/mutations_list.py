@@ -229,7 +229,7 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "heat of a capture forgotten",
-        "plant/free_floating",
+        "plant/hands",
         "self._next_losses += taken.energy_lost",
         "self._next_losses += 0.0 * taken.energy_lost",
         "capture",
@@ -950,6 +950,27 @@ BREAKS: tuple[Break, ...] = (
         "campaign_cases",
     ),
     _core(
+        "a law without a plan taken for a broken program",
+        "campaign/cases/case",
+        "return Status.MISSION_FAILED, str(error), run",
+        "return Status.ERROR, str(error), run",
+        "campaign_cases",
+    ),
+    _core(
+        "a worst case kept that is not the one of its row",
+        "campaign/record/kept_cases",
+        "if result.run is None or result.row.text != row.text:",
+        "if result.run is None:",
+        "campaign_commands",
+    ),
+    _core(
+        "half a bag of an interrupted case left behind",
+        "campaign/record/kept_cases",
+        "    finally:\n        _remove(unfinished)",
+        "    finally:\n        pass",
+        "campaign_commands",
+    ),
+    _core(
         "no limit of memory",
         "campaign/cases/case_process",
         "elif _resident_mb(child.pid) > self._limits.memory:",
@@ -1093,8 +1114,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "heat of friction not booked",
         "plant/free_floating",
-        "self._losses += effects.settle(self._floating)",
-        "effects.settle(self._floating)",
+        "self._losses += effects.settle(self._hands.floating)",
+        "effects.settle(self._hands.floating)",
         "conditions",
     ),
     Break(
@@ -1283,9 +1304,16 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "rates of encoders not filtered",
         "conditions/sensors/encoders",
-        "self._kept = exp(-values.bandwidth * self._h)",
+        "self._kept = exp(-self._bandwidth * self._h)",
         "self._kept = 0.0",
         "sensors",
+    ),
+    _core(
+        "zeros of encoders set and not applied",
+        "conditions/sensors/encoders",
+        "= values.offset, values.bandwidth",
+        "= 0.0 * values.offset, values.bandwidth",
+        "conditions",
     ),
     _core(
         "the noise of vision the same at every range",

@@ -18,7 +18,7 @@ from sms_handover.campaign.definition.distributions import Value
 from sms_handover.campaign.definition.frozen import Frozen
 from sms_handover.campaign.sampling.samples import Samples
 from sms_handover.campaign.sampling.streams import run_seed
-from sms_handover.errors import ConfigurationError, ControllerError
+from sms_handover.errors import ConfigurationError, ControllerError, NoPlanError
 from sms_handover.run_data import RunData
 from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.recorder import RunRecorder
@@ -30,7 +30,7 @@ _ONE_LINE = 300  # [characters] of a cause
 
 @dataclass(frozen=True, eq=False)
 class CaseResult:
-    """The row of a case, what was measured beside it, and its run if it came to its end."""
+    """The row of a case, what was measured beside it, and its run, which ends where there is no plan."""
 
     row: Row
     beside: Beside
@@ -104,7 +104,11 @@ class Cases:
         recorder = RunRecorder(robot.joint_names, robot.arms, loop.last_tick + 1, panels)
         done = 0
         while not loop.finished:
-            ticks = loop.advance_quietly()
+            try:
+                ticks = loop.advance_quietly()
+            except NoPlanError as error:  # as far as it came, and without metrics: less effort is no merit
+                run = recorder.data(loop.base_wrenches, loop.applied) if done else None
+                return Status.MISSION_FAILED, str(error), run
             recorder.add(ticks)
             done += len(ticks.rows.stamp_ns)
             if most and done > most:

@@ -26,7 +26,7 @@ class Status(Enum):
     """How a case ended; the value is what a user reads."""
 
     SUCCEEDED = "succeeded"
-    MISSION_FAILED = "mission failed"  # it ran to its end, and that is no success
+    MISSION_FAILED = "mission failed"  # it ran to its end without success, or its law found no plan
     NUMERIC_FAILURE = "numeric failure"  # numbers that are not finite, or a law that broke down
     REJECTED = "rejected"  # no scenario can have the drawn values
     ERROR = "error"  # an exception that nobody expected
@@ -39,7 +39,7 @@ class Row:
     """One run of a campaign, a pure function of campaign, case, scenario and law.
 
     ``inputs`` are as read back from plant and model, ``metrics`` in SI units, None where one is not defined;
-    ``run_digest`` is that of all its data, '' where the run did not come to its end.
+    none of them where a law found no plan; ``run_digest`` is that of all data, '' where there is no run.
     """
 
     task: Task
@@ -57,7 +57,7 @@ class Row:
 
     @property
     def mission_failure(self) -> bool:
-        """Whether the run came to its end without success."""
+        """Whether the run came to its end without success, or to rest without a plan."""
         return self.status is Status.MISSION_FAILED
 
     @property

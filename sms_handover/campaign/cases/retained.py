@@ -1,4 +1,4 @@
-"""Retained data of a case: its trajectory at the rate of references, or all of its run, as NumPy archives."""
+"""Retained data of a case: its trajectory at the rate of references, or its whole run as arrays or a bag."""
 
 from io import BytesIO
 from pathlib import Path
@@ -8,10 +8,10 @@ import numpy as np
 
 from sms_handover.campaign.cases.case_row import Row, Task
 from sms_handover.campaign.definition.campaign_file import Keep
-from sms_handover.campaign.definition.fields import ALL, FAILURES
+from sms_handover.campaign.definition.fields import ALL, BAG, FAILURES
 from sms_handover.run_data import RunData
 
-TRAJECTORIES, FULL = "trajectories", "full"
+TRAJECTORIES, FULL, BAGS = "trajectories", "full", "bags"
 
 
 def keeps_trajectory(keep: Keep, row: Row) -> bool:
@@ -40,5 +40,15 @@ def trajectory(run: RunData) -> bytes:
 
 
 def file_of(folder: Path, kind: str, task: Task) -> Path:
-    """Return the file of retained data of a case."""
-    return folder / kind / f"{task.case}_{task.scenario}_{task.law}.npz"
+    """Return the NumPy archive of a case."""
+    return folder / kind / f"{_name(task)}.npz"
+
+
+def worst_path(folder: Path, keep: Keep, task: Task) -> Path:
+    """Return where a case is if it is kept as one of the worst: a NumPy archive, or the folder of a run."""
+    return folder / BAGS / _name(task) if keep.worst_as == BAG else file_of(folder, FULL, task)
+
+
+def _name(task: Task) -> str:
+    """Return the name of a case among files."""
+    return f"{task.case}_{task.scenario}_{task.law}"

@@ -23,6 +23,7 @@ from sms_handover.campaign.definition.distributions import (
 from sms_handover.campaign.definition.fields import (
     CAMPAIGN_FIELDS,
     COUNTED,
+    DATA,
     EXTENDABLE,
     LIST,
     MORRIS,
@@ -76,10 +77,11 @@ class Limits:
 
 @dataclass(frozen=True)
 class Keep:
-    """What is kept beyond rows: trajectories of no, failed or all cases, full data of the worst."""
+    """What is kept beyond rows: trajectories of no, failed or all cases, and so many worst ones whole."""
 
     trajectories: str = NONE
     worst: int = 0
+    worst_as: str = DATA
 
 
 @dataclass(frozen=True, eq=False)
@@ -320,13 +322,17 @@ def _keep(root: Section) -> Keep:
     if "keep" not in root:
         return Keep()
     section = root.section("keep")
-    known = CAMPAIGN_FIELDS.optional["keep"].optional["trajectories"].choices  # type: ignore[union-attr]
     given: dict[str, Any] = {}
-    if "trajectories" in section:
-        given["trajectories"] = section.name("trajectories", "choice", known)
+    for key in ("trajectories", "worst_as"):
+        if key in section:
+            known = CAMPAIGN_FIELDS.optional["keep"].optional[key].choices  # type: ignore[union-attr]
+            given[key] = section.name(key, "choice", known)
     if "worst" in section:
         given["worst"] = int(section.number("worst"))
-    return Keep(**given)
+    keep = Keep(**given)
+    if "worst_as" in section and not keep.worst:
+        raise section.error("keep.worst_as is for the cases of keep.worst, which is 0: give it", "worst_as")
+    return keep
 
 
 def _limits(root: Section) -> Limits:

@@ -16,6 +16,7 @@ GRID, MORRIS, SALTELLI, LIST = "grid", "morris", "saltelli", "list"
 COUNTED = (RANDOM, LHS, SOBOL)  # samplers that take the number of cases; the others have their own
 EXTENDABLE = (RANDOM, SOBOL)  # whose cases stay when more are added
 NONE, FAILURES, ALL = "none", "failures", "all"
+DATA, BAG = "data", "bag"
 MOST_CASES = 100_000_000
 _LARGEST = 2**53  # from which on not every whole number is a double
 
@@ -88,8 +89,12 @@ _KEEP = MappingSpec(
     optional={
         "trajectories": text("50 Hz trajectories of which cases", (NONE, FAILURES, ALL)),
         "worst": ValueSpec(
-            "full data of that many worst cases of each law", minimum=0, maximum=1000, kind=int
+            "that many worst cases of each law in each scenario, run again at the end",
+            minimum=0,
+            maximum=1000,
+            kind=int,
         ),
+        "worst_as": text("as what: data, all arrays; bag, recorded over DDS, which needs ROS", (DATA, BAG)),
     },
 )
 _LIMITS = MappingSpec(

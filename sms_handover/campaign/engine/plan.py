@@ -2,23 +2,69 @@
 
 import tempfile
 from collections.abc import Iterator
+from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 
 from sms_handover.analysis.layout import Row, Section, layout
-from sms_handover.campaign.cases.case import Cases
+from sms_handover.campaign.cases.case import CaseResult, Cases
 from sms_handover.campaign.cases.case_metrics import known_metrics
 from sms_handover.campaign.cases.case_row import Row as CaseRow
 from sms_handover.campaign.cases.case_row import Status, Task
 from sms_handover.campaign.cases.retained import trajectory
-from sms_handover.campaign.definition.campaign_file import Campaign
+from sms_handover.campaign.definition.campaign_file import Campaign, Keep
 from sms_handover.campaign.definition.distributions import range_in_words
-from sms_handover.campaign.definition.fields import ALL, NONE
+from sms_handover.campaign.definition.fields import ALL, BAG, NONE
 from sms_handover.campaign.definition.frozen import Frozen, freeze
 from sms_handover.errors import ConfigurationError, UnknownNameError
+from sms_handover.run_data import RunData
+from sms_handover.simulation.save import write_arrays
 from sms_handover.simulation.scenario import load_scenario
 
 _S_PER_H = 3600.0  # [s/h]
 _MB = 1e6  # [byte]
+_BAG, _BAG_TICK = 133_000, 680  # [byte] of a bag without a tick, and of each of two arms with seven joints
+
+
+@dataclass
+class _Cost:
+    """What one case takes under all laws in all scenarios: CPU seconds, and bytes of what is kept of it."""
+
+    cpu: float = 0.0
+    row: int = 0
+    trajectory: int = 0
+    whole: int = 0
+
+    def add(self, result: CaseResult, keep: Keep) -> None:
+        """Count a run."""
+        self.cpu += result.beside.cpu
+        self.row += len(result.row.text)
+        if result.run is not None:
+            self.trajectory += len(trajectory(result.run)) if keep.trajectories != NONE else 0
+            self.whole += _size(result.run, keep) if keep.worst else 0
+
+    def in_words(self, cases: int, keep: Keep) -> str:
+        """Return what so many cases take."""
+        kept = min(keep.worst, cases)
+        said = [
+            f"CPU time about {(cases + kept) * self.cpu / _S_PER_H:.3g} h, by the first case",
+            f"journal about {cases * self.row / _MB:.3g} MB",
+        ]
+        if self.trajectory:
+            at_most = "" if keep.trajectories == ALL else ", if all fail"
+            said.append(f"trajectories {cases * self.trajectory / _MB:.3g} MB{at_most}")
+        if self.whole:
+            said.append(f"worst {kept} of each law as {keep.worst_as} {kept * self.whole / _MB:.3g} MB")
+        return "; ".join(said)
+
+
+def _size(run: RunData, keep: Keep) -> int:
+    """Return the bytes that a whole run takes as it is to be kept."""
+    if keep.worst_as == BAG:
+        return _BAG + _BAG_TICK * len(run.tick_ns)
+    stream = BytesIO()
+    write_arrays(run, stream)
+    return len(stream.getvalue())
 
 
 def plan_in_words(path: Path) -> str:
@@ -29,30 +75,22 @@ def plan_in_words(path: Path) -> str:
     """
     frozen, number = freeze(path)
     require_metrics(frozen, path)
+    cost = _Cost()
     with tempfile.TemporaryDirectory(prefix="sms_handover_check_") as folder:
         cases = Cases(frozen, number, Path(folder))
         campaign, count = cases.campaign, cases.samples.count
-        cpu, size, kept = 0.0, 0.0, 0.0
         for scenario in campaign.scenarios:
             for law in campaign.laws:
                 result = cases.run(Task(0, scenario, law))
                 _require_run(result.row, path)
-                cpu += result.beside.cpu
-                size += len(result.row.text)
-                kept += (
-                    len(trajectory(result.run)) if result.run and campaign.keep.trajectories != NONE else 0
-                )
+                cost.add(result, campaign.keep)
     runs = count * campaign.runs_per_case
-    at_most = "" if campaign.keep.trajectories == ALL else ", if all fail"
-    trajectories = f"; trajectories {count * kept / _MB:.3g} MB{at_most}" if kept else ""
+    table = Section("Drawn value", tuple(_draws(campaign)))
     lines = [
-        *layout(("distribution", "from 0.1 % to 99.9 %"), [Section("Drawn value", tuple(_draws(campaign)))])[
-            1:
-        ],
+        *layout(("distribution", "from 0.1 % to 99.9 %"), [table])[1:],
         "",
         f"{count} cases x {len(campaign.scenarios)} scenarios x {len(campaign.laws)} laws = {runs} runs",
-        f"CPU time about {count * cpu / _S_PER_H:.3g} h, by the first case; "
-        f"journal about {count * size / _MB:.3g} MB{trajectories}",
+        cost.in_words(count, campaign.keep),
     ]
     return "\n".join(lines)
 

@@ -1,11 +1,17 @@
 """Page of a campaign: one HTML document that needs no network, as that of runs is."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from os.path import relpath
+from pathlib import Path
+from urllib.parse import quote
 
 from sms_handover import __version__
 from sms_handover.campaign.cases.case import in_words, inputs_in_words
 from sms_handover.campaign.cases.case_metrics import USUAL
 from sms_handover.campaign.cases.case_row import Row
+from sms_handover.campaign.cases.retained import worst_path
+from sms_handover.campaign.definition.campaign_file import Campaign
 from sms_handover.campaign.page.campaign_plots import campaign_plots
 from sms_handover.campaign.record.campaign_folder import CampaignFolder
 from sms_handover.campaign.statistics.case_columns import Group, columns_of
@@ -36,15 +42,23 @@ class Headed:
 
 @dataclass(frozen=True)
 class CaseLine:
-    """A case in a list: what came of it, its draws, and the command that runs it again."""
+    """A case in a list: what came of it, its draws, and the command that runs it again.
+
+    ``link`` leads from the page to ``kept``, the path of its whole run; both are '' where it is not kept.
+    """
 
     text: str
     inputs: str
     command: str
+    link: str = ""
+    kept: str = ""
 
 
-def campaign_page(folder: CampaignFolder) -> str:
-    """Return the page of a campaign folder; raises MissingDependencyError without what it needs."""
+def campaign_page(folder: CampaignFolder, place: Path | None = None) -> str:
+    """Return the page of a campaign folder, with links for a page in ``place``, by default that folder.
+
+    Raises MissingDependencyError without what it needs.
+    """
     campaign, entries = folder.campaign, list(folder.entries())
     columns = columns_of(entries)
     plots = campaign_plots(campaign, columns)
@@ -67,7 +81,7 @@ def campaign_page(folder: CampaignFolder) -> str:
         runs=[Headed(style) for style in run_styles(campaign.laws, campaign.laws)],
         sections=outcome_sections(campaign, columns),
         causes=[(*cause, times) for cause, times in causes],
-        worst=_worst(folder, worst_of(entries, campaign.worst_by, _WORST)),
+        worst=[*_worst(folder, worst_of(entries, campaign.worst_by, _count(campaign)), place or folder.path)],
         worst_by=campaign.worst_by,
         tables=[*([(TEST_HEAD, paired)] if paired else []), *sensitivity_sections(campaign, columns)],
         plots=plots,
@@ -79,19 +93,24 @@ def campaign_page(folder: CampaignFolder) -> str:
     )
 
 
-def _worst(folder: CampaignFolder, found: dict[Group, list[Row]]) -> list[CaseLine]:
-    """Return the worst cases of each law."""
+def _count(campaign: Campaign) -> int:
+    """Return how many of the worst cases of each law are listed: those that are kept at least."""
+    return max(_WORST, campaign.keep.worst)
+
+
+def _worst(folder: CampaignFolder, found: dict[Group, list[Row]], place: Path) -> Iterator[CaseLine]:
+    """Yield the worst cases of each law; links lead from a page in ``place``."""
     path, metric = folder.path, folder.campaign.worst_by
     one_scenario = len(folder.campaign.scenarios) == 1
-    return [
-        CaseLine(
-            in_words(row, metric),
-            inputs_in_words(row.inputs),
-            rerun_command(str(path), row.task, one_scenario=one_scenario),
-        )
-        for rows in found.values()
-        for row in rows
-    ]
+    for rows in found.values():
+        for row in rows:
+            kept = worst_path(path, folder.campaign.keep, row.task)
+            yield CaseLine(
+                in_words(row, metric),
+                inputs_in_words(row.inputs),
+                rerun_command(str(path), row.task, one_scenario=one_scenario),
+                *((quote(relpath(kept, place)), str(kept)) if kept.exists() else ()),
+            )
 
 
 def _draws(folder: CampaignFolder) -> list[tuple[str, str]]:

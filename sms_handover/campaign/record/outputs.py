@@ -1,49 +1,38 @@
-"""Outputs of a campaign folder that are made of its journal: table, full data of the worst cases, page."""
+"""Outputs of a campaign folder that are made of its journal: table, page, and the worst cases whole."""
 
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from sms_handover.campaign.cases.case import Cases
-from sms_handover.campaign.cases.retained import FULL, file_of
 from sms_handover.campaign.page.campaign_page import PAGE, campaign_page
 from sms_handover.campaign.record.campaign_folder import CampaignFolder
 from sms_handover.campaign.record.cases_table import TABLE, write_table
-from sms_handover.campaign.statistics.worst_cases import worst_of
+from sms_handover.campaign.record.kept_cases import Record, keep_worst
+from sms_handover.campaign.record.output import Output
 from sms_handover.errors import MissingDependencyError
-from sms_handover.simulation.save import save_run
 
 
-def write_outputs(path: Path) -> Iterator[str]:
-    """Write table, data and page of a folder; yield a line on each, also on what could not be made."""
+def write_outputs(path: Path, record: Record | None) -> Iterator[Output]:
+    """Write table, page and worst cases of a folder; yield a line on each, also on what could not be made.
+
+    Table and page come first, as whoever waits for the worst cases may interrupt; then the page has links to
+    those. ``record`` makes their bags, None where there is no ROS.
+    """
     folder = CampaignFolder(path)
     try:
         rows = write_table(path / TABLE, folder.entries())
-        yield f"{path / TABLE}: {rows} rows"
+        yield Output(f"{path / TABLE}: {rows} rows")
     except MissingDependencyError as error:
-        yield f"{TABLE} is not written: {error}"
-    yield from _worst(folder)
+        yield Output(f"{TABLE} is not written: {error}")
+    is_written = False
     try:
         (path / PAGE).write_text(campaign_page(folder), encoding="utf-8")
-        yield f"{path / PAGE}: open it in a browser"
+        is_written = True
+        yield Output(f"{path / PAGE}: open it in a browser")
     except MissingDependencyError as error:
-        yield f"{PAGE} is not written: {error}"
-
-
-def _worst(folder: CampaignFolder) -> Iterator[str]:
-    """Run the worst cases of each law again and keep all of their data."""
-    campaign = folder.campaign
-    if not campaign.keep.worst:
-        return
-    chosen = worst_of(folder.entries(), campaign.worst_by, campaign.keep.worst)
-    tasks = [row.task for rows in chosen.values() for row in rows]
-    missing = [task for task in tasks if not file_of(folder.path, FULL, task).exists()]
-    with tempfile.TemporaryDirectory(prefix="sms_handover_worst_") as scratch:
-        cases = Cases(folder.frozen, folder.manifest.cases, Path(scratch))
-        for task in missing:
-            run = cases.run(task).run
-            if run is not None:
-                (folder.path / FULL).mkdir(exist_ok=True)
-                save_run(run, file_of(folder.path, FULL, task))
-    if missing:
-        yield f"{folder.path / FULL}: all data of {len(missing)} worst cases"
+        yield Output(f"{PAGE} is not written: {error}")
+    kept = list[Output]()
+    for output in keep_worst(folder, record):
+        kept.append(output)
+        yield output
+    if is_written and kept:
+        (path / PAGE).write_text(campaign_page(folder), encoding="utf-8")

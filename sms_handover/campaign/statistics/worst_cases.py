@@ -9,7 +9,7 @@ from shlex import quote
 from sms_handover.campaign.cases.case_row import Row, Task
 from sms_handover.campaign.record.journal import Entry
 
-_NUMBER = re.compile(r"0x[0-9a-f]+|-?\d+(\.\d+)?(e[-+]?\d+)?")
+_NUMBER = re.compile(r"(?<![\w.])(0x[0-9a-f]+|-?\d+(\.\d+)?(e[-+]?\d+)?)")  # not those of names: joint_3
 Group = tuple[str, str]  # scenario and law
 
 
@@ -41,7 +41,7 @@ def failures_by_cause(entries: Iterable[Entry]) -> Counter[tuple[str, str, str]]
 
 
 def cause_of(row: Row) -> str:
-    """Return the cause of a row with its numbers left out, so that like cases have like causes."""
+    """Return the cause of a row with numbers left out but in names, so that like cases have like causes."""
     return _NUMBER.sub("#", row.cause)
 
 

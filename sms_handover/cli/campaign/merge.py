@@ -4,8 +4,8 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from sms_handover.campaign.record.campaign_folder import merge
-from sms_handover.campaign.record.outputs import write_outputs
 from sms_handover.campaign.statistics.stop_rule import stopped_at
+from sms_handover.cli.campaign.outputs import tell_outputs
 from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
 
 
@@ -16,7 +16,8 @@ def add_parser(parser: ArgumentParser) -> None:
         "Two rows of one case must be equal."
     )
     parser.epilog = (
-        "exit codes: 0 every case has a row; 1 it cannot be written; 2 wrong input; 3 cases are missing"
+        "exit codes: 0 every case has a row; 1 it cannot be written; 2 wrong input; 3 cases are missing, or "
+        "not every worst case could be kept; 130 interrupted"
     )
     parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER", help="folder of a campaign")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="FOLDER", help="new folder")
@@ -27,7 +28,6 @@ def command(options: Namespace) -> int:
     with merge(options.output, options.folders) as merged:
         entries = list(merged.entries())
         there, total = len(entries), merged.runs(stopped_at(merged.campaign, merged.cases, entries))
-    print(f"{there} of {total} rows")
-    for line in write_outputs(options.output):
-        print(line)
-    return EXIT_OK if there >= total else EXIT_LOSS
+        print(f"{there} of {total} rows", flush=True)
+        is_whole = tell_outputs(options.output)
+    return EXIT_OK if there >= total and is_whole else EXIT_LOSS

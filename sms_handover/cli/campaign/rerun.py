@@ -11,7 +11,7 @@ from sms_handover.bag.run.reader import read_run
 from sms_handover.campaign.cases.case import Cases, in_words, inputs_in_words
 from sms_handover.campaign.cases.case_row import Row, Task
 from sms_handover.campaign.record.campaign_folder import CampaignFolder
-from sms_handover.cli.exit_codes import EXIT_FAILED, EXIT_OK
+from sms_handover.cli.exit_codes import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_LOSS, EXIT_OK
 from sms_handover.errors import ConfigurationError, UnknownNameError
 from sms_handover.launcher.run_folder import bag_of
 from sms_handover.simulation.save import save_run
@@ -24,7 +24,13 @@ def add_parser(parser: ArgumentParser) -> None:
         "Run one case of a campaign again, in this process, and compare it with its row, bit for bit. With\n"
         "--bag run it as a graph of ROS 2 nodes and record it; with --view show the recording too."
     )
-    parser.epilog = "exit codes: 0 equal to its row, or there is none yet; 1 it differs; 2 wrong input"
+    parser.epilog = (
+        "examples:\n"
+        "  sms-handover campaign rerun runs/laws 17 --law pid -o case_17.npz\n"
+        "  sms-handover campaign rerun runs/laws 17 --law pid --bag -o runs/case_17 --view\n\n"
+        "exit codes: 0 equal to its row, or there is none yet; 1 it differs; 2 wrong input; 3 messages are\n"
+        "missing in the bag; 130 interrupted"
+    )
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="folder of a campaign")
     parser.add_argument("case", type=int, metavar="CASE", help="number of the case, from 0")
     parser.add_argument("--law", metavar="LAW", help="control law (default: the first of the campaign)")
@@ -97,7 +103,9 @@ def _recorded(options: Namespace, cases: Cases, task: Task, row: Row | None, scr
         words += ["-p", f"{path}:={json.dumps(value)}"]
     parser = ArgumentParser(prog="sms-handover run")
     run.add_parser(parser)
-    run.command(parser.parse_args(words))
+    ended = int(run.command(parser.parse_args(words)))
+    if ended in (EXIT_LOSS, EXIT_INTERRUPTED):  # any other is of the mission, which may fail as in its row
+        return ended
     equal = row is not None and run_digest(read_run(bag_of(options.output))) == row.run_digest
     code = _told(row, equal)
     if options.view:

@@ -2,20 +2,21 @@
 
 import sys
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import monotonic
-from typing import Any
 
-from sms_handover.campaign.definition.fields import MOST_CASES
+from sms_handover.campaign.definition.fields import BAG, MOST_CASES
 from sms_handover.campaign.definition.frozen import campaign_path, freeze
 from sms_handover.campaign.engine.choice import workers_for
 from sms_handover.campaign.engine.plan import require_metrics
 from sms_handover.campaign.engine.run import Tally, run_campaign
 from sms_handover.campaign.engine.scheduler_url import require_safe
-from sms_handover.campaign.record.campaign_folder import open_campaign
+from sms_handover.campaign.engine.workers import Workers
+from sms_handover.campaign.record.campaign_folder import OpenCampaign, open_campaign
 from sms_handover.campaign.record.manifest import MANIFEST, Shard, read_manifest, shard_of
-from sms_handover.campaign.record.outputs import write_outputs
-from sms_handover.cli.exit_codes import EXIT_INTERRUPTED, EXIT_OK
+from sms_handover.cli.campaign.outputs import has_ros, tell_outputs
+from sms_handover.cli.exit_codes import EXIT_INTERRUPTED, EXIT_LOSS, EXIT_OK
 from sms_handover.errors import ConfigurationError
 from sms_handover.terminal.progress import Progress
 
@@ -28,14 +29,16 @@ def add_parser(parser: ArgumentParser) -> None:
     parser.description = (
         "Run all cases of a campaign that its folder lacks. Each finished case is on disk before it counts,\n"
         "so the same command goes on after Ctrl-C, a crash, or a full disk. Results depend neither on the\n"
-        "number of workers nor on the order of cases."
+        "number of workers nor on the order of cases. Then table and page are written, and the worst cases\n"
+        "run again, as 'keep' in the file says."
     )
     parser.epilog = (
         "examples:\n"
         "  sms-handover campaign run laws -j 2\n"
         "  sms-handover campaign run laws -j 2 --cases 500    more cases; those that are there stay\n"
         "  sms-handover campaign run laws --shard 3/100       every 100th case, for a batch system\n\n"
-        "exit codes: 0 every case has a row; 1 it could not go on; 2 wrong input; 130 interrupted"
+        "exit codes: 0 every case has a row; 1 it could not go on; 2 wrong input; 3 every case has a row,\n"
+        "but not every worst case could be kept; 130 interrupted"
     )
     parser.add_argument("file", metavar="FILE", help="campaign file, or the name of a shipped campaign")
     parser.add_argument(
@@ -91,32 +94,40 @@ def command(options: Namespace) -> int:
             f"--cases is {options.cases}, must be >= {known}, which {folder} was made for: cases are only "
             "added; choose another folder with --output"
         )
-    with open_campaign(folder, frozen, cases, shard) as opened, Progress() as progress:
-        if known > (cases or known):
-            progress.print(f"{folder} has {known} cases, as was asked for before, not {cases}")
-        for fault in opened.faults:
-            progress.print(fault)
-        for difference in opened.manifest.differences:
-            progress.print(f"sessions differ in {difference}: rows are equal bit for bit on equal ones only")
-        shown = _Shown(progress)
-
-        def make() -> Any:
-            return workers_for(frozen, opened.manifest.cases, jobs=options.jobs, scheduler=options.scheduler)
-
+    with open_campaign(folder, frozen, cases, shard) as opened:
         try:
-            tally = run_campaign(opened, make, shown)
+            with Progress() as progress:
+                if known > (cases or known):
+                    progress.print(f"{folder} has {known} cases, as was asked for before, not {cases}")
+                progress.print(*_notices(opened))
+                tally = run_campaign(opened, _maker(options, opened), _Shown(progress))
+                progress.show(*_words(tally, ""), 1.0)
+            if tally.stopped_at:
+                print(f"stopped after {tally.stopped_at} cases: every interval is narrow enough")
+            for group in tally.groups:
+                share = tally.proportion(group)
+                print(f"{group[0]} under {group[1]}: success {share} of {tally.rows[group]} cases")
+            is_whole = tell_outputs(folder)
         except KeyboardInterrupt:
-            progress.stay()
-            print(f"interrupted: the same command goes on; rows are in {folder}", file=sys.stderr)
+            print(f"interrupted: the same command goes on; what is there is in {folder}", file=sys.stderr)
             return EXIT_INTERRUPTED
-        progress.show(*_words(tally, ""), 1.0)
-    if tally.stopped_at:
-        print(f"stopped after {tally.stopped_at} cases: every interval is narrow enough")
-    for group in tally.groups:
-        print(f"{group[0]} under {group[1]}: success {tally.proportion(group)} of {tally.rows[group]} cases")
-    for line in write_outputs(folder):
-        print(line)
-    return EXIT_OK
+    return EXIT_OK if is_whole else EXIT_LOSS
+
+
+def _notices(opened: OpenCampaign) -> Iterator[str]:
+    """Yield what is to be known of a folder before it goes on."""
+    yield from opened.faults
+    for difference in opened.manifest.differences:
+        yield f"sessions differ in {difference}: rows are equal bit for bit on equal ones only"
+    keep = opened.campaign.keep
+    if keep.worst_as == BAG and opened.manifest.shard.of == 1 and not has_ros():
+        yield "keep.worst_as is bag, and ROS is not installed here: there will be no bags of the worst cases"
+
+
+def _maker(options: Namespace, opened: OpenCampaign) -> Callable[[], Workers]:
+    """Return what makes the workers that the options ask for."""
+    frozen, cases = opened.frozen, opened.manifest.cases
+    return lambda: workers_for(frozen, cases, jobs=options.jobs, scheduler=options.scheduler)
 
 
 class _Shown:

@@ -5,6 +5,8 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from sms_handover.campaign.cases.case import in_words, inputs_in_words
+from sms_handover.campaign.cases.case_row import Row
+from sms_handover.campaign.cases.retained import worst_path
 from sms_handover.campaign.record.campaign_folder import CampaignFolder
 from sms_handover.campaign.record.journal import JOURNAL, JournalFaults
 from sms_handover.campaign.statistics.proportion import proportion
@@ -55,18 +57,22 @@ def command(options: Namespace) -> int:
             numeric = sum(row.numeric_failure for row in rows)
             table.append((scenario, law, str(len(rows)), str(successes), str(numeric)))
     print(columns([head, *table]))
-    one_scenario = len(campaign.scenarios) == 1
+    one_scenario, listed = len(campaign.scenarios) == 1, list[Row]()
     if options.failed:
         causes = failures_by_cause(entries).most_common()
         print(
             "\n"
             + columns([("law", "status", "times", "cause"), *((a, b, str(n), c) for (a, b, c), n in causes)])
         )
-        for row in list(failed(entries))[:_MOST]:
-            print(f"\n{in_words(row, campaign.worst_by)}\n  {inputs_in_words(row.inputs)}")
-            print(f"  {rerun_command(str(folder.path), row.task, one_scenario=one_scenario)}")
-    for rows in (worst_of(entries, campaign.worst_by, options.worst) if options.worst else {}).values():
-        for row in rows:
-            print(f"\n{in_words(row, campaign.worst_by)}\n  {inputs_in_words(row.inputs)}")
-            print(f"  {rerun_command(str(folder.path), row.task, one_scenario=one_scenario)}")
+        listed = list(failed(entries))[:_MOST]
+    elif options.worst:
+        listed = [
+            row for rows in worst_of(entries, campaign.worst_by, options.worst).values() for row in rows
+        ]
+    for row in listed:
+        print(f"\n{in_words(row, campaign.worst_by)}\n  {inputs_in_words(row.inputs)}")
+        print(f"  {rerun_command(str(folder.path), row.task, one_scenario=one_scenario)}")
+        kept = worst_path(folder.path, campaign.keep, row.task)
+        if kept.exists():
+            print(f"  kept whole: {kept}")
     return EXIT_OK if len(entries) >= total else EXIT_LOSS
