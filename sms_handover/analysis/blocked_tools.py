@@ -1,4 +1,4 @@
-"""Blocked tools: those that a limit of a predictive law keeps from their targets at the end of a phase."""
+"""Blocked tools: those off their targets at the end of a phase while a limit of a predictive law binds."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sms_handover.analysis.settling import steady_rows
-from sms_handover.analysis.tracking import ToolTracking
+from sms_handover.analysis.tracking import Motion, ToolTracking
 from sms_handover.plan_report import PlanReport
 
 _BLOCKING = ("distance ", "position of ", "base attitude ")  # rows of places; those of rates only slow down
@@ -25,12 +25,12 @@ class BlockedTool:
 
 
 def blocked_tools(plans: Sequence[PlanReport], tools: Iterable[ToolTracking]) -> tuple[BlockedTool, ...]:
-    """Return the tools that end a phase outside their settling bands while a limit binds.
+    """Return the tools that are to move and end a phase outside their settling bands while a limit binds.
 
     It is the row of distances, joint positions or the base's attitude that binds in most solves of the last
     tenth of the phase, and in at least half of them.
     """
-    off = [tool for tool in tools if tool.final_error > tool.band]
+    off = [tool for tool in tools if tool.motion is not Motion.HOLD and tool.final_error > tool.band]
     rows = [_lasting_row(plans, tool) for tool in off]
     return tuple(
         BlockedTool(tool.phase.name, tool.arm, row, tool.final_error)

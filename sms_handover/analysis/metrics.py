@@ -71,7 +71,7 @@ class RunMetrics:
 
     @property
     def blocked(self) -> tuple[BlockedTool, ...]:
-        """The tools that a limit of a predictive law keeps from their targets at the end of a phase."""
+        """The tools off their targets at the end of a phase while a limit of a predictive law binds."""
         tools = [tool for item in self.phases for tool in item.tools.values()]
         return blocked_tools(self.run.plans, tools)
 

@@ -43,10 +43,10 @@ def plan_sections(runs: Sequence[RunMetrics]) -> tuple[Section, ...]:
 
 
 def _blocked_rows(runs: Sequence[RunMetrics]) -> list[Row]:
-    """Return how far tools are off that a limit keeps from their targets at the end of a phase, if any is."""
+    """Return how far tools are off their targets at the end of a phase while a limit binds, if any is."""
     by_run = [{(item.phase, item.arm, item.row): item.error for item in run.blocked} for run in runs]
     keys = dict.fromkeys(key for errors in by_run for key in errors)
-    rows = [Row("tools that a limit keeps from their targets at the end of a phase [mm]")] if keys else []
+    rows = [Row("tools off their targets at the end of a phase while a limit binds [mm]")] if keys else []
     for key in keys:
         phase, arm, name = key
         cells = tuple(f"{errors[key] * MM_PER_M:.4g}" if key in errors else MISSING for errors in by_run)
