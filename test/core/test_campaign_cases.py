@@ -141,9 +141,10 @@ def test_a_draw_that_no_scenario_can_have_is_a_row(tmp_path: Path) -> None:
 
 
 def test_a_mission_failure_is_no_numeric_failure(tmp_path: Path) -> None:
-    row = cases_of(tmp_path, success="complete").run(TASK).row
+    row = cases_of(tmp_path, success="complete", worst_by="approach.arm_a.final_error").run(TASK).row
     assert (row.status, row.numeric_failure, row.mission_failure) == (Status.MISSION_FAILED, False, True)
     assert row.cause.startswith("ended at 0.04 s") and row.run_digest
+    assert "approach.arm_a.final_error" in row.metrics, "or no case could be the worst"
 
 
 def test_a_run_without_a_plan_is_a_failed_mission_with_its_cause(

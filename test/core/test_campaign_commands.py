@@ -184,9 +184,15 @@ def test_where_there_is_no_ros_bags_are_left_for_later(
     monkeypatch.setattr("sms_handover.cli.campaign.outputs.record_case", interrupt)
     assert main(["campaign", "run", file, "-o", str(out)]) == 130
     assert "interrupted: the same command goes on" in capsys.readouterr().err
+    merged = tmp_path / "merged"
+    assert main(["campaign", "merge", str(out), "-o", str(merged)]) == 130
+    told = re.search(r"'sms-handover (.*)' goes on", capsys.readouterr().err)
+    makes = "sms_handover.cli.campaign.outputs.record_case"
+    monkeypatch.setattr(makes, lambda folder, task, output: output.mkdir())
+    assert told and main(shlex.split(told[1])) == 0 and len(list((merged / "bags").iterdir())) == 2
     run_here(Path(file), tmp_path / "part", shard=Shard(1, 2), program=STUB)
-    (told,) = keep_worst(CampaignFolder(tmp_path / "part"), None)
-    assert "'campaign merge' keeps them" in told.text and not (tmp_path / "part" / "bags").exists()
+    (output,) = keep_worst(CampaignFolder(tmp_path / "part"), None)
+    assert "'campaign merge' keeps them" in output.text and not (tmp_path / "part" / "bags").exists()
 
 
 def test_an_interrupted_recording_ends_with_all_that_it_has_started(
@@ -306,11 +312,12 @@ def test_merge_takes_the_rows_and_makes_the_rest(finished: Path, tmp_path: Path)
 
 
 def test_check_tells_draws_and_cost(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = written(tmp_path, cases=10_000, metrics=["approach.arm_a.final_error"])
+    file = written(tmp_path, cases=10_000, metrics=["approach.arm_a.final_error"], sampler="sobol")
     assert main(["check", str(file)]) == 0
     said = capsys.readouterr().out
     assert "normal, mean 240, std 12" in said and "202.917 to 277.083" in said
     assert "10000 cases x 1 scenarios x 1 laws = 10000 runs" in said and "CPU time about " in said
+    assert "sobol spreads powers of two evenly: take 8192 or 16384 cases" in said
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,9 @@ import pytest
 from scipy.stats import binom
 from statsmodels.stats.proportion import proportion_confint
 
+from sms_handover.campaign.cases.case_row import Beside, Row, Status, Task
 from sms_handover.campaign.definition.campaign_file import Campaign, read_campaign
+from sms_handover.campaign.record.journal import Entry
 from sms_handover.campaign.sampling.samples import Samples
 from sms_handover.campaign.statistics.case_columns import CaseColumns
 from sms_handover.campaign.statistics.holm import holm
@@ -20,6 +22,7 @@ from sms_handover.campaign.statistics.percentiles import percentile
 from sms_handover.campaign.statistics.proportion import proportion
 from sms_handover.campaign.statistics.sensitivity import sensitivities
 from sms_handover.campaign.statistics.tables import outcome_sections, sensitivity_sections
+from sms_handover.campaign.statistics.worst_cases import worst_of
 
 from .campaigns import written
 
@@ -74,6 +77,16 @@ def test_laws_are_compared_case_by_case() -> None:
     assert error.p == pytest.approx(2.0 ** (1 - 32), rel=1e-6)  # every difference has the same sign
     assert error.difference == pytest.approx(-0.3, abs=0.02)
     assert [error.adjusted, success.adjusted] == pytest.approx([2 * error.p, success.p])
+
+
+@pytest.mark.parametrize(("metric", "worst"), [("grasp_error", [3, 2]), ("clearance", [0, 1])])
+def test_the_worst_are_the_largest_or_of_clearance_the_smallest(metric: str, worst: list[int]) -> None:
+    rows = [
+        Row(Task(case, "s", "a"), 1, {}, Status.SUCCEEDED, "", {metric: value}, "00")
+        for case, value in enumerate((0.1, 0.2, 0.3, 0.4, None))
+    ]
+    found = worst_of([Entry(row, Beside(0.0, 0.0, "")) for row in rows], metric, 2)
+    assert [row.task.case for row in found["s", "a"]] == worst
 
 
 def test_only_cases_that_both_laws_have_are_paired() -> None:

@@ -116,7 +116,8 @@ class Cases:
         run = recorder.data(loop.base_wrenches, loop.applied)
         if not _is_finite(run):
             return Status.NUMERIC_FAILURE, "numbers that are not finite", None
-        found, lacking = metrics_of(run, scenario, (*campaign.metrics, *campaign.success.names))
+        further = (*campaign.metrics, *campaign.success.names, campaign.worst_by)
+        found, lacking = metrics_of(run, scenario, further)
         metrics.update(found)
         if campaign.success.holds(metrics):
             return Status.SUCCEEDED, "", run
