@@ -11,12 +11,13 @@ TEST_WORKERS ?= 2
 MEASURED := build/verification
 CORE := first_edition.py save.py yaml_reader.py robot_model.py reduced_dynamics.py ik.py bag_reader.py bag_writer.py \
         export.py cli_figures.py 'compiled_dynamics.py::test_a_step_is_that_of_pinocchio[shipped-rk4]'
+CONDITIONS := $(addprefix test/core/test_,joint_effects.py wrenches.py panels.py sensors.py conditions.py)
 SITE := build/docs/html
 
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint .ci/constraints.txt
 OPTIMA = OPENBLAS_NUM_THREADS=1 $(VENV)-crocoddyl/bin/python -m pytest -q -p no:cacheprovider test/verification/test_crocoddyl.py
-MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification --evidence $(MEASURED)/evidence.json
+MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest test/verification $(CONDITIONS) --evidence $(MEASURED)/evidence.json
 
 # The environment stands alone: what a sourced ROS workspace or another environment exports must not leak in.
 unexport PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE

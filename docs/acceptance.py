@@ -7,13 +7,16 @@ import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from math import inf, nan
+from math import inf, isnan, nan
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from docs.tables import table
+from sms_handover.analysis.clearance import TaskTexts, run_clearance
+from sms_handover.analysis.completion import completion
+from sms_handover.configuration.scenario_file import scenario_names
 from sms_handover.errors import NoPlanError
 from sms_handover.plan_report import PlanStatus
 from sms_handover.run_data import RunData
@@ -30,7 +33,6 @@ TICK = 0.004  # [s], four times the shipped one, to save time
 SLOW = 0.005  # [s], of which the periods of the sensors of nominal conditions are multiples
 GRASPED = 40.1  # [s], just after the transfer of the scenarios that are cut off there
 BOUND = 30.0  # [s], beyond the middle of the second motion of `tight`: all of its limits have bound by then
-SCENARIOS = ("paper", "smooth", "massive", "tumbling", "tight")
 SEEDS = range(1, 21)
 OBSERVER = {"controller.disturbance_bandwidth": 20.0}  # 1/s
 _VISCOUS, _DRY = 2.0, 2.5  # N m s/rad, N m: the friction of the Gen3, see docs/conditions.md
@@ -41,10 +43,11 @@ Values = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a run: distances at grasps in mm, whether all is done, peaks, and what plans told."""
+    """What came of a run: distances at grasps in mm, what it lacks of its task, peaks, and what plans say."""
 
     grasps: tuple[float, ...]
-    complete: bool
+    grasped: bool
+    lacks: tuple[str, ...]
     joint_rate: float  # rad/s
     base_rate: float  # rad/s
     distance: float  # m, least, between bodies that are not of one arm, without the deputy
@@ -88,7 +91,7 @@ IMPOSSIBLE = {"controller.least_distance": 0.3}  # m, where the arms begin neare
 def cases() -> Iterator[tuple[str, str, Values]]:
     """Return all runs: a name, a scenario and values over it."""
     mpc = {"law": "mpc", "common.tick": TICK}
-    for name in SCENARIOS:
+    for name in scenario_names():
         yield f"scenario {name}", name, mpc
     begun = {**mpc, "common.duration": BOUND}
     yield "wrong model", "tight", {**begun, **WRONG}
@@ -116,12 +119,14 @@ def outcome_of(scenario: Scenario) -> Outcome:
     try:
         run = simulate(scenario)
     except NoPlanError as error:
-        return Outcome((), False, nan, nan, nan, 0, str(error))
-    events = run.grasp_events
+        return Outcome((), False, (str(error),), nan, nan, nan, 0, str(error))
+    events, truth = run.grasp_events, scenario.truth
     held = [event.status is GraspStatus.SUCCEEDED for event in events]
+    clearance = run_clearance(run, TaskTexts(truth.robot.urdf, truth.schedule.text))
     return Outcome(
-        tuple(event.position_error * MM_PER_M for event in events),
+        tuple(event.position_error * MM_PER_M for event in events if not isnan(event.position_error)),
         bool(held) and all(held) and not any(phase.failed for phase in run.phases),
+        completion(run, clearance).shortfalls,
         float(np.abs(run.joint_velocity).max()),
         float(np.abs(run.base_twist[:, 3:]).max()),
         _least_distance(scenario, run),
@@ -156,17 +161,17 @@ def measured(wanted: str) -> dict[str, Outcome]:
             file.write_text(json.dumps(asdict(outcome), indent=1) + "\n", encoding="utf-8")
             print(name, outcome, flush=True)
         content = json.loads(file.read_text(encoding="utf-8"))
-        found[name] = Outcome(**{**content, "grasps": tuple(content["grasps"])})
+        found[name] = Outcome(**{**content, **{key: tuple(content[key]) for key in ("grasps", "lacks")}})
     return found
 
 
 def section(found: Mapping[str, Outcome]) -> str:
     """Return the text of the section."""
     limits = load_scenario("tight").parameters.controller
-    by_name = ("Scenario", "Grasp, transfer [mm]", "Completes", "Solves without a plan")
+    by_name = ("Scenario", "Grasp and transfers [mm]", "Completes", "Solves without a plan")
     completed = [
-        (f"`{name.removeprefix('scenario ')}`", _grasps(one), _yes(one), str(one.without_plan))
-        for name, one in _of(found, [f"scenario {name}" for name in SCENARIOS])
+        (f"`{name.removeprefix('scenario ')}`", _grasps(one), _completes(one), str(one.without_plan))
+        for name, one in _of(found, [f"scenario {name}" for name in scenario_names()])
     ]
     kept = (
         "`tight`",
@@ -213,7 +218,7 @@ task cannot meet, `-p controller.least_distance:={room:g}`, ends the run with
 > {impossible}
 
 Under `nominal` conditions, with the observer ({observer:g} 1/s) and tick and delay of {SLOW * 1e3:g} ms,
-`mpc` makes both grasps of `smooth` for {sum(one.complete for one in seeds)} of {len(seeds)} seeds,
+`mpc` makes both grasps of `smooth` for {sum(one.grasped for one in seeds)} of {len(seeds)} seeds,
 within {worst:.2f} mm.
 
 Shares of the friction of the Gen3 ([conditions](conditions.md)) alone, in `smooth`, with tolerances opened;
@@ -238,8 +243,8 @@ def _missed(one: Outcome) -> str:
     return f"**{text}**" if not one.worst <= 10.0 else text
 
 
-def _yes(one: Outcome) -> str:
-    return "yes" if one.complete else "no"
+def _completes(one: Outcome) -> str:
+    return f"no: {one.lacks[0]}" if one.lacks else "yes"
 
 
 def with_section(page: str, text: str) -> str:

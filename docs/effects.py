@@ -1,8 +1,10 @@
 """Effects of conditions, each alone on the shipped task: writes a section of docs/conditions.md."""
 
+import os
 from collections.abc import Iterable, Mapping
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from math import nan
+from math import inf, isnan, nan
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +17,15 @@ import numpy as np
 
 from docs.tables import table
 from sms_handover.analysis.signals import base_rotation
+from sms_handover.errors import NoPlanError
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.units import DEG_PER_RAD, MM_PER_M
 
 PAGE = Path(__file__).resolve().parent / "conditions.md"
 PICTURE = PAGE.parent / "images" / "effects.svg"
-LAWS = ("nmpc", "pid")
+COLOURS = {"nmpc": "#0072b2", "pid": "#d55e00", "mpc": "#009e73"}
+LAWS = tuple(COLOURS)
 TICK = 0.004  # [s], four times the shipped one, to save time: noise has the same density
 ROTOR = 0.31  # [kg m^2], that of the shipped conditions
 _OPEN = {  # tolerances at which every grasp holds, so that every effect is followed to the end
@@ -111,7 +115,13 @@ class Effect:
         """Whether both grasps would have held with the shipped tolerances."""
         parameters = load_scenario("smooth").parameters.plant
         far, askew = parameters.grasp_position_tolerance, parameters.grasp_angle_tolerance
-        return max(self.distances) <= far * MM_PER_M and max(self.angles) <= askew * DEG_PER_RAD
+        return self.farther <= far * MM_PER_M and max(self.angles) <= askew * DEG_PER_RAD
+
+    @property
+    def farther(self) -> float:
+        """The larger distance of both grasps, infinite without a grasp."""
+        distance = max(self.distances)
+        return inf if isnan(distance) else distance
 
 
 def effect_of(name: str, law: str) -> Effect:
@@ -121,7 +131,10 @@ def effect_of(name: str, law: str) -> Effect:
     values |= {f"conditions.{name}": value for name, value in conditions.items()}
     if "sensors" in conditions:
         values["source"] = "measured"
-    run = simulate(load_scenario(scenario, {"common.tick": TICK, **values}))
+    try:
+        run = simulate(load_scenario(scenario, {"common.tick": TICK, **values}))
+    except NoPlanError:
+        return Effect((nan,), (nan,), nan)
     events = run.grasp_events
     return Effect(
         tuple(event.position_error * MM_PER_M for event in events) or (nan,),
@@ -140,7 +153,7 @@ This section is written by `make effects`. The smooth handover with rotors of {R
 grasp and at the transfer, the angle is the larger one of both, the base its largest turn. Tolerances are
 opened, so that each effect is followed to the end, and the loop goes by sensors where there are any;
 **bold** is where a grasp would have missed (10 mm, 2 degrees). Sorted by the larger distance under the
-better law.
+best law. `mpc` has no observer here: [control](control.md) tells what one gains.
 
 ![The effects, ranked](images/effects.svg)
 
@@ -156,6 +169,8 @@ def with_section(page: str, text: str) -> str:
 
 def _cell(effect: Effect) -> str:
     """Return an effect as text, bold where a grasp would miss."""
+    if isnan(effect.turn):
+        return "**no plan**"
     distances = ", ".join(f"{mm:.2f}" for mm in effect.distances)
     text = f"{distances}; {max(effect.angles):.2f}; {effect.turn:.2f}"
     return text if effect.holds else f"**{text}**"
@@ -163,18 +178,18 @@ def _cell(effect: Effect) -> str:
 
 def _ranked(found: Mapping[str, Mapping[str, Effect]]) -> list[tuple[str, Mapping[str, Effect]]]:
     """Return effects, the one that costs most first, by the larger distance under the better law."""
-    return sorted(found.items(), key=lambda item: -min(max(one.distances) for one in item[1].values()))
+    return sorted(found.items(), key=lambda item: -min(one.farther for one in item[1].values()))
 
 
 def draw(found: Mapping[str, Mapping[str, Effect]], file: Path) -> None:
     """Draw the effects, ranked, beside the tolerance of a grasp."""
     matplotlib.rcParams.update({"svg.hashsalt": "sms_handover", "svg.fonttype": "none"})
     ranked = _ranked(found)[::-1]
-    figure, axes = plt.subplots(figsize=(7.5, 0.34 * len(ranked) + 1.0), layout="constrained")
+    figure, axes = plt.subplots(figsize=(7.5, 0.42 * len(ranked) + 1.0), layout="constrained")
     for index, law in enumerate(LAWS):
         widths = [max(of_law[law].distances) for _, of_law in ranked]
-        places = np.arange(len(ranked)) + 0.2 - 0.4 * index
-        axes.barh(places, widths, 0.38, label=law, color=("#0072b2", "#d55e00")[index])
+        places = np.arange(len(ranked)) + 0.27 * (1 - index)
+        axes.barh(places, widths, 0.25, label=law, color=COLOURS[law])
     axes.axvline(10.0, color="black", linewidth=1.0, linestyle="--", label="tolerance of a grasp")
     axes.set_yticks(range(len(ranked)), [name for name, _ in ranked])
     axes.set_xscale("log")
@@ -187,9 +202,11 @@ def draw(found: Mapping[str, Mapping[str, Effect]], file: Path) -> None:
 def measured(names: Iterable[str]) -> dict[str, dict[str, Effect]]:
     """Run the task under the effects of these names."""
     found: dict[str, dict[str, Effect]] = {}
-    for name in names:
-        found[name] = {law: effect_of(name, law) for law in LAWS}
-        print(name, *(f"{law} {_cell(one)}" for law, one in found[name].items()), sep=" | ", flush=True)
+    runs = [(name, law) for name in names for law in LAWS]
+    with ProcessPoolExecutor(os.cpu_count()) as pool:
+        for (name, law), effect in zip(runs, pool.map(effect_of, *zip(*runs, strict=True)), strict=True):
+            found.setdefault(name, {})[law] = effect
+            print(name, law, _cell(effect), sep=" | ", flush=True)
     return found
 
 

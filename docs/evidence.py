@@ -82,8 +82,9 @@ The plant has the drawn mass properties, the laws have those of the scenario, wi
 {campaign.values["deputy.mass"]} kg. `smooth` and `paper` are at ideal [conditions](conditions.md), the
 others at nominal ones: friction, errors and noise of torques, a delay, wrenches, and a true robot that
 differs further. A case is a success if `{campaign.success.text}`: no grasp missed, no bodies in each other.
-`mpc` has its defaults, which limit torques and rates of joints but keep no distances
-(`controller.least_distance`): on the steps of `paper` it takes the shortest way, through what is there.
+`mpc` has its defaults, which limit torques and rates of joints, and keep bodies 10 mm apart
+(`controller.least_distance`): without, it takes the shortest way on the steps of `paper`, through what is
+there.
 
 {table(["Drawn for the plant", "Distribution"], draws)}
 

@@ -1,12 +1,14 @@
 """Equality of two runs, bit for bit."""
 
 import hashlib
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
+from sms_handover.configuration.conditions_fields import SENSORS
 from sms_handover.graph.events import MESSAGE_REFUSED
 from sms_handover.graph.topics import TRAJECTORY
 from sms_handover.run_data import Array, MeasuredRows, RunData
@@ -104,6 +106,12 @@ def as_far_as_recorded(recorded: RunData, again: RunData) -> tuple[RunData, tupl
     if again.applied and not recorded.applied:
         values["applied"] = ""
         missing.append("applied")
+    elif again.applied:
+        theirs, ours = (json.loads(run.applied) for run in (recorded, again))
+        if SENSORS in ours and SENSORS not in theirs:
+            del ours[SENSORS]
+            values["applied"] = json.dumps(ours)
+            missing.append(f"applied.{SENSORS}")
     events, lacking = recorded.grasp_events, {}
     for item in fields(GraspEvent):
         theirs, ours = ([getattr(e, item.name) for e in run.grasp_events] for run in (recorded, again))

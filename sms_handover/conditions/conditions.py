@@ -19,7 +19,14 @@ from sms_handover.conditions.thruster_misfire import ThrusterMisfire
 from sms_handover.conditions.wrench import WrenchModel
 from sms_handover.conditions.wrench_history import WrenchHistory
 from sms_handover.configuration.checks import check_vector
-from sms_handover.configuration.conditions_fields import AXES, BODIES, CONDITIONS_FIELDS, ON_BASE, WORLD
+from sms_handover.configuration.conditions_fields import (
+    AXES,
+    BODIES,
+    CONDITIONS_FIELDS,
+    ON_BASE,
+    SENSORS,
+    WORLD,
+)
 from sms_handover.configuration.sections import Section
 from sms_handover.configuration.yaml_reader import Mapping as YamlMapping
 from sms_handover.model.robot_model import RobotModel
@@ -79,7 +86,7 @@ def conditions_of(content: YamlMapping, robot: RobotModel) -> Conditions:
         _command(root),
         on_base,
         on_deputy,
-        sensors_of(root.section("sensors"), robot.n_joints) if "sensors" in root else {},
+        sensors_of(root.section(SENSORS), robot.n_joints) if SENSORS in root else {},
     )
     _require_rotors(root, conditions, robot)
     return IDEAL if conditions.ideal else conditions

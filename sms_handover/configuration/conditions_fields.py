@@ -16,6 +16,7 @@ BODY, WORLD = "body", "world"
 AXES = (BODY, WORLD)
 ON_BASE, ON_DEPUTY = "base", "deputy"
 BODIES = (ON_BASE, ON_DEPUTY)
+SENSORS = "sensors"
 
 
 def _per_joint(
@@ -152,6 +153,6 @@ CONDITIONS_FIELDS = MappingSpec(
         "command": _COMMAND,
         "wrenches": NamedSpec("wrenches from outside by name", _WRENCH),
         "model_error": _MODEL_ERROR,
-        "sensors": SENSOR_FIELDS,
+        SENSORS: SENSOR_FIELDS,
     },
 )

@@ -11,13 +11,11 @@ from rclpy.executors import Executor
 from sms_handover_interfaces.msg import RunState
 from std_msgs.msg import String
 
-from sms_handover.errors import MessageError, Reason
 from sms_handover.graph.topics import (
     GRASP_EVENT,
     JOINT_COMMAND,
     LOOP_TIMING,
     PLANT,
-    RECORDER,
     RUN_READY,
     RUN_RECORDED,
     RUN_STATE,
@@ -28,6 +26,7 @@ from sms_handover.nodes.parts.plant_clearance import PlantClearance
 from sms_handover.nodes.parts.plant_description import PlantDescription
 from sms_handover.nodes.parts.plant_outputs import PlantOutputs
 from sms_handover.nodes.parts.plant_transforms import PlantTransforms
+from sms_handover.nodes.parts.recording_progress import RecordingProgress
 from sms_handover.nodes.parts.run_control import RunControl
 from sms_handover.nodes.parts.watchdogs import AnswerWatchdog, CommandWatchdog, lag_skipped
 from sms_handover.plant.parameters import PlantParameters
@@ -45,7 +44,6 @@ from sms_handover.types import JointCommand, TaskPhase
 
 _COMMAND = (JOINT_COMMAND,)
 _PHASE_AND_COMMAND = (TASK_PHASE, JOINT_COMMAND)
-_MOST_UNRECORDED_NS = 45_000_000  # [ns] of simulation time that may be lost with the recorder
 _RUNNING = int(RunState.RUNNING)  # asking the message class for it takes a call each time
 _TIMING_PERIOD_S = 1.0  # [s] of wall time
 _LAST_POLLS = 3  # of the inputs: the state is taken, the command is taken, and one for what came between
@@ -70,7 +68,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self._end_ns = schedule.end_ns
         self.lockstep = self.common.mode == LOCKSTEP
         self._tick_ns, self._per_reference = self.common.tick_ns, self.common.ticks_per_reference
-        self._is_recorded = RECORDER in self.common.peers
+        self._recording = RecordingProgress(self.common)
         self._command_codec = JointStateCodec(self.robot.joint_names, ("effort",))
         self._phase_codec = PhaseCodec(self.robot.arms, tuple(schedule.deputy.grasp_frames))
         self._inputs: StampSync[Any] = StampSync(ahead_ns=self._tick_ns)
@@ -163,8 +161,7 @@ class PlantNode(GraphNode[PlantParameters]):
     @property
     def _ahead_of_recorder(self) -> bool:
         """Whether the next state would be more than may be lost if the recorder were killed."""
-        next_ns = self._plant.stamp_ns + self._tick_ns
-        return self._is_recorded and next_ns - self._recorded_ns > _MOST_UNRECORDED_NS
+        return self._recording.holds(self._plant.stamp_ns)
 
     def _make_endpoints(self) -> None:
         names = [GRASP_EVENT, RUN_STATE, LOOP_TIMING]
@@ -205,7 +202,7 @@ class PlantNode(GraphNode[PlantParameters]):
         self._command = JointCommand(0, np.zeros(self.robot.n_joints))  # N m
         self._command_watchdog.reset()
         self._needed: tuple[str, ...] = _PHASE_AND_COMMAND  # what completes this tick, by arrival
-        self._recorded_ns = 0
+        self._recording.reset()
         self._silent_tick = -1
 
     # One tick
@@ -269,11 +266,7 @@ class PlantNode(GraphNode[PlantParameters]):
         if self.run_state == RunState.WAITING:
             return  # it is of the run before
         stamp, _ = recorded
-        if not self._recorded_ns <= stamp <= self._plant.stamp_ns:
-            reason = Reason.OLD if stamp < self._recorded_ns else Reason.FUTURE
-            allowed = f"must be {self._recorded_ns} to {self._plant.stamp_ns} ns"
-            raise MessageError(reason, f"recorded up to {stamp} ns, {allowed}")
-        self._recorded_ns = stamp
+        self._recording.recorded(stamp, self._plant.stamp_ns)
         self.advance()
 
     def advance(self) -> None:
@@ -334,7 +327,7 @@ class PlantNode(GraphNode[PlantParameters]):
     @property
     def recorder_has_ended(self) -> bool:
         """Whether the run has a recorder, but its process has ended."""
-        return self._is_recorded and not self.count_publishers(RUN_RECORDED)
+        return self._recording.is_recorded and not self.count_publishers(RUN_RECORDED)
 
     def ticks_to(self, most: int) -> tuple[int, int]:
         """Return how many ticks of so many there are to the end, and the time of the last of them in ns."""

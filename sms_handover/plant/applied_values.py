@@ -9,13 +9,15 @@ import numpy as np
 
 from sms_handover.conditions.constant_wrench import ConstantWrench
 from sms_handover.conditions.orbit import GravityGradient, Orbit, RelativeOrbit
+from sms_handover.conditions.sensors.suite import SensorSuite
 from sms_handover.conditions.thruster_misfire import ThrusterMisfire
 from sms_handover.conditions.wrench import WrenchModel
 from sms_handover.conditions.wrench_history import WrenchHistory
-from sms_handover.configuration.conditions_fields import ON_BASE, ON_DEPUTY
+from sms_handover.configuration.conditions_fields import ON_BASE, ON_DEPUTY, SENSORS
 from sms_handover.model.robot_model import BASE_NV, RobotModel
 from sms_handover.plant.effects import PlantEffects
 from sms_handover.plant.free_floating import FreeFloatingPlant
+from sms_handover.plant.sensed_plant import SensedPlant
 
 _KINDS: Mapping[type, str] = MappingProxyType(
     {
@@ -28,22 +30,26 @@ _KINDS: Mapping[type, str] = MappingProxyType(
 )
 
 
-def applied_values(plant: FreeFloatingPlant) -> dict[str, Any]:
-    """Return what acts in a plant as plain data, by the names that files of conditions have.
+def applied_text(plant: FreeFloatingPlant, unread: SensorSuite | None = None) -> str:
+    """Return the applied values as JSON, with every bit of their numbers: the conditions and ``robot``.
 
     ``robot`` has ``mass`` kg, ``com`` m and ``inertia`` kg m^2 about that (xx, xy, xz, yy, yz, zz) of every
     body by the joint that moves it, in its own axes, and the inertia of rotors kg m^2 by joint: with the
-    errors of the model, panels locked, and without what a hand holds. Sensors are not among the values.
+    errors of the model, panels locked, and without what a hand holds.
     """
-    found: dict[str, Any] = {"robot": _of_robot(plant.robot)}
-    if plant.effects:
-        found |= _of_effects(plant.effects)
+    return json.dumps({"robot": _of_robot(plant.robot), **applied_conditions(plant, unread)})
+
+
+def applied_conditions(plant: FreeFloatingPlant, unread: SensorSuite | None = None) -> dict[str, Any]:
+    """Return what acts in a plant as plain data, by the names that files of conditions have.
+
+    ``unread`` are the sensors of a run in which nothing goes by them, so that its plant is without.
+    """
+    found = _of_effects(plant.effects) if plant.effects else {}
+    sensors = plant.sensors if isinstance(plant, SensedPlant) else unread
+    if sensors:
+        found[SENSORS] = {name: _plain(values) for name, values in sensors.applied.items()}
     return found
-
-
-def applied_text(plant: FreeFloatingPlant) -> str:
-    """Return the applied values as JSON, with every bit of their numbers."""
-    return json.dumps(applied_values(plant))
 
 
 def _of_effects(effects: PlantEffects) -> dict[str, Any]:

@@ -1,7 +1,5 @@
 """Free-floating plant: robot and deputy, advanced tick by tick under joint efforts."""
 
-from dataclasses import replace
-
 import numpy as np
 import numpy.typing as npt
 
@@ -19,21 +17,17 @@ from sms_handover.plant.dynamics import MakeDynamics, PlantDynamics, pinocchio_d
 from sms_handover.plant.effects import PlantEffects
 from sms_handover.plant.enforced_limits import EnforcedLimits
 from sms_handover.plant.external_wrenches import NO_FORCE, Companion, ExternalAccount
-from sms_handover.plant.grasping import execute_grasp
+from sms_handover.plant.hands import Hands
 from sms_handover.plant.integrators import TABLEAUS
 from sms_handover.plant.joint_limits import ENFORCE, JointLimitWatch, require_start_within_limits
 from sms_handover.plant.parameters import PlantParameters
-from sms_handover.plant.payload import Payload, deputy_at_start
 from sms_handover.plant.plant_state import InitialState, PlantState
-from sms_handover.plant.rigid_deputy import RigidDeputy
 from sms_handover.types import (
     Array,
     BaseWrench,
     DeputyState,
-    GraspAction,
     GraspCommand,
     GraspEvent,
-    GraspStatus,
     Pose,
     RobotState,
     TickRows,
@@ -103,11 +97,7 @@ class FreeFloatingPlant:
             self._effects.reset()
         self._watch.reset()
         self._saturated_ticks = np.zeros(self._arms.robot.n_joints, dtype=np.int64)
-        self._deputy = deputy_at_start(initial, self._tick_s)
-        body = self._deputy if isinstance(self._deputy, RigidDeputy) else None
-        self._payload = Payload(robot, body) if body else None
-        self._next_v: Array | None = None  # after the impulse of a grasp at this instant
-        self._next_losses = 0.0
+        self._hands = Hands(robot, initial, self._tolerance, self._tick_s)
         self._load()
 
     def seed(self, seed: int) -> None:
@@ -126,7 +116,7 @@ class FreeFloatingPlant:
             self._losses,
             tuple(self._saturated_ticks.tolist()),
             self._watch.excesses(self.stamp_ns),
-            self._deputy.motion,
+            self._hands.deputy.motion,
             self._effects.state if self._effects else None,
         )
 
@@ -136,26 +126,17 @@ class FreeFloatingPlant:
         if shapes != [self._q.shape, self._v.shape, self.joint_effort.shape]:
             count, wanted = (q.size - BASE_NQ for q in (state.q, self._q))
             raise ConfigurationError(f"the snapshot has {count} joints and hinges, must have {wanted}")
-        has_mass = state.deputy.q.size > 0
-        if has_mass != (self._payload is not None):
-            kinds = ("with", "without") if has_mass else ("without", "with")
-            raise ConfigurationError(
-                f"the snapshot is of a deputy {kinds[0]} mass, must be of one {kinds[1]}: "
-                "set deputy.mass, in kg, as in its run"
-            )
+        self._hands.require_like(state.deputy)
         self.tick, self._work, self._losses = state.tick, state.work, state.losses
         self._use_state(read_only(state.q), read_only(state.v))
         self.joint_effort = read_only(state.joint_effort)
         self._saturated_ticks = np.array(state.saturated_ticks, dtype=np.int64)
         self._watch.restore(state.excesses)
-        self._deputy.restore(state.deputy)
+        self._hands.restore(state.deputy)
         if self._effects is None and state.effects:
             self._use_ideal_effects()
         if self._effects:
             self._effects.restore(state.effects)
-        self._next_v, self._next_losses = None, 0.0
-        if self._payload:
-            self._payload.follow_holder()
         self._load()
 
     @property
@@ -166,12 +147,12 @@ class FreeFloatingPlant:
     @property
     def loaded_robot(self) -> RobotModel:
         """The robot with what it carries, whose equations of motion hold from this instant on."""
-        return self._payload.robot if self._payload else self._robot
+        return self._hands.robot
 
     @property
     def jumps(self) -> bool:
         """Whether the velocity jumps at this instant, by a grasp, before it is integrated."""
-        return self._next_v is not None
+        return self._hands.next_v is not None
 
     @property
     def stamp_ns(self) -> int:
@@ -187,12 +168,12 @@ class FreeFloatingPlant:
     def deputy(self) -> DeputyState:
         """Return where the deputy is and who holds it."""
         self._deputy_follow()
-        return self._deputy.state
+        return self._hands.deputy.state
 
     @property
     def deputy_body(self) -> MasslessDeputy:
         """The deputy with its motion, which compiled periods take over and give back."""
-        return self._deputy
+        return self._hands.deputy
 
     @property
     def work(self) -> float:
@@ -241,7 +222,7 @@ class FreeFloatingPlant:
 
     def with_deputy(self, of_robot: ConservedQuantities) -> ConservedQuantities:
         """Return what is conserved of robot and deputy, by that of the robot with what it carries."""
-        deputy = self._floating
+        deputy = self._hands.floating
         if deputy is None:
             return of_robot
         return together(of_robot, self._robot.mass, deputy.conserved, deputy.inertia.mass)
@@ -251,32 +232,10 @@ class FreeFloatingPlant:
 
         The state of this instant stays as it is: an impulse acts as its integration begins.
         """
-        return tuple(self._carry_out(command) for command in commands)
-
-    def _carry_out(self, command: GraspCommand) -> GraspEvent:
-        """Execute one command; with a deputy that has mass its momentum changes hands too."""
-        v = self._v if self._next_v is None else self._next_v
-        if self._deputy.holder:
-            self._kinematics.carry(self._deputy, self._q, v)
-        motions = {arm: self._kinematics.tool_motion(self._q, v, arm) for arm in self._robot.arms}
-        tools = {arm: pose for arm, (pose, _) in motions.items()}
-        twists = {arm: twist for arm, (_, twist) in motions.items()}
-        payload, deputy = self._payload, self._deputy
-        if payload is None or not isinstance(deputy, RigidDeputy):
-            return execute_grasp(command, deputy, tools, twists, self._tolerance, self.stamp_ns)
-        before = payload.twist_in_hand(self._q, v) if deputy.holder else deputy.twist_in_deputy
-        event = execute_grasp(command, deputy, tools, twists, self._tolerance, self.stamp_ns)
-        if event.status is not GraspStatus.SUCCEEDED:
-            return event
-        if command.action is GraspAction.RELEASE:
-            payload.let_go(before)
-            self._next_v = v
-            return event
-        taken = payload.taken(self._q, v, before)
-        self._next_v = taken.velocity
-        self._next_losses += taken.energy_lost
-        impulse = payload.in_world(taken.impulse)
-        return replace(event, impulse=impulse, energy_lost=taken.energy_lost)
+        hands, stamp_ns = self._hands, self.stamp_ns
+        return tuple(
+            hands.execute(command, self._kinematics, self._q, self._v, stamp_ns) for command in commands
+        )
 
     def take_excesses(self) -> tuple[RunEvent, ...]:
         """Return the excesses of joint limits that are over; to be asked once for every state."""
@@ -297,8 +256,8 @@ class FreeFloatingPlant:
         """
         effects = self._effects
         effort = self._limited(effects.torque(self.tick, asked) if effects else asked)
-        if self._next_v is not None:
-            self._jump(self._next_v)
+        if self._hands.next_v is not None:
+            self._jump()
         if effects:
             effects.begins(self.tick, self._stepper, self.base_wrenches.at(self.tick))
         before, whole = self._q, self._arms.padded(effort)
@@ -311,14 +270,14 @@ class FreeFloatingPlant:
         if self._swinging:
             self._losses += self._swinging.taken
         if effects:
-            self._losses += effects.settle(self._floating)
+            self._losses += effects.settle(self._hands.floating)
         for part in (whole * (q[BASE_NQ:] - before[BASE_NQ:])).tolist():
             self._work += part
         self._use_state(q, v)
         self.joint_effort = effort
         self.tick += 1
-        if not (self._deputy.holder or (effects and effects.has_moved_deputy)):
-            self._deputy.drift(self._tick_s)
+        if not (self._hands.deputy.holder or (effects and effects.has_moved_deputy)):
+            self._hands.deputy.drift(self._tick_s)
 
     def push(self, wrench: BaseWrench) -> None:
         """Let a wrench act on the base over the tick of its stamp, and no other tick.
@@ -328,7 +287,7 @@ class FreeFloatingPlant:
         self.base_wrenches.add(wrench, self.tick)
         if self._effects is None:
             self._use_ideal_effects()
-            if self._next_v is None:  # else as that velocity is taken on
+            if not self.jumps:  # else as that velocity is taken on
                 self._load()
 
     def _use_ideal_effects(self) -> None:
@@ -359,16 +318,15 @@ class FreeFloatingPlant:
         self._use_state(q, v)
         self.joint_effort, self._work = joint_effort, work
         self._saturated_ticks += saturated
-        if not self._deputy.holder:
+        if not self._hands.deputy.holder:
             for _ in range(steps):  # a sum of ticks, as one after the other makes it
-                self._deputy.drift(self._tick_s)
+                self._hands.deputy.drift(self._tick_s)
 
-    def _jump(self, v: Array) -> None:
+    def _jump(self) -> None:
         """Go on from the velocity after an impulse, with the payload that the robot then has."""
+        v, lost = self._hands.take_jump()
         self._use_state(self._q, v)
-        self._next_v = None
-        self._losses += self._next_losses
-        self._next_losses = 0.0
+        self._losses += lost
         self._load()
 
     def _load(self) -> None:
@@ -406,13 +364,8 @@ class FreeFloatingPlant:
     @property
     def companion(self) -> Companion | None:
         """The deputy where it floats and has mass."""
-        return self._floating.as_companion(NO_FORCE) if self._floating else None
-
-    @property
-    def _floating(self) -> RigidDeputy | None:
-        """The deputy where it floats and has mass."""
-        deputy = self._deputy
-        return deputy if isinstance(deputy, RigidDeputy) and not deputy.holder else None
+        deputy = self._hands.floating
+        return deputy.as_companion(NO_FORCE) if deputy else None
 
     def _limited(self, asked: Array) -> Array:
         """Return the efforts that act, and count those at their limit or beyond."""
@@ -425,5 +378,5 @@ class FreeFloatingPlant:
 
     def _deputy_follow(self) -> None:
         """Move a held deputy with its tool."""
-        if self._deputy.holder:
-            self._kinematics.carry(self._deputy, self._q, self._v)
+        if self._hands.deputy.holder:
+            self._kinematics.carry(self._hands.deputy, self._q, self._v)

@@ -37,28 +37,28 @@ class SensedPlant(FreeFloatingPlant):
         effects: PlantEffects | None = None,
     ) -> None:
         """Place robot and deputy; raises ConfigurationError on a joint outside its limits."""
-        self._sensors, self.tick_ns = sensors, tick_ns
+        self.sensors, self.tick_ns = sensors, tick_ns
         super().__init__(robot, parameters, initial, tick_ns, make_dynamics, effects)
 
     def reset(self) -> None:
         """Go back to the initial state at time zero."""
         super().reset()
-        self._sensors.reset()
+        self.sensors.reset()
         self._measure()
 
     def seed(self, seed: int) -> None:
         """Let every random stream of the conditions follow from a seed, from the start of a run on."""
         super().seed(seed)
-        self._sensors.seed(seed)
+        self.sensors.seed(seed)
 
     def snapshot(self) -> PlantState:
         """Return the state to :meth:`restore`."""
-        return replace(super().snapshot(), sensors=self._sensors.state(self.measured))
+        return replace(super().snapshot(), sensors=self.sensors.state(self.measured))
 
     def restore(self, state: PlantState) -> None:
         """Go back to a former state; raises ConfigurationError if it is that of another robot or sensors."""
         super().restore(state)
-        self.measured = self._sensors.restore(state.sensors or SensorsState())
+        self.measured = self.sensors.restore(state.sensors or SensorsState())
 
     def apply(self, asked: Array) -> None:
         """Integrate one tick under read-only efforts (n,), and measure the state that it leads to."""
@@ -68,7 +68,7 @@ class SensedPlant(FreeFloatingPlant):
     def _measure(self) -> None:
         """Let the sensors measure the present state."""
         truth = Truth(self.tick, self.q, self.v, lambda: self.deputy.deputy_in_world)
-        self.measured = self._sensors.measure(truth)
+        self.measured = self.sensors.measure(truth)
 
 
 def known_of(plant: SensedPlant) -> KnownState:

@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from sms_handover.compiled.periods import CompiledPeriods, Room
 from sms_handover.compiled.ticks import CompiledTicks
+from sms_handover.conditions.sensors.suite import SensorSuite
 from sms_handover.control.law import Need
 from sms_handover.control.plan_events import PlanEvents
 from sms_handover.control.protocol import (
@@ -20,7 +22,7 @@ from sms_handover.control.registry import law_named
 from sms_handover.errors import ConfigurationError
 from sms_handover.graph.events import RunEvent
 from sms_handover.graph.topics import CONTROLLER
-from sms_handover.plant.applied_values import applied_text
+from sms_handover.plant.applied_values import applied_conditions, applied_text
 from sms_handover.plant.sensed_plant import KnownState, SensedPlant, known_of
 from sms_handover.simulation.observed_ticks import Observation, Period, Ticks
 from sms_handover.simulation.parameters import COMPILED
@@ -34,6 +36,7 @@ from sms_handover.simulation.wiring import (
     make_monitor,
     make_plant,
     make_runner,
+    make_sensors,
 )
 from sms_handover.types import (
     BaseWrench,
@@ -73,8 +76,10 @@ class Loop:
         robot, schedule = self.scenario.model.robot, self.scenario.model.schedule
         self._common = parameters.common
         conditions = truth.conditions
+        self._unread: SensorSuite | None = None  # made to read back what they have; C does not measure
         if self._common.dynamics == COMPILED and not self._common.uses_measurements:
-            conditions = replace(conditions, sensors={})  # C does not measure, and nobody would listen
+            self._unread = make_sensors(conditions, truth.robot.n_joints, self._common)
+            conditions = replace(conditions, sensors={})  # nobody would listen
         self._plant = make_plant(truth.robot, truth.schedule, self._common, parameters.plant, conditions)
         for wrench in base_wrenches:
             self._plant.push(wrench)
@@ -144,8 +149,13 @@ class Loop:
 
     @property
     def applied(self) -> str:
-        """What acts in the plant, read back from it, as JSON."""
-        return applied_text(self._plant)
+        """What acts in the plant, read back from it, as JSON, with sensors whether or not they are read."""
+        return applied_text(self._plant, self._unread)
+
+    @property
+    def applied_conditions(self) -> Mapping[str, Any]:
+        """The part of :attr:`applied` that files of conditions name, as plain data."""
+        return applied_conditions(self._plant, self._unread)
 
     @property
     def controller(self) -> Controller:

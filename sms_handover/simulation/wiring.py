@@ -87,14 +87,21 @@ def make_plant(
     joints, tick_ns, seed = robot.n_joints, common.tick_ns, common.seed
     effects = PlantEffects(conditions, joints, tick_ns, seed) if conditions.acts else None
     dynamics = make_dynamics(common.dynamics, tableau, h)
-    if conditions.sensors:
-        sensors = SensorSuite(conditions.sensors, joints, tick_ns, seed)
+    sensors = make_sensors(conditions, joints, common)
+    if sensors:
         return SensedPlant(robot, parameters, initial, tick_ns, sensors, dynamics, effects)
     if common.uses_measurements:
         raise ConfigurationError(
             f"source is {MEASURED!r}, must be {TRUE!r} where there are no sensors: set conditions.sensors"
         )
     return FreeFloatingPlant(robot, parameters, initial, tick_ns, dynamics, effects)
+
+
+def make_sensors(conditions: Conditions, joints: int, common: CommonParameters) -> SensorSuite | None:
+    """Return the sensors for so many joints, None if there are none; raises ConfigurationError."""
+    if not conditions.sensors:
+        return None
+    return SensorSuite(conditions.sensors, joints, common.tick_ns, common.seed)
 
 
 def make_dynamics(dynamics: str, tableau: Tableau, h: float) -> MakeDynamics:

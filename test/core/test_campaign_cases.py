@@ -110,12 +110,15 @@ def test_masses_are_read_back_from_what_the_plant_integrates() -> None:
         ("conditions.model_error.base.mass", 0.02),
         ("conditions.wrenches.solar_pressure.constant.force[0]", -3e-5),
         ("conditions.wrenches.gravity.gravity_gradient.radius", 6.9e6),
-        ("conditions.sensors.gyro.bias[1]", 1e-5),
-        ("conditions.sensors.vision.latency", 0.2),
+        ("conditions.sensors.encoders.offset", 7e-4),
+        ("conditions.sensors.star_tracker.period", 0.2),
+        ("conditions.wrenches.told.history.rows[1][2]", 3.0),
     ],
 )
 def test_conditions_are_read_back_from_the_plant(path: str, value: float) -> None:
-    nominal = {"common.conditions": "nominal"}
+    """Of sensors too, which compiled ticks do not read."""
+    told = {"conditions.wrenches.told.history": {"rows": [[0.0] * 7, [1.0] * 7]}}
+    nominal = {"common.conditions": "nominal", "common.dynamics": "compiled", **told}
     assert read_back(Loop(load_scenario("smooth", {**nominal, path: value})), path) == value
     assert read_back(Loop(load_scenario("smooth", nominal)), path) != value
 

@@ -1,5 +1,6 @@
 """Two runs are the same only if every field is; what differs is told with its place."""
 
+import json
 from collections.abc import Callable
 from dataclasses import fields, replace
 from math import nan
@@ -82,6 +83,13 @@ def test_what_an_older_version_did_not_record_is_named_and_the_rest_judged(run: 
     other = replace(run, kinetic_energy=changed(run.kinetic_energy, 1, lambda value: value + 1.0))
     (difference,) = compare_runs(old, as_far_as_recorded(old, other)[0])
     assert difference.field == "kinetic_energy"
+    acted, sensed = {"command": {"delay": 0.003}}, {"sensors": {"gyro": {"period": 0.0}}}
+    old, now = (replace(run, applied=json.dumps(values)) for values in (acted, {**acted, **sensed}))
+    again, missing = as_far_as_recorded(old, now)
+    assert missing == ("applied.sensors",) and compare_runs(old, again) == ()
+    assert as_far_as_recorded(now, now)[1] == ()
+    (difference,) = compare_runs(now, as_far_as_recorded(now, old)[0])
+    assert difference.field == "applied"
 
 
 def test_of_the_first_edition_only_rounding_differs() -> None:

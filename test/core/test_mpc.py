@@ -59,8 +59,12 @@ STEP = 1e-6  # [rad/s^2] of central differences; their error is about 1e-9 here
 
 
 def scenario_of(name: str, seconds: float, **controller: object) -> Scenario:
-    """Return the beginning of a shipped scenario under the predictive law."""
-    return load_scenario(name, {"common": {"duration": seconds}, "controller": {"law": "mpc", **controller}})
+    """Return the beginning of a shipped scenario under the predictive law, without distances if not given.
+
+    They are most of what a solve takes, and have tests of their own.
+    """
+    gains = {"law": "mpc", "least_distance": 0.0, **controller}
+    return load_scenario(name, {"common": {"duration": seconds}, "controller": gains})
 
 
 def controller_of(loop: Loop) -> MpcController:
@@ -408,6 +412,45 @@ def test_the_limits_of_the_tight_scenario_are_kept_and_needed() -> None:
     kept, exceeded = peaks(planned), peaks(free)
     assert kept["base_rate_limit"] <= 1.01 * limits.base_rate_limit
     assert kept["joint_rate_limit"] <= 1.01 * limits.joint_rate_limit < 0.9 * exceeded["joint_rate_limit"]
+
+
+def test_as_shipped_no_body_is_led_through_another() -> None:
+    """The paper's steps, one soon after the other: the shortest way of a gripper is through the deputy."""
+    values: dict[str, object] = {"law": "mpc", "common.tick": 0.02, "common.duration": 2.9}
+    for name in ("approach", "carry"):
+        values |= {f"schedule.phases.{name}.duration": 2.0, f"schedule.phases.{name}.motion": 1.5}
+    kept = Loop(load_scenario("paper", values))
+    without = Loop(load_scenario("paper", {**values, "controller.least_distance": 0.0}))
+    near = NearPairs(make_clearance(kept.scenario.model.robot, kept.scenario.model.schedule))
+    (pair,) = [row for row, item in enumerate(near.pairs) if item.names == ("arm_b_gripper", "deputy")]
+    while kept.state.stamp_ns < 2_000_000_000:
+        kept.advance_period()
+    without.restore(kept.snapshot())
+
+    def nearest(loop: Loop) -> float:
+        found = np.inf
+        while not loop.finished:
+            q, period = loop.state.q, loop.advance_period().period
+            assert period is not None
+            found = min(found, float(near.distances(q, period.deputy.deputy_in_world)[pair]))
+        return found
+
+    assert nearest(without) < -0.03  # m
+    assert nearest(kept) > 0.0007  # m, of 1 mm where it may touch
+
+
+def test_a_robot_without_bodies_needs_no_distances(
+    robot: RobotModel, moving: tuple[BaseStart, Array, Array, Array, Array]
+) -> None:
+    class Nothing:
+        pairs = ()
+
+    start, joints, rates, accelerations, _ = moving
+    gains = replace(planner_of(robot).gains, least_distance=0.01)
+    aim = PreviewedTargets({}, {}, joints, rates, "", pose_of(pin.SE3.Identity()), frozenset())
+    problem = PlanStart(joints, rates, start), accelerations, [aim] * 10
+    step = Planner(robot, gains, Nothing(), np.eye(3)).step(*problem)  # type: ignore[arg-type]
+    assert step.solution.change.tobytes() == planner_of(robot).step(*problem).solution.change.tobytes()
 
 
 def test_a_plan_begins_where_the_robot_will_be() -> None:

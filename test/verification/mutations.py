@@ -11,7 +11,7 @@ import subprocess
 import sys
 from argparse import ArgumentParser
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -125,13 +125,13 @@ def copy_of(root: Path, folder: Path) -> Path:
     return folder
 
 
-def run(breaks: Sequence[Break], root: Path, workers: int) -> list[Result]:
-    """Return the result of every break, in their order; prints each as it comes."""
+def run(breaks: Sequence[Break], root: Path, workers: int, unbroken: Sequence[str]) -> Iterator[Result]:
+    """Yield the result of every break, as they come; first see that ``unbroken`` tests pass."""
     with TemporaryDirectory() as scratch:
         copies: Queue[Path] = Queue()
         for number in range(workers):
             copies.put(copy_of(root, Path(scratch) / f"copy_{number}"))
-        failing = first_failure(Path(scratch) / "copy_0", *FAST, workers=workers)
+        failing = first_failure(Path(scratch) / "copy_0", *unbroken, workers=workers)
         if failing:
             raise SystemExit(f"the tests fail without any break: {failing}")
         print(f"without a break every test passes; now {len(breaks)} breaks", flush=True)
@@ -143,39 +143,56 @@ def run(breaks: Sequence[Break], root: Path, workers: int) -> list[Result]:
                     test = first_failure(folder, item.likely) or first_failure(folder, *FAST)
             finally:
                 copies.put(folder)
-            result = Result(item.name, item.file, item.old, item.new, test, round(monotonic() - begin, 1))
-            print(f"{result.seconds:6.1f} s  {item.name}: {test or 'SURVIVED'}", flush=True)
-            return result
+            return Result(item.name, item.file, item.old, item.new, test, round(monotonic() - begin, 1))
 
         with ThreadPoolExecutor(workers) as pool:
-            return list(pool.map(attempt, breaks))
+            for future in as_completed(pool.submit(attempt, item) for item in breaks):
+                yield future.result()
+
+
+def results_in(file: Path) -> list[Result]:
+    """Return what a file of results holds, nothing if there is none."""
+    return [Result(**item) for item in json.loads(file.read_text(encoding="utf-8"))] if file.exists() else []
+
+
+def _key(item: "Break | Result") -> tuple[str, ...]:
+    return item.name, item.file, item.old, item.new
 
 
 def main() -> int:
     """Run all breaks, or those whose name holds a text; the exit code is 1 if one survives."""
     parser = ArgumentParser(description=__doc__)
-    parser.add_argument("--output", type=Path, help="write the results to this JSON file")
+    parser.add_argument("--output", type=Path, help="write the results to this JSON file, each as it comes")
+    parser.add_argument("--resume", action="store_true", help="try only breaks that the output does not hold")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="breaks tried at a time")
     parser.add_argument("--only", default="", metavar="TEXT", help="only breaks whose name holds this text")
     parser.add_argument("--dry-run", action="store_true", help="only look whether every break has its place")
     options = parser.parse_args()
+    if options.resume and not options.output:
+        parser.error("--resume needs --output, the file with the results so far")
     wrong = misplaced(BREAKS, ROOT)
     if wrong:
         raise SystemExit("\n".join(wrong))
     if options.dry_run:
         return 0
     begin = monotonic()
-    results = run([item for item in BREAKS if options.only in item.name], ROOT, options.workers)
-    survivors = [result.name for result in results if result.survived]
+    known = {_key(item): item for item in BREAKS}
+    held = results_in(options.output) if options.resume else []
+    done = {_key(result): result for result in held if _key(result) in known}
+    wanted = [item for key, item in known.items() if key not in done and options.only in item.name]
+    unbroken = FAST if len(wanted) == len(BREAKS) else sorted({item.likely for item in wanted})
+    for result in run(wanted, ROOT, options.workers, unbroken) if wanted else ():
+        done[_key(result)] = result
+        print(f"{result.seconds:6.1f} s  {result.name}: {result.test or 'SURVIVED'}", flush=True)
+        if options.output:
+            results = [asdict(done[key]) for key in known if key in done]
+            options.output.write_text(json.dumps(results, indent=2) + "\n", encoding="utf-8")
+    survivors = [result.name for result in done.values() if result.survived]
     print(
-        f"{len(results)} breaks in {monotonic() - begin:.0f} s, {len(survivors)} survived",
+        f"{len(wanted)} breaks in {monotonic() - begin:.0f} s, {len(survivors)} of {len(done)} survived",
         *survivors,
         sep="\n  ",
     )
-    if options.output:
-        options.output.write_text(
-            json.dumps([asdict(item) for item in results], indent=2) + "\n", encoding="utf-8"
-        )
     return 1 if survivors else 0
 
 

@@ -229,7 +229,7 @@ BREAKS: tuple[Break, ...] = (
     ),
     _core(
         "heat of a capture forgotten",
-        "plant/free_floating",
+        "plant/hands",
         "self._next_losses += taken.energy_lost",
         "self._next_losses += 0.0 * taken.energy_lost",
         "capture",
@@ -1128,8 +1128,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "heat of friction not booked",
         "plant/free_floating",
-        "self._losses += effects.settle(self._floating)",
-        "effects.settle(self._floating)",
+        "self._losses += effects.settle(self._hands.floating)",
+        "effects.settle(self._hands.floating)",
         "conditions",
     ),
     Break(
@@ -1318,9 +1318,16 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "rates of encoders not filtered",
         "conditions/sensors/encoders",
-        "self._kept = exp(-values.bandwidth * self._h)",
+        "self._kept = exp(-self._bandwidth * self._h)",
         "self._kept = 0.0",
         "sensors",
+    ),
+    _core(
+        "zeros of encoders set and not applied",
+        "conditions/sensors/encoders",
+        "= values.offset, values.bandwidth",
+        "= 0.0 * values.offset, values.bandwidth",
+        "conditions",
     ),
     _core(
         "the noise of vision the same at every range",

@@ -25,7 +25,7 @@ _INTRODUCTION = """\
 
 What the simulator was measured against, with the bound beside each figure. This file is written by
 `make verify` from what it measures; nothing in it is written by hand. A figure keeps its bound if it is
-not above it. Every row names its test: `pytest test/verification -k <name>` repeats it.
+not above it. Every row names its test: `pytest test/verification test/core -k <name>` repeats it.
 [equations.md](equations.md) tells where the paper's printed equations differ from what holds."""
 
 _BREAKS = """\

@@ -32,7 +32,7 @@ from sms_handover.plant.payload import Payload
 from sms_handover.plant.rigid_deputy import RigidDeputy
 from sms_handover.plant.stepper import PinocchioStepper
 from sms_handover.types import Array, Pose, Twist
-from test.verification.conftest import Record
+from test.evidence import Record
 
 _EPS = float(np.finfo(float).eps)
 _AGAINST = f"MuJoCo {mujoco.__version__}"

@@ -11,7 +11,7 @@ from sms_handover.analysis.comparison import compare
 from sms_handover.run_data import RunData
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
-from test.verification.conftest import Record, Table
+from test.evidence import Record, Table
 
 _COMMAND = (
     "`make handover` records both runs over DDS and prints the same figures; each here is of `simulate()`"

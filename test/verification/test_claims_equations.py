@@ -18,7 +18,7 @@ from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import BASE_NV, RobotModel
 from sms_handover.types import Array
 from test.core.conftest import Draw
-from test.verification.conftest import Record, Table
+from test.evidence import Record, Table
 from test.verification.lagrangian import Lagrangian, Motion
 
 _STATES = 20

@@ -11,7 +11,8 @@ from sms_handover.model.assembly import RobotDescription
 from sms_handover.model.description import load_robot
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import Array
-from test.verification.conftest import Record, links_in_world
+from test.evidence import Record
+from test.verification.conftest import links_in_world
 
 _SOURCE = "Kinovarobotics/ros2_kortex, gen3_macro.xacro"
 

@@ -15,7 +15,7 @@ from sms_handover.simulation.simulate import simulate
 from sms_handover.simulation.wiring import make_ik
 from sms_handover.types import IkRequest
 from test.core.test_quiet_periods import python_loop, require_same, rest_of
-from test.verification.conftest import Record
+from test.evidence import Record
 
 ROBOTS = 100  # of one kind
 _FOUR_ARMS = """

@@ -19,7 +19,7 @@ from sms_handover.types import Array
 from test.core.conftest import Draw, distance, slope
 from test.core.test_integrators import Top, _advance, _driven
 from test.core.test_plant import Drift
-from test.verification.conftest import Record, Table
+from test.evidence import Record, Table
 from test.verification.lagrangian import Lagrangian
 from test.verification.test_claims import handover
 

@@ -22,7 +22,7 @@ from sms_handover.simulation.scenario import load_parameters
 from sms_handover.types import Array, Pose
 from test.core.conftest import Draw, slope
 from test.core.test_pid import Bench, _linear
-from test.verification.conftest import Record, Table
+from test.evidence import Record, Table
 from test.verification.lagrangian import Lagrangian, pinocchio_configuration
 
 _EPS = float(np.finfo(float).eps)

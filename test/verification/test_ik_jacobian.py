@@ -11,7 +11,7 @@ import pytest
 from sms_handover.ik.residual import PoseResidual
 from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.model.robot_model import RobotModel
-from test.verification.conftest import Record
+from test.evidence import Record
 
 _STATES = 100
 _STEP = 1e-3  # [rad]

@@ -15,7 +15,7 @@ from sms_handover.ik.parameters import IkParameters
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.simulation.scenario import load_parameters
 from sms_handover.types import Array, IkRequest, IkStatus, Pose
-from test.verification.conftest import Record, Table
+from test.evidence import Record, Table
 from test.verification.ik_library import Attempt, FixedBase
 
 _TARGETS = 1000  # per arm

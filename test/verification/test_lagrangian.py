@@ -25,7 +25,7 @@ from sms_handover.model.robot_model import BASE_NQ, BASE_NV, RobotModel
 from sms_handover.plant.integrators import Tableau
 from sms_handover.types import Array
 from test.core.robots import someone_else
-from test.verification.conftest import Record
+from test.evidence import Record
 from test.verification.lagrangian import Lagrangian, pinocchio_configuration
 
 _STATES = 100

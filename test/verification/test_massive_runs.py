@@ -8,7 +8,7 @@ from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.types import GraspStatus
 from sms_handover.units import MM_PER_M
-from test.verification.conftest import Record
+from test.evidence import Record
 
 _EPS = float(np.finfo(float).eps)
 _LEVER = 2.0  # [m] of the farthest body from the common centre, at most

@@ -15,7 +15,7 @@ from sms_handover.frames import BASE
 from sms_handover.model.description import load_robot
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import BASE_NQ, Pose
-from test.verification.conftest import Record
+from test.evidence import Record
 
 _POSES = 1000
 _FAR = 10.0  # [m] beyond which MuJoCo is not asked for a distance

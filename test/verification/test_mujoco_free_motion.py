@@ -20,7 +20,7 @@ from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.integrators import TABLEAUS, LieGroupIntegrator
 from sms_handover.types import Array
-from test.verification.conftest import Record, Table
+from test.evidence import Record, Table
 
 _MOTIONS = 24
 _TIME = 1.0  # [s]

@@ -22,7 +22,7 @@ from sms_handover.simulation.simulate import simulate
 from sms_handover.simulation.wiring import make_plant
 from sms_handover.types import Array
 from sms_handover.units import ns_to_seconds
-from test.verification.conftest import Record, Table
+from test.evidence import Record, Table
 
 _EPS = float(np.finfo(float).eps)
 _ASKED = 1e-8  # [m, rad] agreement that is asked for

@@ -23,7 +23,8 @@ from sms_handover.model.floating_model import floating_model
 from sms_handover.model.parts import Inertia, JointDescription, Origin
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.types import Array, Pose
-from test.verification.conftest import Record, links_in_world
+from test.evidence import Record
+from test.verification.conftest import links_in_world
 
 _STATES = 100
 _GRAZING = 1e-4  # [m] from contact, within which two engines may disagree

@@ -18,7 +18,7 @@ from sms_handover.model.robot_model import RobotModel
 from sms_handover.scene.links import DescribedRobot
 from sms_handover.scene.shapes import read_shapes
 from sms_handover.types import Array, Pose
-from test.verification.conftest import Record
+from test.evidence import Record
 
 _STATES = 100
 _EPS = float(np.finfo(float).eps)

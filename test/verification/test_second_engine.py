@@ -16,7 +16,7 @@ from sms_handover.model.robot_model import RobotModel
 from sms_handover.run_data import RunData
 from sms_handover.simulation.scenario import Scenario, load_scenario
 from sms_handover.simulation.simulate import simulate
-from test.verification.conftest import Record
+from test.evidence import Record
 
 _HEAVIER = 1.001  # [-] what a link weighs that is to be noticed
 _SHORT = {"common": {"duration": 2.0}}  # [s]

@@ -7,7 +7,7 @@ import pytest
 
 from test.core.loop_rest import digests_of_rests
 from test.core.retried_handover import EARLIEST_END, LAWS, MISSED, retried_handover
-from test.verification.conftest import Record
+from test.evidence import Record
 
 COUNT = 50  # random ticks under each law
 

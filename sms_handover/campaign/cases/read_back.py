@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from math import isclose
 from typing import Any
 
-import numpy as np
 import pinocchio as pin
 
 from sms_handover.campaign.definition.distributions import Value
@@ -72,7 +71,7 @@ def _found(loop: Loop, path: str) -> Any:
     scenario = loop.scenario
     first, _, rest = path.partition(".")
     if first == CONDITIONS:
-        return _of_conditions(scenario.truth, path_of(f"{path}:=0")[2])
+        return _of_conditions(loop, path_of(f"{path}:=0")[2])
     if first not in (ROBOT, DEPUTY, SCHEDULE, *ROLES):
         section, name = (SHORT[first], first) if first in SHORT and not rest else (first, rest)
         return getattr(getattr(scenario.parameters, section), name)
@@ -174,24 +173,14 @@ def _of_deputy(loop: Loop, world: World, steps: Sequence[str], *, of_plant: bool
     return deputy.mass if steps[0] == "mass" else _of_inertia(deputy.body, steps)
 
 
-def _of_conditions(world: World, steps: Sequence[str]) -> Any:
+def _of_conditions(loop: Loop, steps: Sequence[str]) -> Any:
     """Return a value of the conditions; of one that every joint has, that of the first."""
     if steps[0] == "model_error":
-        return getattr(getattr(world.model_error, steps[1]), steps[2])
-    conditions = world.conditions
-    if steps[0] == "wrenches":
-        model: Any = {**conditions.wrenches, **conditions.deputy_wrenches}[steps[1]]
-        return _entry(getattr(model if hasattr(model, steps[3]) else model.orbit, steps[3]), steps[4:])
-    if steps[0] == "sensors":
-        return _entry(getattr(conditions.sensors[steps[1]], steps[2]), steps[3:] or "0")
-    if steps[0] not in ("friction", "torque", "command"):
-        raise KeyError(steps[0])
-    return _entry(getattr(getattr(conditions, steps[0]), steps[1]), steps[2:] or "0")
-
-
-def _entry(value: Any, steps: Sequence[str]) -> Any:
-    """Return an entry of an array, or a value that is none."""
-    return float(value[int(steps[0])]) if isinstance(value, np.ndarray) else value
+        return getattr(getattr(loop.scenario.truth.model_error, steps[1]), steps[2])
+    value: Any = loop.applied_conditions
+    for step in steps:
+        value = value[int(step)] if isinstance(value, list) else value[step]
+    return value[0] if isinstance(value, list) else value
 
 
 def _of_schedule(world: World, steps: Sequence[str]) -> Any:

@@ -2,6 +2,7 @@
 
 from sms_handover.conditions.sensors.sensor import Memory, Sample, in_ticks
 from sms_handover.types import Array
+from sms_handover.units import ns_to_seconds
 
 
 class DelayLine:
@@ -13,12 +14,18 @@ class DelayLine:
 
     def __init__(self, sensor: str, period: float, latency: float, tick_ns: int) -> None:
         """Take period and latency in s; raises ConfigurationError unless they are multiples of the tick."""
-        self._every = max(1, in_ticks(period, tick_ns, f"{sensor}.period"))
+        self._every, self._tick_ns = in_ticks(period, tick_ns, f"{sensor}.period"), tick_ns
         self._latency = in_ticks(latency, tick_ns, f"{sensor}.latency")
+
+    @property
+    def applied(self) -> dict[str, float]:
+        """Period and latency by which it counts, in s; 0 is every tick, and at once."""
+        counts = {"period": self._every, "latency": self._latency}
+        return {name: ns_to_seconds(ticks * self._tick_ns) for name, ticks in counts.items()}
 
     def measures(self, tick: int) -> bool:
         """Whether the sensor measures in a tick."""
-        return tick % self._every == 0
+        return tick % max(1, self._every) == 0
 
     def put(self, memory: Memory, tick: int, values: Array, *, lost: bool = False) -> Memory:
         """Return the memory with a sample measured now, unless it is lost."""

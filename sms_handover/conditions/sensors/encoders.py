@@ -1,7 +1,8 @@
 """Encoders: the angles of the joints in steps, and rates by a filtered difference of them."""
 
 from dataclasses import dataclass
-from math import exp
+from math import exp, isfinite
+from typing import Any
 
 import numpy as np
 
@@ -41,12 +42,18 @@ class Encoders:
     """
 
     def __init__(self, values: EncoderValues, setting: Setting) -> None:
-        self._values, self._h = values, setting.tick_s
+        self._offset, self._bandwidth, self._h = values.offset, values.bandwidth, setting.tick_s
         self._stepped = values.step > 0.0
         self._step = np.where(self._stepped, values.step, 1.0)
-        self._kept = exp(-values.bandwidth * self._h)
+        self._kept = exp(-self._bandwidth * self._h)
         self._n = setting.joints
         self.reset()
+
+    @property
+    def applied(self) -> dict[str, Any]:
+        """The values by which they compute, rad and 1/s; without a filter there is no bandwidth."""
+        found = {"step": np.where(self._stepped, self._step, 0.0), "offset": self._offset}
+        return {**found, "bandwidth": self._bandwidth} if isfinite(self._bandwidth) else found
 
     def reset(self) -> None:
         """Go back to the start of a run."""
@@ -54,7 +61,7 @@ class Encoders:
 
     def measure(self, truth: Truth, known: Known) -> None:
         """Put measured angles and rates in the place of the true ones."""
-        shifted = truth.q[BASE_NQ:] + self._values.offset
+        shifted = truth.q[BASE_NQ:] + self._offset
         position = np.where(self._stepped, self._step * np.round(shifted / self._step), shifted)
         held = self.memory.held
         if held.size:

@@ -2,11 +2,13 @@
 
 from dataclasses import dataclass
 from math import sqrt
+from typing import Any
 
 import numpy as np
 
 from sms_handover.conditions.sensors.sensor import EMPTY, Known, Memory, Reading, Setting, Truth, in_ticks
 from sms_handover.types import BASE_NV, Array, freeze
+from sms_handover.units import ns_to_seconds
 
 GYRO = "gyro"
 _STREAM = "sensors.gyro"
@@ -45,12 +47,19 @@ class Gyro:
 
     def __init__(self, values: GyroValues, setting: Setting) -> None:
         self._bias = values.bias
-        self._every = max(1, in_ticks(values.period, setting.tick_ns, "gyro.period"))
+        self._asked, self._tick_ns = in_ticks(values.period, setting.tick_ns, "gyro.period"), setting.tick_ns
+        self._every = max(1, self._asked)
         self._period = self._every * setting.tick_s
         self._sigma = values.noise_density / sqrt(self._period)  # rad/s
         self._variance = np.full(_AXES, self._sigma**2)
         self._noise = setting.streams.noise(_STREAM, _AXES)
         self.reset()
+
+    @property
+    def applied(self) -> dict[str, Any]:
+        """The values by which it computes, rad/s/sqrt(Hz), rad/s and s."""
+        density, period = self._sigma * sqrt(self._period), ns_to_seconds(self._asked * self._tick_ns)
+        return {"noise_density": density, "bias": self._bias, "period": period}
 
     def reset(self) -> None:
         """Go back to the start of a run."""

@@ -1,6 +1,6 @@
 """Sensor protocol: what is true at a tick, what is known of it, and what a sensor keeps from tick to tick."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -98,6 +98,10 @@ class Sensor(Protocol):
 
     memory: Memory
 
+    @property
+    def applied(self) -> Mapping[str, Any]:
+        """The values by which it computes, by the names that files of conditions have, times in s."""
+
     def reset(self) -> None:
         """Go back to the start of a run."""
 
@@ -111,7 +115,7 @@ class SensorValues(Protocol):
     def check(self, tick_ns: int) -> None:
         """Raise ConfigurationError unless every time is a multiple of the tick."""
 
-    def make(self, setting: Setting) -> Any:
+    def make(self, setting: Setting) -> Sensor:
         """Return the sensor of a run."""
 
 

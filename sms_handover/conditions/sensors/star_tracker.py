@@ -1,6 +1,7 @@
 """Star tracker of the base: its orientation now and then, and late; a gyro goes on from there."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -57,6 +58,11 @@ class StarTracker:
         self._variance = np.concatenate([np.zeros(_AXES), np.full(_AXES, values.noise**2)])
         self._noise = setting.streams.noise(_STREAM, _AXES)
         self.reset()
+
+    @property
+    def applied(self) -> dict[str, Any]:
+        """The values by which it computes, rad and s."""
+        return {"noise": self._values.noise, "bias": self._values.bias, **self._line.applied}
 
     def reset(self) -> None:
         """Go back to the start of a run."""

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -67,6 +68,11 @@ class SensorSuite:
         self._sensors: dict[str, Sensor] = {
             name: values.make(setting) for name, values in self._values.items()
         }
+
+    @property
+    def applied(self) -> dict[str, Mapping[str, Any]]:
+        """The values by which each sensor computes, by its name."""
+        return {name: sensor.applied for name, sensor in self._sensors.items()}
 
     def reset(self) -> None:
         """Go back to the start of a run."""

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from math import sqrt
+from typing import Any
 
 import numpy as np
 
@@ -64,6 +65,11 @@ class Vision:
         self._line = values.line(setting.tick_ns)
         self._noise = setting.streams.noise(_STREAM, 2 * _AXES)
         self.reset()
+
+    @property
+    def applied(self) -> dict[str, Any]:
+        """The values by which it computes: m, rad, s, and those per metre of range."""
+        return {**vars(self._values), **self._line.applied}
 
     def reset(self) -> None:
         """Go back to the start of a run."""

@@ -80,7 +80,7 @@ class Planner:
         self._tools, self._cost = ToolErrorModel(robot), PlanCost(robot, gains, self.horizon)
         self._limits = Limits(robot, gains, initial_rotation)
         self._distances: DistanceModel | None = None
-        if distances and gains.least_distance > 0.0:
+        if distances and distances.pairs and gains.least_distance > 0.0:
             least = (1.0 + gains.limit_margin) * gains.least_distance
             self._distances = DistanceModel(robot, distances, gains.distance_pairs, least)
 

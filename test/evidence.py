@@ -1,9 +1,13 @@
 """One measured number and the bound it has to keep, as the verification report shows it."""
 
 import json
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from math import isnan
 from pathlib import Path
+
+Record = Callable[..., None]
+Table = Callable[[str], None]
 
 
 @dataclass(frozen=True)
