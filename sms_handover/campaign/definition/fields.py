@@ -139,8 +139,8 @@ CAMPAIGN_FIELDS = MappingSpec(
         "success": text("when a case is a success: an expression over metrics, by default 'complete'"),
         "metrics": ValueSpec("figures to keep beside the usual ones, as PHASE.ARM.FIGURE", kind=TEXTS),
         "worst_by": text(
-            "metric by which cases are worst: the larger, but of clearance and complete the smaller; by default "
-            "'grasp_error'"
+            "metric by which cases are worst: the larger, but of clearance and complete the smaller; "
+            "'grasp_error' by default"
         ),
         "stop": _STOP,
         "keep": _KEEP,
