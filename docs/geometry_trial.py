@@ -30,13 +30,13 @@ from sms_handover.control.pid import PID
 from sms_handover.errors import ConfigurationError
 from sms_handover.model.poses import pose_of, se3_of
 from sms_handover.run_data import RunData
-from sms_handover.simulation.loop import Loop
-from sms_handover.simulation.observed_ticks import Period
-from sms_handover.simulation.recorder import RunRecorder
+from sms_handover.simulation.observed_ticks import Ticks
+from sms_handover.simulation.quiet_periods import QuietPeriods
 from sms_handover.simulation.scenario import Scenario, World, load_scenario
+from sms_handover.simulation.simulate import simulate
 from sms_handover.trajectory.load import schedule_of
 from sms_handover.trajectory.schedule import Schedule
-from sms_handover.types import BASE_NV, Array, GraspStatus, Pose
+from sms_handover.types import BASE_NV, Array, GraspEvent, GraspStatus, Pose
 
 LAWS = (PID.name, NMPC.name)  # the one that fails more often first
 _SHARES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4)  # [-] of a straight joint path; PID overshoots
@@ -99,6 +99,7 @@ class Bench:
         scenario = self._scenarios[LAWS[0]]
         self.robot, self.ik = scenario.model.robot, scenario.parameters.ik
         self._reference_ns = scenario.parameters.common.reference_ns
+        self._per_reference = scenario.parameters.common.ticks_per_reference
         robot = self.robot
         self._bodies = ClearanceModel(robot.pin, robot.urdf, robot.arms, np.array(SIZE))
         meet = {BodyKind.GRIPPER, BodyKind.DEPUTY}
@@ -140,30 +141,15 @@ class Bench:
     def attempt(self, schedule: Schedule, law: str, floor: float = 0.0) -> Attempt:
         """Return what comes of a schedule under one law."""
         world = World(self.robot, schedule)
+        watch = _Watch(self._bodies, self._rate_limit, floor, self._per_reference)
         try:
-            loop = Loop(Scenario(self._scenarios[law].parameters, world, world))
+            run = simulate(Scenario(self._scenarios[law].parameters, world, world), until=watch.fails_in)
         except ConfigurationError as error:
             return Attempt(str(error), schedule.phases[0].name, -inf, inf)
-        recorder = RunRecorder(self.robot.joint_names, self.robot.arms)
-        least, rate, failure, phase = inf, 0.0, "", ""
-        while not loop.finished and not failure:
-            period, q, v = _advanced(loop, recorder)
-            phase = period.phase.name
-            distances = self._bodies.distances(q, period.deputy.deputy_in_world)
-            nearest = int(distances.argmin())
-            least = min(least, float(distances[nearest]))
-            rate = max(rate, float((np.abs(v[:, BASE_NV:]) / self._rate_limit).max()))
-            if any(event.status is not GraspStatus.SUCCEEDED for event in period.events):
-                failure = "a grasp missed"
-            elif least < floor:
-                one, other = self._bodies.pairs[nearest]
-                failure = f"{one.label} - {other.label}"
-            elif rate > 1.0:
-                failure = "rate limit"
-        run = None if failure else recorder.data()
-        if run is not None and self._beyond(run):
-            failure = "position limit"
-        return Attempt(failure, phase, least, rate, run)
+        if watch.failure:
+            return Attempt(watch.failure, watch.phase, watch.least, watch.rate)
+        beyond = "position limit" if self._beyond(run) else ""
+        return Attempt(beyond, watch.phase, watch.least, watch.rate, run)
 
     def _beyond(self, run: RunData) -> bool:
         """Whether a joint was beyond its position limits."""
@@ -192,12 +178,49 @@ class Bench:
                 yield CARRY, joints, held(joints, ARM_A, END_A)
 
 
-def _advanced(loop: Loop, recorder: RunRecorder) -> tuple[Period, Array, Array]:
-    """Carry out a reference period; return how it began, q (7 + n,) then, and v (ticks, 6 + n) in it."""
-    ticks = loop.advance_period()
-    recorder.add(ticks)
-    assert ticks.period is not None
-    return ticks.period, ticks.rows.q[0], ticks.rows.v
+class _Watch:
+    """Looks at every reference period of a run in turn, up to the one in which something fails."""
+
+    def __init__(self, bodies: ClearanceModel, rate_limit: Array, floor: float, per_reference: int) -> None:
+        """Begin a run; bodies fail nearer than ``floor`` m."""
+        self._bodies, self._rate_limit = bodies, rate_limit
+        self._floor, self._per_reference = floor, per_reference
+        self.least, self.rate, self.failure, self.phase = inf, 0.0, "", ""
+
+    def fails_in(self, ticks: Ticks | QuietPeriods) -> bool:
+        """Whether something fails in one of these periods, of which the later ones are not looked at."""
+        for phase, q, v, deputy, events in _periods(ticks, self._per_reference):
+            self.phase, self.failure = phase, self._failure(q, v, deputy, events)
+            if self.failure:
+                return True
+        return False
+
+    def _failure(self, q: Array, v: Array, deputy: Pose, events: tuple[GraspEvent, ...]) -> str:
+        """Return what fails in a period, '' if nothing does, and note how near and fast it was."""
+        distances = self._bodies.distances(q, deputy)
+        nearest = int(distances.argmin())
+        self.least = min(self.least, float(distances[nearest]))
+        self.rate = max(self.rate, float((np.abs(v[:, BASE_NV:]) / self._rate_limit).max()))
+        if any(event.status is not GraspStatus.SUCCEEDED for event in events):
+            return "a grasp missed"
+        if self.least < self._floor:
+            one, other = self._bodies.pairs[nearest]
+            return f"{one.label} - {other.label}"
+        return "rate limit" if self.rate > 1.0 else ""
+
+
+def _periods(
+    ticks: Ticks | QuietPeriods, per_reference: int
+) -> Iterator[tuple[str, Array, Array, Pose, tuple[GraspEvent, ...]]]:
+    """Yield phase, q (7 + n,) as it begins, v (ticks, 6 + n) in it, deputy and grasps of every period."""
+    q, v = ticks.rows.q, ticks.rows.v
+    if isinstance(ticks, Ticks):
+        assert ticks.period is not None
+        yield ticks.period.phase.name, q[0], v, ticks.period.deputy.deputy_in_world, ticks.period.events
+        return
+    for index, (phase, row) in enumerate(zip(ticks.phases, ticks.periods.deputy_pose, strict=True)):
+        first = index * per_reference
+        yield phase.name, q[first], v[first : first + per_reference], Pose(row[:3], row[3:]), ()
 
 
 def _or_late(time: float) -> float:

@@ -20,9 +20,10 @@ from sms_handover.model.reduced import reduced_dynamics
 from sms_handover.run_data import RunData
 from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.feasibility import check_feasibility
-from sms_handover.simulation.loop import Loop
-from sms_handover.simulation.recorder import RunRecorder
+from sms_handover.simulation.observed_ticks import Ticks
+from sms_handover.simulation.quiet_periods import QuietPeriods
 from sms_handover.simulation.scenario import Scenario, load_scenario
+from sms_handover.simulation.simulate import simulate
 from sms_handover.simulation.wiring import gains_by_phase
 from sms_handover.types import GraspStatus
 from sms_handover.units import DEG_PER_RAD, MM_PER_M, ns_to_seconds
@@ -120,7 +121,7 @@ def outcome_of(case: Case) -> Outcome:
             check_scenario(scenario)
         except UnstableLoopError:
             return Outcome("rejected as unstable")
-    run = _run(scenario)
+    run = simulate(scenario, until=_grasp_missed)
     attitude = run.base_pose[:, 3:]
     turn = float(np.max(angle_between(attitude[:1], attitude))) * DEG_PER_RAD
     held = run.tick_ns > run.grasp_events[0].stamp_ns  # before, no mass is in the hand
@@ -177,18 +178,10 @@ def placed(name: str, size: tuple[float, ...]) -> dict[str, object]:
     return {"deputy.size": list(size), "deputy.in_world.xyz": centre.tolist(), **frames}
 
 
-def _run(scenario: Scenario) -> RunData:
-    """Return the run of a scenario, up to the first grasp that misses."""
-    loop = Loop(scenario)
-    robot = scenario.model.robot
-    recorder = RunRecorder(robot.joint_names, robot.arms)
-    missed = False
-    while not (loop.finished or missed):
-        ticks = loop.advance_period()
-        recorder.add(ticks)
-        events = ticks.period.events if ticks.period else ()
-        missed = any(event.status is not GraspStatus.SUCCEEDED for event in events)
-    return recorder.data()
+def _grasp_missed(ticks: Ticks | QuietPeriods) -> bool:
+    """Whether a grasp has missed; in quiet periods there is none."""
+    period = ticks.period if isinstance(ticks, Ticks) else None
+    return period is not None and any(event.status is not GraspStatus.SUCCEEDED for event in period.events)
 
 
 def _words(case: Case, scenario: Scenario, run: RunData) -> str:

@@ -19,7 +19,7 @@ class PlanStatus(Enum):
 
 @dataclass(frozen=True)
 class PlanReport:
-    """One solve of a predictive law for the state at ``stamp_ns``.
+    """One solve of a predictive law for the state at ``stamp_ns``, or that plans are overdue in real time.
 
     ``plan`` is the number of the solve, ``active`` the rows of constraints that bind. ``largest_slack`` is by
     how much the worst soft limit is exceeded, in the unit of ``largest_slack_row``. Times in s are of the
@@ -40,6 +40,11 @@ class PlanReport:
     plan_age: float
     late_plans: int = 0
     reused_plans: int = 0
+
+    @property
+    def has_solve(self) -> bool:
+        """Whether a solve came of it; that the arms brake as plans are overdue is told without one."""
+        return self.total_time > 0.0
 
 
 @dataclass(frozen=True, eq=False)

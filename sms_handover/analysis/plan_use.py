@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import nan
 from types import MappingProxyType
 
 import numpy as np
@@ -15,7 +16,7 @@ _TAIL = 99.0  # [%] percentile of the solve times that is reported
 
 @dataclass(frozen=True, eq=False)
 class PlanUse:
-    """The solves of a run.
+    """The solves of a run; reports without a solve are not among them.
 
     ``failed_solves`` gave no plan; ``reused_plans`` and ``late_plans`` are counts of periods and plans.
     ``binding_share`` of the solves have a row that binds, ``binding`` counts them by row. ``largest_slack``
@@ -45,19 +46,20 @@ def plan_use(run: RunData) -> PlanUse | None:
     plans = run.plans
     if not plans:
         return None
-    times = np.array([plan.total_time for plan in plans])
+    solves = [plan for plan in plans if plan.has_solve]
+    times = [plan.total_time for plan in solves] or [nan]
     worst = max(plans, key=lambda plan: plan.largest_slack)
     return PlanUse(
-        solves=len(plans),
-        failed_solves=sum(plan.status is not PlanStatus.SOLVED for plan in plans),
+        solves=len(solves),
+        failed_solves=sum(plan.status is not PlanStatus.SOLVED for plan in solves),
         reused_plans=plans[-1].reused_plans,
         late_plans=plans[-1].late_plans,
-        binding_share=sum(bool(plan.active) for plan in plans) / len(plans),
-        binding=Counter(row for plan in plans for row in plan.active),
+        binding_share=sum(bool(plan.active) for plan in solves) / max(1, len(solves)),
+        binding=Counter(row for plan in solves for row in plan.active),
         largest_slack=worst.largest_slack,
         largest_slack_row=worst.largest_slack_row,
         solve_median=float(np.median(times)),
         solve_tail=float(np.percentile(times, _TAIL)),
-        solve_max=float(times.max()),
-        program_median=float(np.median([plan.program_time for plan in plans])),
+        solve_max=max(times),
+        program_median=float(np.median([plan.program_time for plan in solves] or [nan])),
     )

@@ -5,11 +5,14 @@ from collections.abc import Callable, Sequence
 from sms_handover.control.protocol import Controller
 from sms_handover.run_data import RunData
 from sms_handover.simulation.loop import Loop
+from sms_handover.simulation.observed_ticks import Ticks
+from sms_handover.simulation.quiet_periods import QuietPeriods
 from sms_handover.simulation.recorder import RunRecorder
 from sms_handover.simulation.scenario import Scenario
 from sms_handover.types import BaseWrench, TaskPhase
 
 Progress = Callable[[int, TaskPhase], None]
+Until = Callable[[Ticks | QuietPeriods], bool]
 
 
 def simulate(
@@ -18,12 +21,14 @@ def simulate(
     controller: Controller | None = None,
     progress: Progress | None = None,
     base_wrenches: Sequence[BaseWrench] = (),
+    until: Until | None = None,
 ) -> RunData:
     """Return the run of a scenario, by default the shipped one.
 
     ``controller`` replaces that of the scenario and is reset first. ``progress`` is called each reference
     period with the time in ns and the phase. ``base_wrenches`` act as if they had come by topic
-    ``base_wrench``. Raises what :class:`~sms_handover.simulation.loop.Loop` does.
+    ``base_wrench``. ``until`` is given what was carried out, and returns whether the run ends with that; it
+    may be several reference periods. Raises what :class:`~sms_handover.simulation.loop.Loop` does.
     """
     loop = Loop(scenario, controller, base_wrenches)
     robot = loop.scenario.model.robot
@@ -35,4 +40,6 @@ def simulate(
         if progress:
             for phase in ticks.phases:
                 progress(phase.stamp_ns, phase)
+        if until and until(ticks):
+            break
     return recorder.data(loop.base_wrenches, loop.applied)

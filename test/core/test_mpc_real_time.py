@@ -154,6 +154,7 @@ def test_without_plans_the_arms_brake_and_an_old_plan_is_not_used(in_real_time: 
     braking, stale = stopped
     begin = 6 * PERIOD_NS  # of the sixth plan, the last that came in time
     assert (braking.stamp_ns, braking.plan) == (begin + HOLD * PERIOD_NS, 8)
+    assert stale.has_solve and not braking.has_solve
     assert braking.plan_age == pytest.approx(HOLD * PERIOD_NS / 1e9) and braking.late_plans == 1
     assert stale.plan == 7 and 7 not in live.plans and live.plans == sorted(live.plans)
     at, fastest = braking.stamp_ns // TICK_NS, np.abs(live.rates).max(axis=1)

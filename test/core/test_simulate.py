@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from sms_handover.analysis.equality import before, compare_runs
 from sms_handover.errors import ConfigurationError, UnstableLoopError
 from sms_handover.graph.events import GRASP_FAILED, GRASP_MISSED, IK_FAILED, PHASE_RETRIED
 from sms_handover.graph.message_constants import CONSTANTS
@@ -128,6 +129,14 @@ def test_progress_is_told_every_period(make_scenario: MakeScenario) -> None:
 
     data = simulate(make_scenario(common={"duration": 0.5}), progress=progress)
     assert told == [(stamp, "approach" if stamp < 400_000_000 else "carry") for stamp in data.reference_ns]
+
+
+def test_a_run_ends_where_it_is_asked_to(make_scenario: MakeScenario) -> None:
+    """With what was carried out before; until then it is the run that goes on."""
+    scenario = make_scenario(common={"duration": 0.2})
+    ended = simulate(scenario, until=lambda ticks: ticks.rows.stamp_ns[-1] >= 90_000_000)
+    assert ended.tick_ns[-1] == 99_000_000
+    assert compare_runs(ended, before(simulate(scenario), 100_000_000)) == ()
 
 
 @pytest.mark.parametrize("law", ["nmpc", "pid"])
