@@ -105,7 +105,7 @@ class Cases:
         done = 0
         while not loop.finished:
             try:
-                ticks = loop.advance_quietly()
+                ticks = loop.advance_quietly(recorder.room)
             except NoPlanError as error:  # as far as it came, and without metrics: less effort is no merit
                 run = recorder.data(loop.base_wrenches, loop.applied) if done else None
                 return Status.MISSION_FAILED, str(error), run
