@@ -957,6 +957,20 @@ BREAKS: tuple[Break, ...] = (
         "campaign_cases",
     ),
     _core(
+        "no case the worst by a metric that is not among the usual ones",
+        "campaign/cases/case",
+        "(*campaign.metrics, *campaign.success.names, campaign.worst_by)",
+        "(*campaign.metrics, *campaign.success.names)",
+        "campaign_cases",
+    ),
+    _core(
+        "the cases with the most clearance taken for the worst",
+        "campaign/statistics/worst_cases",
+        "sign = -1.0 if metric in SMALLER_IS_WORSE else 1.0",
+        "sign = 1.0",
+        "campaign_statistics",
+    ),
+    _core(
         "a worst case kept that is not the one of its row",
         "campaign/record/kept_cases",
         "if result.run is None or result.row.text != row.text:",
