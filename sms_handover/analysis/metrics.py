@@ -6,6 +6,7 @@ from math import isnan, nan
 from types import MappingProxyType
 
 from sms_handover.analysis.base_motion import UNKNOWN_MOTION, BaseMotion, base_motion
+from sms_handover.analysis.blocked_tools import BlockedTool, blocked_tools
 from sms_handover.analysis.clearance import RunClearance, TaskTexts, run_clearance
 from sms_handover.analysis.completion import Completion, completion
 from sms_handover.analysis.conservation import IkOutcomes, PhysicsResiduals, ik_outcomes, physics_residuals
@@ -67,6 +68,12 @@ class RunMetrics:
     def completion(self) -> Completion:
         """Whether the run did its task, and what it lacks."""
         return completion(self.run, self.clearance)
+
+    @property
+    def blocked(self) -> tuple[BlockedTool, ...]:
+        """The tools off their targets at the end of a phase while a limit of a predictive law binds."""
+        tools = [tool for item in self.phases for tool in item.tools.values()]
+        return blocked_tools(self.run.plans, tools)
 
     def phase(self, name: str) -> PhaseMetrics | None:
         """Return the phase with a name, None if the run has none."""

@@ -6,6 +6,7 @@ from functools import partial
 
 from sms_handover.analysis.layout import MISSING, Row, Section, row
 from sms_handover.analysis.metrics import RunMetrics
+from sms_handover.units import MM_PER_M
 
 _MS_PER_S = 1000.0  # [ms/s]
 _MOST_ROWS = 8  # [-] rows of constraints that are listed, those that bind most often
@@ -37,4 +38,17 @@ def plan_sections(runs: Sequence[RunMetrics]) -> tuple[Section, ...]:
         rows.append(Row(f"  {name}", cells))
     rows.append(_cost("largest excess of a soft limit, in its unit", plans, lambda item: item.largest_slack))
     rows.append(Row("  of", tuple((item.largest_slack_row or "none") if item else MISSING for item in plans)))
+    rows += _blocked_rows(runs)
     return (Section("Plans of the predictive law", tuple(rows)),)
+
+
+def _blocked_rows(runs: Sequence[RunMetrics]) -> list[Row]:
+    """Return how far tools are off their targets at the end of a phase while a limit binds, if any is."""
+    by_run = [{(item.phase, item.arm, item.row): item.error for item in run.blocked} for run in runs]
+    keys = dict.fromkeys(key for errors in by_run for key in errors)
+    rows = [Row("tools off their targets at the end of a phase while a limit binds [mm]")] if keys else []
+    for key in keys:
+        phase, arm, name = key
+        cells = tuple(f"{errors[key] * MM_PER_M:.4g}" if key in errors else MISSING for errors in by_run)
+        rows.append(Row(f"  {phase}, {arm}: {name}", cells))
+    return rows

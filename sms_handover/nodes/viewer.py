@@ -15,6 +15,7 @@ from sms_handover.graph.topics import (
     DEPUTY_MARKER,
     DEPUTY_POSE,
     GRASP_EVENT,
+    PLANNED_PATHS,
     ROBOT_DESCRIPTION,
     SAMPLED_BASE_ODOMETRY,
     SAMPLED_JOINT_STATES,
@@ -24,8 +25,10 @@ from sms_handover.graph.topics import (
     target_pose,
 )
 from sms_handover.model.poses import pose_row
+from sms_handover.plan_report import PlannedPaths
 from sms_handover.ros.codecs.events import read_grasp_event
 from sms_handover.ros.codecs.loop_messages import PoseCodec, Stamped, StateCodec, stamped, state_of
+from sms_handover.ros.codecs.planned_paths import read_planned_paths
 from sms_handover.ros.codecs.task_phase import PhaseCodec
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.node.message_filter import Decode, MessageFilter, OnMessage
@@ -53,7 +56,7 @@ class ViewerNode(RunnableNode):
     """Shows a graph that runs or is played back in a browser; nothing in the graph waits for it.
 
     It subscribes to robot_description, deputy/marker, the sampled states, deputy/pose, the target poses,
-    task/phase and task/grasp_event, best effort where they are many.
+    task/phase, task/grasp_event and mpc/planned_paths, best effort where they are many.
     """
 
     def __init__(self) -> None:
@@ -74,6 +77,7 @@ class ViewerNode(RunnableNode):
             self.create_subscription(self._kind(name), name, on_message, LATCHED)
         self._subscribe(GRASP_EVENT, self._on_event, read_grasp_event, LATCHED)
         self._subscribe(TASK_PHASE, self._on_phase, PhaseCodec().read, _LOSSY)
+        self._subscribe(PLANNED_PATHS, self._on_paths, read_planned_paths, _LOSSY)
         for name in self._wanted:
             self._subscribe(name, partial(self._add, name), stamped, _LOSSY)
         self.server = SceneServer(self.find_scene, self.parameters.port, "Handover, live")
@@ -144,6 +148,10 @@ class ViewerNode(RunnableNode):
     def _on_event(self, event: GraspEvent, sent_ns: int) -> None:
         if self._scene:
             self._scene.add_event(event)
+
+    def _on_paths(self, paths: PlannedPaths, sent_ns: int) -> None:
+        if self._scene:
+            self._scene.add_paths(paths)
 
     def _add(self, name: str, message: Stamped[bytes], sent_ns: int) -> None:
         """Keep the content of a good message until all of its stamp are there, then show them."""

@@ -37,7 +37,7 @@ def scene_document(name: str, scene: Scene) -> Document:
         **task_document(scene.phases, scene.grasp_events),
         **({"clearance": _clearance(scene.worst_pair)} if scene.worst_pair else {}),
         **({"momentum": _momentum(scene.momentum)} if scene.momentum else {}),
-        **({"planned": _planned(scene.planned)} if scene.planned else {}),
+        **({"planned": planned_document(scene.planned)} if scene.planned else {}),
     }
 
 
@@ -76,6 +76,15 @@ def task_document(phases: Sequence[TaskPhase], events: Sequence[GraspEvent]) -> 
     }
 
 
+def planned_document(planned: PlannedLines) -> Document:
+    """Return the instants (P,) s of plans, and their lines (P, A, K, 3) m with K points each."""
+    return {
+        "times": _base64(planned.stamp_ns / NS_PER_S, "<f8"),
+        "points": _base64(planned.points, "<f4"),
+        "size": planned.points.shape[2],
+    }
+
+
 def _clearance(worst: WorstPair) -> Document:
     """Return, per instant, the index of the worst pair (T,), its distance (T,) m and points (T, 2, 3) m."""
     used, index = np.unique(worst.pair, return_inverse=True)
@@ -92,15 +101,6 @@ def _momentum(momentum: Momentum) -> Document:
     return {
         "centres": _base64(momentum.centre_of_mass, "<f4"),
         "angular": _base64(momentum.angular_momentum, "<f4"),
-    }
-
-
-def _planned(planned: PlannedLines) -> Document:
-    """Return the instants (P,) s of plans, and their lines (P, A, K, 3) m with K points each."""
-    return {
-        "times": _base64(planned.stamp_ns / NS_PER_S, "<f8"),
-        "points": _base64(planned.points, "<f4"),
-        "size": planned.points.shape[2],
     }
 
 

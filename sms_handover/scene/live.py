@@ -7,8 +7,16 @@ from threading import Condition
 import numpy as np
 
 from sms_handover.errors import ConfigurationError
-from sms_handover.scene.document import Document, moving_document, still_document, task_document
+from sms_handover.plan_report import PlannedPaths
+from sms_handover.scene.document import (
+    Document,
+    moving_document,
+    planned_document,
+    still_document,
+    task_document,
+)
 from sms_handover.scene.links import DescribedRobot
+from sms_handover.scene.planned_lines import planned_lines
 from sms_handover.scene.scene import FRAME_RATE
 from sms_handover.scene.shapes import read_shapes
 from sms_handover.types import Array, GraspEvent, TaskPhase
@@ -31,10 +39,11 @@ class LiveFrame:
 
 @dataclass(frozen=True)
 class Seen:
-    """How much of a live scene a viewer has: the number of the run, and of its frames."""
+    """How much of a live scene a viewer has: the number of the run, and of its frames and plans."""
 
     run: int = 0
     frames: int = 0
+    plans: int = 0
 
 
 class LiveScene:
@@ -84,6 +93,18 @@ class LiveScene:
         with self._changed:
             self._events.append(event)
 
+    def add_paths(self, paths: PlannedPaths) -> None:
+        """Add the paths of a plan if they are due, to be told with the next instant.
+
+        A stamp that goes back starts another run.
+        """
+        with self._changed:
+            if self._paths and paths.stamp_ns < self._paths[-1].stamp_ns:
+                self._reset()  # its first frame is still to come
+            if self._paths and paths.stamp_ns < self._paths[-1].stamp_ns + self._step_ns:
+                return
+            self._paths.append(paths)
+
     def updates(self, seen: Seen, timeout: float) -> tuple[Document, Seen] | None:
         """Return what is new since ``seen``, the whole scene if another run has started.
 
@@ -92,18 +113,20 @@ class LiveScene:
         with self._changed:
             if not self._changed.wait_for(lambda: self._stamps and self._seen != seen, timeout):
                 return None
-            first = seen.frames if seen.run == self._run else 0
+            known = seen if seen.run == self._run else Seen()
+            first, planned = known.frames, planned_lines(self._paths[known.plans :], self.arms)
             document = {
                 **(self._still if first == 0 else {}),
                 **moving_document(np.array(self._stamps[first:]), np.array(self._poses[first:])),
                 **task_document(self._phases, self._events),
+                **({"planned": planned_document(planned)} if planned else {}),
             }
             return document, self._seen
 
     @property
     def _seen(self) -> Seen:
         """Return the state of a viewer that is up to date."""
-        return Seen(self._run, len(self._stamps))
+        return Seen(self._run, len(self._stamps), len(self._paths))
 
     def _reset(self) -> None:
         """Start another run, without frames."""
@@ -112,8 +135,10 @@ class LiveScene:
         self._poses: list[Array] = []
         self._phases: list[TaskPhase] = []
         self._events: list[GraspEvent] = []
+        self._paths: list[PlannedPaths] = []
 
     def _drop_half(self) -> None:
-        """Drop the older half of the frames; every viewer gets the rest again."""
+        """Drop the older half of the frames, and their plans; every viewer gets the rest again."""
         self._run += 1
         del self._stamps[: _MOST_FRAMES // 2], self._poses[: _MOST_FRAMES // 2]
+        self._paths = [paths for paths in self._paths if paths.stamp_ns >= self._stamps[0]]

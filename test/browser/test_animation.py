@@ -115,7 +115,7 @@ def test_a_plan_is_drawn_while_it_is_the_latest(opened: Open, scenes: dict[str, 
             assert visible is shown, t
             ends = np.reshape(numbers, (-1, 2, 3))[:, 1] if shown else planned.points[0, arm, 1:]
             assert np.abs(ends - planned.points[0, arm, 1:]).max() < SINGLE
-    assert page.evaluate("player.runs[1].planned") is None
+    assert page.evaluate("player.runs[1].planned.times") == []
 
 
 def test_between_two_instants_a_body_is_on_the_straight_line(opened: Open, scenes: dict[str, Scene]) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 
+from sms_handover.plan_report import PlannedPaths
 from sms_handover.run_data import RunData
 from sms_handover.scene.live import LiveScene
 from sms_handover.scene.scene import Scene, make_scene
@@ -31,7 +32,12 @@ def scenario(tmp_path_factory: pytest.TempPathFactory) -> Scenario:
 
 @pytest.fixture(scope="module")
 def run(scenario: Scenario) -> RunData:
-    return simulate(scenario)
+    """A run that has two plans, as one under a predictive law: one soon, and one of the last frame."""
+    simulated = simulate(scenario)
+    last_ns = int(simulated.reference_ns[-1]) // 40_000_000 * 40_000_000
+    lines = {arm: poses[:4, :3] for arm, poses in simulated.tool_pose.items()}
+    longer = {arm: poses[:6, :3] for arm, poses in simulated.tool_pose.items()}
+    return replace(simulated, planned_paths=(PlannedPaths(200_000_000, lines), PlannedPaths(last_ns, longer)))
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +91,7 @@ def test_it_waits_then_follows_what_comes(
     page.get_by_text("Waiting for a run to start").wait_for()
     play(live, run, scene, slice(0, 4))
     wait_until(page, f"player.t === {scene.stamp_ns[3] / 1e9}")
-    assert page.locator("#trouble").is_hidden()
+    assert page.locator("#trouble").is_hidden() and page.locator("#planned").is_hidden()
     for row in range(4, len(scene.stamp_ns)):
         play(live, run, scene, slice(row, row + 1))
     wait_until(page, f"player.t === {scene.stamp_ns[-1] / 1e9}")
@@ -93,6 +99,14 @@ def test_it_waits_then_follows_what_comes(
     for place, link in enumerate(scene.links):
         drawn = page.evaluate(f"player.runs[0].position({link!r}).toArray()")
         assert np.abs(np.array(drawn) - scene.link_in_world[-1, place, :3]).max() < 1e-6
+    script = """(t) => { player.seek(t); return player.runs[0].planned.lines.map((line) =>
+        Array.from(line.geometry.attributes.instanceEnd.data.array)) }"""
+    for paths in reversed(run.planned_paths):
+        drawn = page.evaluate(script, paths.stamp_ns / 1e9)
+        for arm, numbers in zip(scene.arms, drawn, strict=True):
+            ends = np.reshape(numbers, (-1, 2, 3))[:, 1]
+            np.testing.assert_allclose(ends, paths.tool_in_world[arm][1:], rtol=0.0, atol=1e-6)
+    assert page.locator("#planned").is_visible()
     assert page.locator("#phases button").all_inner_texts() == [phase.name for phase in scene.phases]
 
 

@@ -22,6 +22,14 @@ def poses(document: Any, bodies: int) -> Array:
     return numbers.reshape(-1, bodies, 7)
 
 
+def plans(document: Any, arms: int) -> tuple[Array, Array]:
+    """Return the instants (P,) s of plans and their lines (P, arms, K, 3) m, none where there are none."""
+    if "planned" not in document:
+        return np.zeros(0), np.zeros((0, arms, 0, 3))
+    lines = np.frombuffer(base64.b64decode(document["planned"]["points"]), "<f4").astype(np.float64)
+    return times(document["planned"]), lines.reshape(-1, arms, document["planned"]["size"], 3)
+
+
 def frames(run: Any, scene: Scene) -> list[LiveFrame]:
     """Return the instants of a scene as a graph would publish them."""
     ticks = np.searchsorted(run.tick_ns, scene.stamp_ns)
@@ -39,8 +47,11 @@ def frames(run: Any, scene: Scene) -> list[LiveFrame]:
 
 
 def play(live: LiveScene, run: Any, scene: Scene, rows: slice = slice(None)) -> None:
-    """Add some instants of a run to a live scene, with its phases and grasps."""
+    """Add some instants of a run to a live scene, with its phases, and its plans of these instants."""
     for frame in frames(run, scene)[rows]:
         phase = [phase for phase in scene.phases if phase.stamp_ns <= frame.stamp_ns][-1]
         live.set_phase(replace(phase, stamp_ns=frame.stamp_ns))
+        for paths in run.planned_paths:
+            if paths.stamp_ns == frame.stamp_ns:
+                live.add_paths(paths)
         live.add(frame)

@@ -1,4 +1,5 @@
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -7,9 +8,11 @@ import numpy as np
 import pytest
 
 from sms_handover.analysis.comparison import compare
+from sms_handover.analysis.metrics import measure
 from sms_handover.analysis.summary import summary
 from sms_handover.analysis.table import comparison_table
 from sms_handover.errors import UnknownNameError
+from sms_handover.plan_report import PlanReport, PlanStatus
 from sms_handover.plant.deputy import GraspTolerance
 from sms_handover.run_data import RunData
 from sms_handover.simulation.scenario import load_scenario
@@ -17,7 +20,7 @@ from sms_handover.simulation.simulate import simulate
 from sms_handover.types import Array
 
 from .test_analysis_claims import BAD, GOOD, HANDOVER, Law, run_of
-from .test_analysis_runs import changed, grasp, make_run
+from .test_analysis_runs import changed, grasp, line, make_run, still
 
 TOLERANCE = GraspTolerance(0.010, 0.0349, 0.020)
 
@@ -263,3 +266,33 @@ def test_runs_of_the_simulation_can_be_compared() -> None:
         assert item.physics.energy < 1e-6
         assert (item.ik.solves, item.ik.failures) == (6, 0)
     assert len(found.claims) == 6
+
+
+def test_what_keeps_a_tool_from_its_target_is_named() -> None:
+    """A row of places that binds in most of the last tenth; rates slow down, a settled tool is there.
+
+    An arm that holds its joints has no target that it could be kept from.
+    """
+    row, other = "distance arm_b_gripper - deputy", "position of arm_b_joint_6"
+    stamps = range(0, 6_000_000_000, 20_000_000)
+
+    def plans(at_end: tuple[str, ...], before: tuple[str, ...]) -> tuple[PlanReport, ...]:
+        """Return solves of which the rows ``at_end`` bind in the last tenths of both phases."""
+        binds = [(stamp, at_end if stamp % 3_000_000_000 >= 2_700_000_000 else before) for stamp in stamps]
+        measured = (0.0, "", 0.0, 0.0, 0.0, 0.0, 0.0)
+        return tuple(PlanReport(stamp, 1, PlanStatus.SOLVED, 1, rows, *measured) for stamp, rows in binds)
+
+    target = {"arm_a": still((1.0, 0.0, 0.0)), "arm_b": still((1.0, 0.0, 0.0))}
+    drifting = line(lambda t: 1.0 + 0.004 * np.maximum(t - 3.0, 0.0))
+    tool = {"arm_a": drifting, "arm_b": line(lambda t: np.minimum(t, 0.957))}
+    phases = (("reach", 0.0), ("stay", 3.0))
+    given: dict[str, Any] = {"end": 6.0, "phases": phases, "tool": tool, "target": target}
+    stuck = make_run(**given, plans=plans((row, "rate of arm_b_joint_1"), (other,)))
+    slow = make_run(**given, plans=plans(("rate of arm_b_joint_1",), (row,)))
+    found = [(item.phase, item.arm, item.row) for item in measure(stuck).blocked]
+    assert found == [("reach", "arm_b", row), ("stay", "arm_b", row)]
+    assert measure(slow).blocked == ()
+    table = comparison_table({"stuck": stuck, "slow": slow})
+    assert re.search(rf"\n  reach, arm_b: {row} +43 +-\n  stay, arm_b: {row} +43 +-\n", table)
+    settled = make_run(**{**given, "tool": target}, plans=stuck.plans)
+    assert "while a limit binds" not in comparison_table({"settled": settled, "slow": slow})

@@ -1,6 +1,7 @@
 """Cases of a campaign: their rows, what is read back, and how a case ends that ends badly."""
 
 import json
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import pytest
 
 from sms_handover.analysis.equality import compare_runs, run_digest
 from sms_handover.campaign.cases.case import Cases
-from sms_handover.campaign.cases.case_process import CaseProcess
+from sms_handover.campaign.cases.case_process import CASE_PROGRAM, CaseProcess
 from sms_handover.campaign.cases.case_row import Row, Status, Task, row_of
 from sms_handover.campaign.cases.read_back import is_same, read_back
 from sms_handover.campaign.cases.retained import trajectory
@@ -144,9 +145,10 @@ def test_a_draw_that_no_scenario_can_have_is_a_row(tmp_path: Path) -> None:
 
 
 def test_a_mission_failure_is_no_numeric_failure(tmp_path: Path) -> None:
-    row = cases_of(tmp_path, success="complete").run(TASK).row
+    row = cases_of(tmp_path, success="complete", worst_by="approach.arm_a.final_error").run(TASK).row
     assert (row.status, row.numeric_failure, row.mission_failure) == (Status.MISSION_FAILED, False, True)
     assert row.cause.startswith("ended at 0.04 s") and row.run_digest
+    assert "approach.arm_a.final_error" in row.metrics, "or no case could be the worst"
 
 
 def test_a_run_without_a_plan_is_a_failed_mission_with_its_cause(
@@ -218,6 +220,17 @@ def test_bad_cases_end_as_rows_with_their_causes(tmp_path: Path, monkeypatch: py
     assert (rows[3].status, rows[3].cause) == (Status.LIMIT, "more than 100 MB of memory")
     assert [rows[case].run_digest for case in range(5)] == ["00", "", "", "", "00"]
     assert not list((tmp_path / "scratch").iterdir()), "whoever was killed left nothing behind"
+
+
+def test_a_process_whose_parent_is_killed_while_it_starts_leaves_nothing(tmp_path: Path) -> None:
+    frozen, number = freeze(written(tmp_path))
+    (tmp_path / "scratch").mkdir()
+    child = subprocess.Popen(CASE_PROGRAM, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert child.stdin and child.stdout
+    child.stdout.close()
+    first = {"files": dict(frozen.files), "cases": number, "folder": str(tmp_path / "scratch")}
+    child.communicate(json.dumps(first).encode() + b"\n")
+    assert not (tmp_path / "scratch").exists()
 
 
 def test_a_process_that_cannot_start_is_an_error(tmp_path: Path) -> None:

@@ -7,8 +7,11 @@ import shlex
 import signal
 import sys
 import time
+from argparse import ArgumentParser
+from collections.abc import Sequence
 from pathlib import Path
 from threading import Thread
+from types import SimpleNamespace
 from urllib.parse import unquote
 
 import numpy as np
@@ -22,9 +25,10 @@ from sms_handover.campaign.definition.frozen import campaign_path
 from sms_handover.campaign.record.campaign_folder import CampaignFolder
 from sms_handover.campaign.record.kept_cases import keep_worst
 from sms_handover.campaign.record.manifest import Shard
+from sms_handover.cli.campaign import rerun
 from sms_handover.cli.campaign.outputs import record_case
 from sms_handover.cli.main import main
-from sms_handover.errors import SmsHandoverError
+from sms_handover.errors import GraphError, SmsHandoverError
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
 
@@ -180,9 +184,15 @@ def test_where_there_is_no_ros_bags_are_left_for_later(
     monkeypatch.setattr("sms_handover.cli.campaign.outputs.record_case", interrupt)
     assert main(["campaign", "run", file, "-o", str(out)]) == 130
     assert "interrupted: the same command goes on" in capsys.readouterr().err
+    merged = tmp_path / "merged"
+    assert main(["campaign", "merge", str(out), "-o", str(merged)]) == 130
+    told = re.search(r"'sms-handover (.*)' goes on", capsys.readouterr().err)
+    makes = "sms_handover.cli.campaign.outputs.record_case"
+    monkeypatch.setattr(makes, lambda folder, task, output: output.mkdir())
+    assert told and main(shlex.split(told[1])) == 0 and len(list((merged / "bags").iterdir())) == 2
     run_here(Path(file), tmp_path / "part", shard=Shard(1, 2), program=STUB)
-    (told,) = keep_worst(CampaignFolder(tmp_path / "part"), interrupt)
-    assert "'campaign merge' keeps them" in told.text and not (tmp_path / "part" / "bags").exists()
+    (output,) = keep_worst(CampaignFolder(tmp_path / "part"), None)
+    assert "'campaign merge' keeps them" in output.text and not (tmp_path / "part" / "bags").exists()
 
 
 def test_an_interrupted_recording_ends_with_all_that_it_has_started(
@@ -191,9 +201,11 @@ def test_an_interrupted_recording_ends_with_all_that_it_has_started(
     out, ready = recorded(tmp_path), tmp_path / "ready"
     stubborn = (
         "import os, pathlib, signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN); "
+        "signal.signal(signal.SIGTERM, signal.SIG_IGN); "
         f"pathlib.Path({str(ready)!r}).write_text(str(os.getpid())); time.sleep(60)"
     )
-    monkeypatch.setattr("sms_handover.cli.campaign.outputs._END_S", 0.1)
+    for limit in ("_END_S", "_KILL_S"):
+        monkeypatch.setattr(f"sms_handover.cli.campaign.outputs.{limit}", 0.1)
     monkeypatch.setattr(
         "sms_handover.cli.campaign.outputs.as_program", lambda name: (sys.executable, "-c", stubborn)
     )
@@ -207,6 +219,45 @@ def test_an_interrupted_recording_ends_with_all_that_it_has_started(
     with pytest.raises(KeyboardInterrupt):
         record_case(CampaignFolder(out), Task(6, "smooth", "nmpc"), tmp_path / "bag")
     assert not psutil.pid_exists(int(ready.read_text()))
+
+
+@pytest.mark.parametrize(
+    ("case", "ended", "code"),
+    [
+        (1, 130, 130),  # interrupted: what there is is not compared
+        (1, 3, 3),  # messages are missing
+        (4, GraphError("container:\nmissed by 4 mm"), 0),
+        (4, GraphError("it hangs"), None),
+        (5, GraphError("missed by 4 mm"), None),  # a success has no cause
+    ],
+)
+def test_what_becomes_of_a_case_over_dds(
+    case: int,
+    ended: int | Exception,
+    code: int | None,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def run(words: Sequence[str]) -> int:
+        assert words[1:3] == ["--controller", "nmpc"] and f"{MASS}:=" in " ".join(words)
+        if isinstance(ended, Exception):
+            raise ended
+        return ended
+
+    takes_words = SimpleNamespace(
+        add_parser=lambda parser: setattr(parser, "parse_args", lambda words: words), command=run
+    )
+    monkeypatch.setattr(rerun, "import_module", lambda name: takes_words)
+    parser = ArgumentParser()
+    rerun.add_parser(parser)
+    options = parser.parse_args([str(recorded(tmp_path)), str(case), "--bag", "-o", str(tmp_path / "bag")])
+    if code is None:
+        with pytest.raises(GraphError):
+            rerun.command(options)
+    else:
+        assert rerun.command(options) == code
+    assert ("it ends as its row says: missed by 4 mm" in capsys.readouterr().out) is (code == 0)
 
 
 def test_a_recording_that_fails_says_so_with_its_last_line(
@@ -261,11 +312,12 @@ def test_merge_takes_the_rows_and_makes_the_rest(finished: Path, tmp_path: Path)
 
 
 def test_check_tells_draws_and_cost(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = written(tmp_path, cases=10_000, metrics=["approach.arm_a.final_error"])
+    file = written(tmp_path, cases=10_000, metrics=["approach.arm_a.final_error"], sampler="sobol")
     assert main(["check", str(file)]) == 0
     said = capsys.readouterr().out
     assert "normal, mean 240, std 12" in said and "202.917 to 277.083" in said
     assert "10000 cases x 1 scenarios x 1 laws = 10000 runs" in said and "CPU time about " in said
+    assert "sobol spreads powers of two evenly: take 8192 or 16384 cases" in said
 
 
 @pytest.mark.parametrize(

@@ -163,6 +163,8 @@ def test_what_is_frozen_needs_no_other_file_and_no_number_of_cases(tmp_path: Pat
     (tmp_path / "mine.yaml").unlink()
     frozen.unpacked(tmp_path / "there", number)
     assert read_frozen(tmp_path / "there").digest == frozen.digest and number == 4
+    again, none = freeze(tmp_path / "there" / "campaign.yaml")  # what a folder has goes on by itself
+    assert again.digest == frozen.digest and none is None
     (tmp_path / "mine.yaml").write_text("extends: smooth\nlaw: pid\n", encoding="utf-8")
     same = freeze(
         written(tmp_path, scenarios={"mine": {"scenario": "mine.yaml", "values": {"seed": 2}}}, cases=9)

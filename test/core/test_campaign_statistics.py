@@ -10,7 +10,10 @@ import pytest
 from scipy.stats import binom
 from statsmodels.stats.proportion import proportion_confint
 
+from sms_handover.campaign.cases.case_row import Beside, Row, Status, Task
 from sms_handover.campaign.definition.campaign_file import Campaign, read_campaign
+from sms_handover.campaign.page.campaign_plots import campaign_plots
+from sms_handover.campaign.record.journal import Entry
 from sms_handover.campaign.sampling.samples import Samples
 from sms_handover.campaign.statistics.case_columns import CaseColumns
 from sms_handover.campaign.statistics.holm import holm
@@ -20,6 +23,7 @@ from sms_handover.campaign.statistics.percentiles import percentile
 from sms_handover.campaign.statistics.proportion import proportion
 from sms_handover.campaign.statistics.sensitivity import sensitivities
 from sms_handover.campaign.statistics.tables import outcome_sections, sensitivity_sections
+from sms_handover.campaign.statistics.worst_cases import worst_of
 
 from .campaigns import written
 
@@ -76,6 +80,16 @@ def test_laws_are_compared_case_by_case() -> None:
     assert [error.adjusted, success.adjusted] == pytest.approx([2 * error.p, success.p])
 
 
+@pytest.mark.parametrize(("metric", "worst"), [("grasp_error", [3, 2]), ("clearance", [0, 1])])
+def test_the_worst_are_the_largest_or_of_clearance_the_smallest(metric: str, worst: list[int]) -> None:
+    rows = [
+        Row(Task(case, "s", "a"), 1, {}, Status.SUCCEEDED, "", {metric: value}, "00")
+        for case, value in enumerate((0.1, 0.2, 0.3, 0.4, None))
+    ]
+    found = worst_of([Entry(row, Beside(0.0, 0.0, "")) for row in rows], metric, 2)
+    assert [row.task.case for row in found["s", "a"]] == worst
+
+
 def test_only_cases_that_both_laws_have_are_paired() -> None:
     laws = {
         ("s", "a"): columns([1.0, 2.0, 3.0, nan], [True] * 4),
@@ -101,6 +115,13 @@ def test_tables_say_of_how_many_cases_and_adjust_for_how_many_draws(tmp_path: Pa
     p, adjusted = ([float(row.cells[place]) for row in table.rows] for place in (1, 2))
     assert 0.0 < p[2] < 0.01 and adjusted[2] == pytest.approx(6.0 * p[2], rel=1e-3) == min(adjusted)
     assert holm([0.01, nan, 0.04, 0.03]) == pytest.approx([0.03, nan, 0.06, 0.06], nan_ok=True)
+
+
+@pytest.mark.parametrize("values", [[0.06, np.nextafter(0.06, 1.0)], [0.0, 0.0], [1.0, 2.0], [nan, 3.0]])
+def test_values_that_hardly_differ_have_a_histogram_too(values: list[float], tmp_path: Path) -> None:
+    plots = campaign_plots(read_campaign(written(tmp_path)), {("smooth", "nmpc"): columns(values)})
+    (bars,) = next(plot for plot in plots if plot.key == "distribution-smooth").traces
+    assert bars.y.sum() == np.isfinite(values).sum()
 
 
 def test_percentiles_have_intervals_that_cover() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from sms_handover.errors import ConfigurationError
+from sms_handover.plan_report import PlannedPaths
 from sms_handover.run_data import RunData
 from sms_handover.scene.document import scene_document
 from sms_handover.scene.live import LiveScene, Seen
@@ -22,7 +23,7 @@ from sms_handover.simulation.scenario import Scenario
 from sms_handover.simulation.simulate import simulate
 
 from .conftest import MakeScenario
-from .scene_documents import frames, play, poses, times
+from .scene_documents import frames, plans, play, poses, times
 
 PATIENCE_S = 60.0  # s of wall time after which a wait has failed
 
@@ -34,7 +35,12 @@ def scenario(make_scenario: MakeScenario) -> Scenario:
 
 @pytest.fixture
 def run(scenario: Scenario) -> RunData:
-    return simulate(scenario)
+    """A run that has plans, as one under a predictive law; the horizon of the last one is shorter."""
+    simulated = simulate(scenario)
+    lines = {arm: poses[:4, :3] for arm, poses in simulated.tool_pose.items()}
+    shorter = {arm: points[1:] for arm, points in lines.items()}
+    stamps = ((0, lines), (160_000_000, lines), (200_000_000, shorter))
+    return replace(simulated, planned_paths=tuple(PlannedPaths(*each) for each in stamps))
 
 
 @pytest.fixture
@@ -65,6 +71,39 @@ def test_what_is_new_is_told_once(live: LiveScene, run: RunData, scene: Scene) -
     assert second is not None and "shapes" not in second[0]
     told = np.concatenate([times(first[0]), times(second[0])])
     assert np.array_equal(told, scene.stamp_ns[:8] / 1e9)
+
+
+def test_plans_are_told_with_the_instants_that_follow_them(
+    live: LiveScene, run: RunData, scene: Scene
+) -> None:
+    """Each once, with the points that its horizon has; where no law plans, nothing is told of plans."""
+    arms, planned = len(scene.arms), run.planned_paths
+    play(live, replace(run, planned_paths=()), scene, slice(0, 1))
+    bare = live.updates(Seen(), 0.0)
+    assert bare is not None and "planned" not in bare[0]
+    live.add_paths(planned[0])
+    assert live.updates(bare[1], 0.0)[0]["planned"] != {}  # type: ignore[index]
+    play(live, run, scene, slice(1, 5))
+    first = live.updates(bare[1], 0.0)
+    live.add_paths(replace(planned[1], stamp_ns=planned[1].stamp_ns + 1))  # too soon
+    play(live, run, scene, slice(5, 6))
+    assert first is not None
+    second = live.updates(first[1], 0.0)
+    assert second is not None and live.updates(second[1], 0.0) is None
+    for (told, _), expected in ((first, planned[:2]), (second, planned[2:])):
+        stamps, lines = plans(told, arms)
+        assert stamps.tolist() == [paths.stamp_ns / 1e9 for paths in expected]
+        points = [[paths.tool_in_world[arm] for arm in scene.arms] for paths in expected]
+        np.testing.assert_allclose(lines, points, rtol=0.0, atol=1e-6)  # m; single precision
+
+
+def test_a_plan_of_an_earlier_instant_begins_another_run(live: LiveScene, run: RunData, scene: Scene) -> None:
+    """It may come before the phase and the frame of that instant."""
+    play(live, run, scene)
+    live.add_paths(run.planned_paths[0])
+    play(live, replace(run, planned_paths=()), scene, slice(0, 1))
+    again = live.updates(Seen(), 0.0)
+    assert again is not None and times(again[0]).tolist() == plans(again[0], 2)[0].tolist() == [0.0]
 
 
 def test_poses_are_those_of_the_run(live: LiveScene, run: RunData, scene: Scene) -> None:
@@ -126,6 +165,7 @@ def test_a_long_run_keeps_its_newest_frames(
     news = live.updates(seen[1], 0.0)
     assert news is not None and "shapes" in news[0]
     assert times(news[0]).tolist() == (scene.stamp_ns[4:9] / 1e9).tolist()
+    assert plans(news[0], 2)[0].tolist() == [0.16, 0.2]
 
 
 @pytest.mark.parametrize("frame_rate", [0.0, -5.0, float("nan")])

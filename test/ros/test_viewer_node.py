@@ -9,10 +9,13 @@ from rclpy.qos import QoSReliabilityPolicy
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from sms_handover_interfaces.msg import GraspEvent, TaskPhase
+from visualization_msgs.msg import Marker, MarkerArray
 
+from sms_handover.errors import MessageError, Reason
 from sms_handover.graph.topics import (
     DEPUTY_POSE,
     GRASP_EVENT,
+    PLANNED_PATHS,
     SAMPLED_BASE_ODOMETRY,
     SAMPLED_JOINT_STATES,
     TASK_PHASE,
@@ -24,15 +27,18 @@ from sms_handover.graph.topics import (
 )
 from sms_handover.messages.message_types import MessageTypes
 from sms_handover.messages.stamps import stamp_ns
-from sms_handover.messages.values import pose_values
+from sms_handover.messages.values import planned_paths, pose_values
+from sms_handover.nodes.parts.marker import path_markers
 from sms_handover.nodes.viewer import ViewerNode
+from sms_handover.plan_report import PlannedPaths
+from sms_handover.ros.codecs.planned_paths import read_planned_paths
 from sms_handover.ros.message_types import message_class
 from sms_handover.ros.qos import profile_of
 from sms_handover.scene.live import LiveScene, Seen
 
-from ..core.scene_documents import poses, times
+from ..core.scene_documents import plans, poses, times
 from .bench import Bench
-from .graph import ARMS, Graph
+from .graph import ARMS, Graph, Messages
 from .short_handover import END_S
 
 pytestmark = pytest.mark.ros
@@ -66,7 +72,8 @@ def speaker_on(graph: Graph, name: str) -> Publisher:
     return graph.client.create_publisher(message_class(topic.type), name, profile_of(topic))
 
 
-def test_it_shows_every_body_where_it_was_published(graph: Graph) -> None:
+def test_it_shows_every_body_where_it_was_published_and_every_plan(bench: Bench) -> None:
+    graph = Graph(bench, {"viewer": QUIET, "controller": {"law": "mpc"}})
     viewer = graph.bench.add(ViewerNode)
     assert viewer.find_scene() == "Waiting for /robot_description and /deputy/marker"
     graph.run()
@@ -84,6 +91,25 @@ def test_it_shows_every_body_where_it_was_published(graph: Graph) -> None:
         for time, rows in drawn.items():
             assert np.abs(rows[bodies.index(body)][:3] - published[time][:3]).max() < 1e-6, body
     assert document["deputy_size"] == [0.1, 0.34, 0.1]
+    published_plans = [planned_paths(message) for message in Messages().of(graph, PLANNED_PATHS)]
+    stamps, lines = plans(document, len(ARMS))
+    assert stamps.tolist() == [paths.stamp_ns / 1e9 for paths in published_plans] and len(stamps) > 2
+    expected = [[paths.tool_in_world[arm] for arm in ARMS] for paths in published_plans]
+    assert np.abs(lines - expected).max() < 1e-6
+
+
+def test_planned_paths_are_read_as_they_were_sent_or_rejected() -> None:
+    lines = {"arm_a": np.eye(3), "arm_b": np.arange(6.0).reshape(2, 3)}
+    markers = path_markers(PlannedPaths(1_500_000_001, lines))
+    read = read_planned_paths(serialize_message(markers))
+    assert read.stamp_ns == 1_500_000_001 and read.tool_in_world.keys() == lines.keys()
+    assert all(np.array_equal(read.tool_in_world[arm], points) for arm, points in lines.items())
+    markers.markers[1].points[0].y = float("nan")
+    empty = MarkerArray(markers=[markers.markers[0], Marker(ns="arm_b")])
+    for bad, reason in ((markers, Reason.NOT_FINITE), (empty, Reason.LENGTHS), (None, Reason.MALFORMED)):
+        with pytest.raises(MessageError) as caught:
+            read_planned_paths(serialize_message(bad) if bad else b"nonsense")
+        assert caught.value.reason is reason
 
 
 def test_a_playback_that_goes_back_is_followed(graph: Graph) -> None:
@@ -117,6 +143,7 @@ def test_bad_messages_are_refused_and_end_no_viewer(graph: Graph) -> None:
         SAMPLED_JOINT_STATES: [serialize_message(JointState(name=["knee"], position=[0.0]))],
         TASK_PHASE: [serialize_message(TaskPhase(state=77))],
         GRASP_EVENT: [serialize_message(GraspEvent(status=77))],
+        PLANNED_PATHS: [serialize_message(MarkerArray())],
     }
     say = [(speaker_on(graph, name), data) for name, messages in bad.items() for data in messages]
 
@@ -128,6 +155,7 @@ def test_bad_messages_are_refused_and_end_no_viewer(graph: Graph) -> None:
     expected = {
         "deputy/pose: duplicate stamp",
         "deputy/pose: malformed",
+        "mpc/planned_paths: wrong lengths",
         "sampled_joint_states: wrong names",
         "task/grasp_event: wrong names",
         "task/phase: wrong names",
@@ -150,14 +178,15 @@ def test_the_graph_does_not_wait_for_a_viewer_that_takes_nothing(graph: Graph) -
     viewer = ViewerNode()  # never spun
     try:
         graph.run()
-        each_period = [topic for topic in graph_topics(ARMS) if topic.rate in (Rate.TICK, Rate.REFERENCE)]
+        often = (Rate.TICK, Rate.REFERENCE, Rate.SHOWN)
+        each_period = [topic for topic in graph_topics(ARMS) if topic.rate in often]
         readers = [
             reader
             for topic in each_period
             for reader in graph.client.get_subscriptions_info_by_topic(f"/{topic.name}")
             if reader.node_name == VIEWER
         ]
-        assert len(readers) == 4  # state, base, deputy, phase; it never learned of the arms
+        assert len(readers) == 5  # state, base, deputy, phase, plans; it never learned of the arms
         for reader in readers:
             assert reader.qos_profile.reliability == QoSReliabilityPolicy.BEST_EFFORT
     finally:

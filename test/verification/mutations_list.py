@@ -971,6 +971,20 @@ BREAKS: tuple[Break, ...] = (
         "campaign_cases",
     ),
     _core(
+        "no case the worst by a metric that is not among the usual ones",
+        "campaign/cases/case",
+        "(*campaign.metrics, *campaign.success.names, campaign.worst_by)",
+        "(*campaign.metrics, *campaign.success.names)",
+        "campaign_cases",
+    ),
+    _core(
+        "the cases with the most clearance taken for the worst",
+        "campaign/statistics/worst_cases",
+        "sign = -1.0 if metric in SMALLER_IS_WORSE else 1.0",
+        "sign = 1.0",
+        "campaign_statistics",
+    ),
+    _core(
         "a worst case kept that is not the one of its row",
         "campaign/record/kept_cases",
         "if result.run is None or result.row.text != row.text:",
@@ -1469,6 +1483,27 @@ BREAKS: tuple[Break, ...] = (
         "brakings = self._state.brakings + 1",
         "brakings = self._state.brakings",
         "mpc",
+    ),
+    Break(
+        "bodies that may enter each other as shipped",
+        "config/controller.yaml",
+        "least_distance: 0.01 ",
+        "least_distance: 0.0 ",
+        "test/core/test_mpc.py",
+    ),
+    _core(
+        "plans that a live page is told again and again",
+        "scene/live",
+        "self._paths[known.plans :]",
+        "self._paths",
+        "scene_live",
+    ),
+    _core(
+        "a tool that is slow called blocked",
+        "analysis/blocked_tools",
+        " if row.startswith(_BLOCKING)",
+        "",
+        "analysis_comparison",
     ),
     # what compensates for what a model does not know
     _core(

@@ -105,7 +105,7 @@ class Cases:
         done = 0
         while not loop.finished:
             try:
-                ticks = loop.advance_quietly()
+                ticks = loop.advance_quietly(recorder.room)
             except NoPlanError as error:  # as far as it came, and without metrics: less effort is no merit
                 run = recorder.data(loop.base_wrenches, loop.applied) if done else None
                 return Status.MISSION_FAILED, str(error), run
@@ -116,7 +116,8 @@ class Cases:
         run = recorder.data(loop.base_wrenches, loop.applied)
         if not _is_finite(run):
             return Status.NUMERIC_FAILURE, "numbers that are not finite", None
-        found, lacking = metrics_of(run, scenario, (*campaign.metrics, *campaign.success.names))
+        further = (*campaign.metrics, *campaign.success.names, campaign.worst_by)
+        found, lacking = metrics_of(run, scenario, further)
         metrics.update(found)
         if campaign.success.holds(metrics):
             return Status.SUCCEEDED, "", run

@@ -14,7 +14,7 @@ from dataclasses import asdict
 from pathlib import Path
 from queue import SimpleQueue
 from threading import Thread
-from typing import IO
+from typing import IO, Any
 
 from sms_handover.campaign.cases.case import Cases
 from sms_handover.campaign.cases.case_row import Task
@@ -30,6 +30,15 @@ def main() -> int:
     answers = os.fdopen(os.dup(_STANDARD_OUTPUT), "w", encoding="ascii")
     os.dup2(os.open(os.devnull, os.O_WRONLY), _STANDARD_OUTPUT)  # what a law prints is no row
     first = json.loads(sys.stdin.readline())
+    try:
+        return _answer_tasks(answers, first)
+    except BrokenPipeError:  # the parent ended before there was anybody to see the end of standard input
+        shutil.rmtree(first["folder"], ignore_errors=True)
+        return 1
+
+
+def _answer_tasks(answers: IO[str], first: dict[str, Any]) -> int:
+    """Answer tasks of the campaign that the first line has; return the exit code."""
     try:
         cases = Cases(Frozen(first["files"]), first["cases"], Path(first["folder"]))
     except SmsHandoverError as error:

@@ -41,6 +41,8 @@ USUAL: Mapping[str, tuple[str, str]] = MappingProxyType(
     }
 )
 
+SMALLER_IS_WORSE = frozenset({"complete", "clearance"})  # of every other metric the larger
+
 
 def metrics_of(run: RunData, scenario: Scenario, further: Sequence[str]) -> tuple[Metrics, tuple[str, ...]]:
     """Return metrics of a run, the usual and further ones, None where not defined; and what it lacks."""

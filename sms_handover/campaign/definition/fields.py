@@ -15,6 +15,7 @@ RANDOM, LHS, SOBOL = "random", "lhs", "sobol"
 GRID, MORRIS, SALTELLI, LIST = "grid", "morris", "saltelli", "list"
 COUNTED = (RANDOM, LHS, SOBOL)  # samplers that take the number of cases; the others have their own
 EXTENDABLE = (RANDOM, SOBOL)  # whose cases stay when more are added
+MORRIS_LEVELS = 4  # [-] by default, as its authors have it
 NONE, FAILURES, ALL = "none", "failures", "all"
 DATA, BAG = "data", "bag"
 MOST_CASES = 100_000_000
@@ -62,7 +63,11 @@ _SAMPLER = EitherSpec(
             MORRIS: MappingSpec(
                 "elementary effects [Morris1991]",
                 {"trajectories": ValueSpec("number of trajectories", minimum=2, kind=int)},
-                {"levels": ValueSpec("levels of each draw; 4 by default, even", minimum=2, kind=int)},
+                {
+                    "levels": ValueSpec(
+                        f"levels of each draw, even; by default {MORRIS_LEVELS}", minimum=2, kind=int
+                    )
+                },
             ),
             SALTELLI: MappingSpec(
                 "variance-based indices [Saltelli2010]",
@@ -133,7 +138,10 @@ CAMPAIGN_FIELDS = MappingSpec(
         "correlated": ListSpec("groups of draws that depend on each other", _CORRELATED),
         "success": text("when a case is a success: an expression over metrics, by default 'complete'"),
         "metrics": ValueSpec("figures to keep beside the usual ones, as PHASE.ARM.FIGURE", kind=TEXTS),
-        "worst_by": text("metric by which cases are worst, the larger the worse; 'grasp_error' by default"),
+        "worst_by": text(
+            "metric by which cases are worst: the larger, but of clearance and complete the smaller; "
+            "'grasp_error' by default"
+        ),
         "stop": _STOP,
         "keep": _KEEP,
         "limits": _LIMITS,

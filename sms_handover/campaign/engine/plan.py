@@ -14,7 +14,7 @@ from sms_handover.campaign.cases.case_row import Status, Task
 from sms_handover.campaign.cases.retained import trajectory
 from sms_handover.campaign.definition.campaign_file import Campaign, Keep
 from sms_handover.campaign.definition.distributions import range_in_words
-from sms_handover.campaign.definition.fields import ALL, BAG, NONE
+from sms_handover.campaign.definition.fields import ALL, BAG, NONE, SOBOL
 from sms_handover.campaign.definition.frozen import Frozen, freeze
 from sms_handover.errors import ConfigurationError, UnknownNameError
 from sms_handover.run_data import RunData
@@ -92,6 +92,9 @@ def plan_in_words(path: Path) -> str:
         f"{count} cases x {len(campaign.scenarios)} scenarios x {len(campaign.laws)} laws = {runs} runs",
         cost.in_words(count, campaign.keep),
     ]
+    if campaign.sampler.kind == SOBOL and count & (count - 1):
+        less = 1 << count.bit_length() - 1
+        lines.append(f"sobol spreads powers of two evenly: take {less} or {2 * less} cases")
     return "\n".join(lines)
 
 

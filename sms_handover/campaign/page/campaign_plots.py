@@ -17,6 +17,7 @@ from sms_handover.types import Array
 LINE, POINTS, BARS = "line", "points", "bars"
 _MOST_POINTS = 2000  # [-] of a trace; of more a part, evenly taken
 _BINS = 40  # [-]
+_SAME = 1e-9  # [-] share of the values by which they differ in their last bits only
 _TRADES = (("base_turn", "grasp_error"), ("control_effort", "grasp_error"))
 
 
@@ -96,13 +97,20 @@ def _distribution(scenario: str, laws: Sequence[tuple[str, CaseColumns]], metric
     every = np.concatenate(known)
     traces = []
     if every.size:
-        edges = np.histogram_bin_edges(every, bins=_BINS)
+        edges = np.histogram_bin_edges(every, _BINS, _range(every))
         middles = (edges[1:] + edges[:-1]) / 2.0
         for colour, ((law, _), values) in enumerate(zip(laws, known, strict=True)):
             traces.append(Trace(BARS, law, colour, middles, np.histogram(values, edges)[0].astype(float)))
     return CampaignPlot(
         f"distribution-{scenario}", f"{scenario}: {metric}", _axis(metric), "cases", tuple(traces)
     )
+
+
+def _range(values: Array) -> tuple[float, float]:
+    """Return the range of a histogram, as wide as NumPy has it of equal values where they hardly differ."""
+    low, high = float(values.min()), float(values.max())
+    is_one = high - low <= _SAME * max(abs(low), abs(high))
+    return (low - 0.5, high + 0.5) if is_one else (low, high)
 
 
 def _trade(scenario: str, laws: Sequence[tuple[str, CaseColumns]], x: str, y: str) -> CampaignPlot:

@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 
 from sms_handover.campaign.definition.distributions import Distribution
-from sms_handover.campaign.definition.fields import GRID, LHS, MORRIS, SALTELLI, SOBOL
+from sms_handover.campaign.definition.fields import GRID, LHS, MORRIS, MORRIS_LEVELS, SALTELLI, SOBOL
 from sms_handover.errors import MissingDependencyError
 from sms_handover.types import Array, read_only
 
 _EDGE = 0.01  # [-] share that the outermost levels of morris keep from infinite quantiles
 _LEAST = 2.0**-53  # [-]
-_LEVELS = 4  # [-] of morris, as its authors have it
 
 
 def design(kind: str, numbers: dict[str, int], cases: int | None, size: int, seed: int) -> Array:
@@ -27,10 +26,10 @@ def design(kind: str, numbers: dict[str, int], cases: int | None, size: int, see
         qmc = needed("scipy.stats.qmc", "scipy")
         make = qmc.LatinHypercube if kind == LHS else qmc.Sobol
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # balance of Sobol points, which the page tells of
+            warnings.simplefilter("ignore", UserWarning)  # balance of Sobol points, which check tells of
             shares = make(size, seed=np.random.default_rng(seed)).random(cases or 0)
     elif kind == MORRIS:
-        levels = numbers.get("levels", _LEVELS)
+        levels = numbers.get("levels", MORRIS_LEVELS)
         sample = needed("SALib.sample.morris", "SALib").sample
         found = sample(problem(size), numbers["trajectories"], num_levels=levels, seed=seed)
         shares = _EDGE + (1.0 - 2.0 * _EDGE) * found
@@ -59,11 +58,11 @@ def cases_of(kind: str, numbers: dict[str, int], draws: Sequence[Distribution]) 
     return numbers["base"] * (len(draws) + 2)
 
 
-def problem(size: int, names: Sequence[str] = ()) -> dict[str, Any]:
+def problem(size: int) -> dict[str, Any]:
     """Return factors as SALib describes them: shares in [0, 1]."""
     return {
         "num_vars": size,
-        "names": list(names) or [f"x{k}" for k in range(size)],
+        "names": [f"x{k}" for k in range(size)],
         "bounds": [[0.0, 1.0]] * size,
     }
 

@@ -6,7 +6,7 @@ from math import nan
 import numpy as np
 
 from sms_handover.campaign.definition.campaign_file import Campaign
-from sms_handover.campaign.definition.fields import MORRIS, SALTELLI
+from sms_handover.campaign.definition.fields import MORRIS, MORRIS_LEVELS, SALTELLI
 from sms_handover.campaign.sampling.designs import needed, problem
 from sms_handover.campaign.sampling.samples import Samples
 from sms_handover.campaign.statistics.case_columns import CaseColumns
@@ -14,7 +14,6 @@ from sms_handover.campaign.statistics.case_columns import CaseColumns
 CORRELATION = "correlation"
 _FEWEST = 8  # [-] cases for a rank correlation
 _SEED = 0  # of the resampling that gives the intervals
-_LEVELS = 4  # [-] of morris by default
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,7 @@ def _correlation(path: str, drawn: np.ndarray, values: np.ndarray) -> Sensitivit
 
 def _morris(campaign: Campaign, values: np.ndarray) -> tuple[Sensitivity, ...]:
     """Return the elementary effects per unit of probability."""
-    paths, levels = campaign.paths, campaign.sampler.numbers.get("levels", _LEVELS)
+    paths, levels = campaign.paths, campaign.sampler.numbers.get("levels", MORRIS_LEVELS)
     analyze = needed("SALib.analyze.morris", "SALib").analyze
     found = analyze(problem(len(paths)), Samples(campaign).design, values, num_levels=levels, seed=_SEED)
     rows = zip(paths, found["mu_star"], found["mu_star_conf"], found["sigma"], strict=True)

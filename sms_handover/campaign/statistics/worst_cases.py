@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from shlex import quote
 
+from sms_handover.campaign.cases.case_metrics import SMALLER_IS_WORSE
 from sms_handover.campaign.cases.case_row import Row, Task
 from sms_handover.campaign.record.journal import Entry
 
@@ -14,10 +15,11 @@ Group = tuple[str, str]  # scenario and law
 
 
 def worst_of(entries: Iterable[Entry], metric: str, count: int) -> dict[Group, list[Row]]:
-    """Return the cases with the largest value of a metric, by scenario and law, the worst first.
+    """Return the cases with the worst values of a metric, by scenario and law, the worst first.
 
     What has no value, as after a numeric failure, is none of them: it is listed with the failures.
     """
+    sign = -1.0 if metric in SMALLER_IS_WORSE else 1.0
     found: dict[Group, list[tuple[float, int, Row]]] = {}
     for entry in entries:
         row = entry.row
@@ -25,7 +27,7 @@ def worst_of(entries: Iterable[Entry], metric: str, count: int) -> dict[Group, l
         if value is None:
             continue
         heap = found.setdefault(row.task[1:], [])
-        heapq.heappush(heap, (value, -row.task.case, row))
+        heapq.heappush(heap, (sign * value, -row.task.case, row))
         if len(heap) > count:
             heapq.heappop(heap)
     return {group: [row for _, _, row in sorted(heap, reverse=True)] for group, heap in found.items()}

@@ -1,12 +1,15 @@
 """``sms-handover campaign merge``: merge the folders of shards into one."""
 
+import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from shlex import quote
 
+from sms_handover.campaign.definition.frozen import CAMPAIGN_FILE
 from sms_handover.campaign.record.campaign_folder import merge
 from sms_handover.campaign.statistics.stop_rule import stopped_at
 from sms_handover.cli.campaign.outputs import tell_outputs
-from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
+from sms_handover.cli.exit_codes import EXIT_INTERRUPTED, EXIT_LOSS, EXIT_OK
 
 
 def add_parser(parser: ArgumentParser) -> None:
@@ -29,5 +32,11 @@ def command(options: Namespace) -> int:
         entries = list(merged.entries())
         there, total = len(entries), merged.runs(stopped_at(merged.campaign, merged.cases, entries))
         print(f"{there} of {total} rows", flush=True)
-        is_whole = tell_outputs(options.output)
+        try:
+            is_whole = tell_outputs(options.output)
+        except KeyboardInterrupt:
+            file = quote(str(options.output / CAMPAIGN_FILE))
+            goes_on = f"'sms-handover campaign run {file} -o {quote(str(options.output))}' goes on"
+            print(f"interrupted: all rows are in {options.output}; {goes_on}", file=sys.stderr)
+            return EXIT_INTERRUPTED
     return EXIT_OK if there >= total and is_whole else EXIT_LOSS

@@ -30,9 +30,11 @@ def add_parser(parser: ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="folder of a campaign")
     which = parser.add_mutually_exclusive_group()
     which.add_argument(
-        "--failed", action="store_true", help="list the cases without success, and their causes"
+        "--failed", action="store_true", help="list causes, and the first cases without success"
     )
-    which.add_argument("--worst", type=int, default=0, metavar="K", help="list the K worst cases of each law")
+    which.add_argument(
+        "--worst", type=int, default=0, metavar="K", help="list the K worst cases of each law by 'worst_by'"
+    )
 
 
 def command(options: Namespace) -> int:
@@ -64,15 +66,17 @@ def command(options: Namespace) -> int:
             "\n"
             + columns([("law", "status", "times", "cause"), *((a, b, str(n), c) for (a, b, c), n in causes)])
         )
-        listed = list(failed(entries))[:_MOST]
+        listed = list(failed(entries))
     elif options.worst:
         listed = [
             row for rows in worst_of(entries, campaign.worst_by, options.worst).values() for row in rows
         ]
-    for row in listed:
+    for row in listed if options.worst else listed[:_MOST]:
         print(f"\n{in_words(row, campaign.worst_by)}\n  {inputs_in_words(row.inputs)}")
         print(f"  {rerun_command(str(folder.path), row.task, one_scenario=one_scenario)}")
         kept = worst_path(folder.path, campaign.keep, row.task)
         if kept.exists():
             print(f"  kept whole: {kept}")
+    if options.failed and len(listed) > _MOST:
+        print(f"\nand {len(listed) - _MOST} more")
     return EXIT_OK if len(entries) >= total else EXIT_LOSS

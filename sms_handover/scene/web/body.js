@@ -21,6 +21,17 @@ function numbers(text, Type) {
   return new Type(bytes.buffer);
 }
 
+/** The last of the first `count` instants not after t, the first one if all are. */
+function latest(times, count, t) {
+  let low = 0;
+  let high = count - 1;
+  while (low < high) {
+    const middle = Math.ceil((low + high) / 2);
+    if (times[middle] <= t) low = middle; else high = middle - 1;
+  }
+  return low;
+}
+
 /** The poses of named bodies over time, interpolated between recorded instants. */
 class Motion {
   constructor(data) {
@@ -53,15 +64,7 @@ class Motion {
   }
 
   /** The last recorded instant not after t. */
-  index(t) {
-    let low = 0;
-    let high = this.count - 1;
-    while (low < high) {
-      const middle = Math.ceil((low + high) / 2);
-      if (this.times[middle] <= t) low = middle; else high = middle - 1;
-    }
-    return low;
-  }
+  index(t) { return latest(this.times, this.count, t); }
 
   read(index, body, position, quaternion) {
     const at = (index * this.bodies.length + body) * 7;
@@ -251,10 +254,9 @@ class Momentum {
 
 /** Where the plans of a predictive law lead the tools: a line per arm, from the latest plan not after the time. */
 class Planned {
-  constructor(data, arms, group) {
-    this.times = numbers(data.times, Float64Array); // s, of the plans
-    this.points = numbers(data.points, Float32Array); // m, x y z per plan, arm and instant of its horizon
-    this.width = 3 * data.size; // numbers of a line
+  constructor(arms, group) {
+    this.times = []; // s, of the plans
+    this.paths = []; // m, per plan and arm the x y z of the instants of its horizon
     this.lines = arms.map(() => {
       const above = { depthTest: false, transparent: true }; // seen through the arms and the deputy
       const dashes = { dashed: true, dashSize: 0.02, gapSize: 0.012 }; // m
@@ -266,13 +268,25 @@ class Planned {
     });
   }
 
+  /** Add plans; all of one call have lines of `size` points. */
+  append({ times, points, size }) {
+    const all = numbers(points, Float32Array);
+    numbers(times, Float64Array).forEach((time, plan) => {
+      this.times.push(time);
+      this.paths.push(this.lines.map((_, arm) => {
+        const begin = 3 * size * (plan * this.lines.length + arm);
+        return all.subarray(begin, begin + 3 * size);
+      }));
+    });
+  }
+
   /** Show the plan at time t; none after the last one has ended. */
   place(t) {
-    let index = -1;
-    while (index + 1 < this.times.length && this.times[index + 1] <= t + 1e-9) index += 1;
+    const index = latest(this.times, this.times.length, t + 1e-9);
+    const age = t - this.times[index]; // s, NaN without plans
+    const shown = age >= -1e-9 && age <= PLANNED_SHOWN;
     this.lines.forEach((line, arm) => {
-      const begin = (index * this.lines.length + arm) * this.width;
-      const points = index < 0 || t > this.times[index] + PLANNED_SHOWN ? [] : this.points.subarray(begin, begin + this.width);
+      const points = shown ? this.paths[index][arm] : [];
       line.visible = points.length > 0 && !Number.isNaN(points[0]);
       if (!line.visible) return;
       line.geometry.dispose();
@@ -308,7 +322,8 @@ class RunBody {
     this.basePath = new Trace(this.motion, 0, this.traceGroup);
     this.nearest = data.clearance ? new Nearest(data.clearance, this.motion, this.nearestGroup) : null;
     this.momentum = data.momentum ? new Momentum(data.momentum, this.motion, this.momentumGroup) : null;
-    this.planned = data.planned ? new Planned(data.planned, data.arms, this.plannedGroup) : null;
+    this.planned = new Planned(data.arms, this.plannedGroup);
+    if (data.planned) this.planned.append(data.planned);
     this.drawStart();
   }
 
@@ -415,15 +430,16 @@ class RunBody {
     this.startGroup.visible = !isGhost;
     this.nearest?.paint(colours);
     this.momentum?.paint(colours.momentum);
-    this.planned?.paint(colours);
+    this.planned.paint(colours);
     [...this.traces, this.basePath].forEach((trace) => {
       trace.past.material.linewidth = isGhost ? TRACE_WIDTH * 0.6 : TRACE_WIDTH;
     });
   }
 
-  /** Add new instants, phases and grasps. */
+  /** Add new instants, plans, phases and grasps. */
   extend(data) {
     this.motion.append(data);
+    if (data.planned) this.planned.append(data.planned);
     this.data.phases = data.phases;
     this.data.events = data.events;
     [...this.traces, this.basePath].forEach((trace) => trace.rebuild());
@@ -438,7 +454,7 @@ class RunBody {
     [...this.traces, this.basePath].forEach((trace) => trace.show(index));
     this.nearest?.place(t);
     this.momentum?.place(t);
-    this.planned?.place(t);
+    this.planned.place(t);
   }
 
   /** The current position of a body, in m. */

@@ -29,6 +29,7 @@ class Player {
   extend(data) {
     const following = this.playing && this.t >= this.end;
     this.runs[0].extend(data);
+    this.offerPlans();
     this.drawBar();
     if (following) this.seek(this.end); else this.show();
     this.picture.ask();
@@ -57,7 +58,7 @@ class Player {
     element("runs").addEventListener("change", (event) => this.arrange(Number(event.target.value)));
     element("nearest").parentElement.hidden = !this.runs.some((run) => run.nearest);
     element("momentum").parentElement.hidden = !this.runs.some((run) => run.momentum);
-    element("planned").parentElement.hidden = !this.runs.some((run) => run.planned);
+    this.offerPlans();
     ["traces", "targets", "nearest", "momentum", "planned"].forEach((id) => element(id).addEventListener("change", () => this.showParts()));
     document.addEventListener("keydown", (event) => {
       if (event.key === " " && !["BUTTON", "SELECT"].includes(event.target.tagName)) { event.preventDefault(); this.toggle(); }
@@ -66,6 +67,9 @@ class Player {
     window.addEventListener("message", (event) => this.receive(event));
     this.drawBar();
   }
+
+  /** Plans can be hidden once there are any. */
+  offerPlans() { element("planned").parentElement.hidden = !this.runs.some((run) => run.planned.times.length); }
 
   /** The phases of the first run, to jump to, and marks for the grasps. */
   drawBar() {
