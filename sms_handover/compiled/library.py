@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from sms_handover.compiled.compiler import library_of
-from sms_handover.compiled.tree import Body, Tool, body_tree, mounts_of, tools_of
+from sms_handover.compiled.tree import Body, Tool, body_tree, hung_of, mounts_of, tools_of
 from sms_handover.errors import MissingDependencyError
 from sms_handover.model.robot_model import RobotModel
 from sms_handover.plant.integrators import TABLEAUS, Tableau
@@ -48,14 +48,15 @@ def _identity(bodies: tuple[Body, ...], tools: tuple[Tool, ...], schemes: Mappin
     """Return a digest of all that the C code depends on: generator, schemes, and how the bodies are joined.
 
     Their inertial parameters are arguments of the functions, so one library serves every robot that has the
-    same joints and tools in the same places; odd mounts are arguments too.
+    same joints and tools in the same places; odd mounts are arguments too, and what hangs from them.
     """
     digest = hashlib.sha256(f"{dict(schemes)}".encode() + _generator())
-    mounts = mounts_of(bodies)
-    digest.update(f"{mounts}".encode())
+    mounts, hung = mounts_of(bodies), hung_of(bodies)
+    digest.update(f"{mounts} {hung}".encode())
     for index, body in enumerate(bodies):
         digest.update(body.parent.to_bytes(4, "little", signed=True))
-        for numbers in (body.axis,) if index in mounts else (body.rotation, body.place, body.axis):
+        place = np.delete(body.place, hung[index]) if index in hung else body.place
+        for numbers in (body.axis,) if index in mounts else (body.rotation, place, body.axis):
             digest.update(np.ascontiguousarray(numbers).tobytes())
     for tool in tools:
         digest.update(f"{tool.body} {tool.first_joint} {tool.joints}".encode())

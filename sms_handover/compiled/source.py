@@ -26,6 +26,7 @@ from sms_handover.compiled.tree import (
     Body,
     Tool,
     coordinate_axis,
+    hung_of,
     lightened_of,
     mounts_of,
     parameter_count,
@@ -205,6 +206,11 @@ def with_parameters(bodies: Sequence[Body]) -> tuple[Any, tuple[Body, ...]]:
     for index, at in enumerate(mounts_of(bodies)):
         numbers = parameters[first + PER_MOUNT * index : first + PER_MOUNT * (index + 1)]
         known[at] = _mounted(known[at], numbers)
+    hung = hung_of(bodies)
+    for index, (at, axis) in enumerate(hung.items(), start=parameter_count(bodies) - len(hung)):
+        place = ca.SX(known[at].place)
+        place[axis] = parameters[index]
+        known[at] = replace(known[at], place=place)
     return parameters, tuple(known)
 
 

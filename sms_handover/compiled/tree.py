@@ -76,6 +76,20 @@ def mounts_of(bodies: Sequence[Body]) -> tuple[int, ...]:
     return carried if is_odd else ()
 
 
+def hung_of(bodies: Sequence[Body]) -> dict[int, int]:
+    """Return the bodies that hang from odd mounts, each with the axis along which its place is an argument.
+
+    The origin of a mounted joint is where its axis comes nearest to the origin of the base, so how far along
+    that axis the next joint begins depends on the mount.
+    """
+    mounts, found = mounts_of(bodies), {}
+    for index, body in enumerate(bodies):
+        axis = coordinate_axis(bodies[body.parent]) if body.parent in mounts else None
+        if axis is not None:
+            found[index] = axis
+    return found
+
+
 def lightened_of(bodies: Sequence[Body]) -> dict[int, tuple[int, ...]]:
     """Return the bodies that leave what they can to their parents, and which of their numbers are then zero.
 
@@ -96,7 +110,7 @@ def lightened_of(bodies: Sequence[Body]) -> dict[int, tuple[int, ...]]:
 
 def parameter_count(bodies: Sequence[Body]) -> int:
     """Return how many parameters the compiled functions of a robot have."""
-    return PER_BODY * len(bodies) + PER_MOUNT * len(mounts_of(bodies))
+    return PER_BODY * len(bodies) + PER_MOUNT * len(mounts_of(bodies)) + len(hung_of(bodies))
 
 
 @lru_cache(maxsize=8)
@@ -105,13 +119,14 @@ def parameters_of(bodies: tuple[Body, ...]) -> Array:
 
     Of each mass kg, first moment (3) kg m, inertia xx xy xz yy yz zz kg m^2 and rotor kg m^2, as in Body, but
     for what :func:`lightened_of` leaves to the parent; then, of mounts that are arguments, cosines and sines
-    of three turns and the place m, as in :func:`mount_numbers`.
+    of three turns and the place m, as in :func:`mount_numbers`; then where :func:`hung_of` bodies begin, m.
     """
     upper = np.triu_indices(3)
     mounts = [mount_numbers(bodies[at]) for at in mounts_of(bodies)]
     lightened = _lightened(bodies)
     rows = [(body.mass, *body.first_moment, *body.inertia[upper], body.rotor) for body in lightened]
-    return read_only(np.concatenate([np.ravel(rows), np.ravel(mounts)]))
+    hung = [bodies[at].place[axis] for at, axis in hung_of(bodies).items()]
+    return read_only(np.concatenate([np.ravel(rows), np.ravel(mounts), hung]))
 
 
 def mount_numbers(body: Body) -> Array:

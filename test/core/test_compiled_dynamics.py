@@ -286,6 +286,25 @@ def test_another_robot_of_a_kind_compiles_nothing(
     assert not caplog.records
 
 
+def test_robots_that_differ_in_their_mounts_and_masses_share_a_library(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As cases of a campaign do: each with errors of its model of its own, compiled once."""
+    asked = set[bytes]()
+
+    def remember(name: str, identity: bytes, write: Callable[[], str]) -> Path:
+        asked.add(identity)
+        return Path(name)
+
+    monkeypatch.setattr(library, "library_of", remember)
+    for seed in range(3):
+        values = {"common.conditions": "nominal", "seed": seed, "truth.robot.base.mass": 240.0 + seed}
+        library.dynamics_library(load_scenario("smooth", values).truth.robot)
+    assert len(asked) == 1
+    library.dynamics_library(load_scenario("smooth").truth.robot)
+    assert len(asked) == 2
+
+
 def test_a_library_is_made_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
