@@ -7,6 +7,7 @@ from unittest.mock import patch
 
 from benchmarks.mujoco_rollout import THREADS, replay_of
 from benchmarks.results import Result, Table, publish, row
+from benchmarks.tick_operations import operations
 from benchmarks.timing import Timings, interleaved
 from sms_handover.compiled.kinematics import CompiledKinematics
 from sms_handover.simulation import loop as loop_module
@@ -128,6 +129,10 @@ def main() -> None:
         for name in runs
     ]
     per_tick = [row(name, 1e6 * ticks.best(name) / _LONG, ticks.ratio(name, _BARE)) for name in held]
+    counts = operations(compiled("smooth", "nmpc"), compiled("smooth", "nmpc", "nominal"))
+    ideal, nominal = (sum(count[index] for count in counts.values()) for index in range(2))
+    counted = [(name, str(one), str(other)) for name, (one, other) in counts.items()]
+    counted.append(("together", str(ideal), f"{nominal}, {nominal / ideal:.2f} times as many"))
     split, calls = parts(first)
     cells = [row(name, 1e6 * split.best(name) / calls[name]) for name in split.seconds]
     publish(
@@ -140,7 +145,9 @@ def main() -> None:
                 "parts called from Python one by one, so with the cost of a call; in quiet periods C calls "
                 "them itself. The third has ticks in C while a deputy is held, under a law that knows it. Of "
                 f"{_NOMINAL.split(': ')[1]} sensors are left out, since nothing goes by them; the run "
-                f"takes {times.ratio(_NOMINAL, _ITS_IDEAL):.2f} times as long as the ideal one beside it. "
+                f"takes {times.ratio(_NOMINAL, _ITS_IDEAL):.2f} times as long as the ideal one beside it. The "
+                "fourth counts what its equations take, if friction is solved at once; where joints turn back or "
+                "stick, it has factors and acceleration again. Noise, wrenches and accounts are the rest. "
                 f"MuJoCo's rollout replays the efforts of the first by RK4, {THREADS} cases on {THREADS} "
                 "threads, per case: no law, inverse kinematics, momenta or record of periods."
             ],
@@ -148,6 +155,7 @@ def main() -> None:
                 Table(("run", "s", "times real time", "time over the first"), rows),
                 Table(("part of a reference period", "us"), cells),
                 Table(("deputy that is held", "us per tick", "time over the first"), per_tick),
+                Table(("operations of the equations in a tick", "ideal", "nominal"), counted),
             ],
             values={
                 **speed,
