@@ -145,9 +145,9 @@ def main() -> None:
                 "parts called from Python one by one, so with the cost of a call; in quiet periods C calls "
                 "them itself. The third has ticks in C while a deputy is held, under a law that knows it. Of "
                 f"{_NOMINAL.split(': ')[1]} sensors are left out, since nothing goes by them; the run "
-                f"takes {times.ratio(_NOMINAL, _ITS_IDEAL):.2f} times as long as the ideal one beside it. The "
-                "fourth counts what its equations take, if friction is solved at once; where joints turn back or "
-                "stick, it has factors and acceleration again. Noise, wrenches and accounts are the rest. "
+                f"takes {times.ratio(_NOMINAL, _ITS_IDEAL):.2f} times as long as the ideal one beside it. "
+                "The fourth counts what its equations take, if friction is solved at once; where joints turn "
+                "back or stick, it has factors and acceleration again. Noise, wrenches and accounts are the rest. "
                 f"MuJoCo's rollout replays the efforts of the first by RK4, {THREADS} cases on {THREADS} "
                 "threads, per case: no law, inverse kinematics, momenta or record of periods."
             ],
