@@ -148,8 +148,8 @@ def main() -> None:
                 f"takes {times.ratio(_NOMINAL, _ITS_IDEAL):.2f} times as long as the ideal one beside it. "
                 "The fourth counts what its equations take, if friction is solved at once; where joints turn "
                 "back or stick, it has factors and acceleration again. Noise, wrenches and accounts are the "
-                f"rest. MuJoCo's rollout replays the efforts of the first by RK4, {THREADS} cases on {THREADS} "
-                "threads, per case: no law, inverse kinematics, momenta or record of periods."
+                f"rest. MuJoCo's rollout replays the efforts of the first by RK4, {THREADS} cases on "
+                f"{THREADS} threads, per case: no law, inverse kinematics, momenta or record of periods."
             ],
             tables=[
                 Table(("run", "s", "times real time", "time over the first"), rows),
