@@ -3,11 +3,13 @@
 from collections.abc import Callable
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from scipy.linalg import expm
 
 from sms_handover.control.compensation import CompensatedTorque, Compensation
 from sms_handover.control.computed_torque import ComputedTorque
+from sms_handover.control.disturbance_observer import DisturbanceObserver
 from sms_handover.control.friction_feed_forward import FrictionFeedForward
 from sms_handover.control.integral_action import IntegralAction
 from sms_handover.control.law import LinearFeedback
@@ -78,6 +80,19 @@ def test_a_constant_torque_is_found_and_taken_off(robot: RobotModel, scenario: S
     assert followed(robot, scenario, integrated, disturb, 1000) < 0.05 * plain
     np.testing.assert_allclose(estimate_of(observed)[6:], disturbance, atol=2e-3)
     np.testing.assert_allclose(estimate_of(observed)[:6], 0.0, atol=2e-3)
+
+
+def test_what_acts_on_base_and_joints_is_taken_off_the_joints(robot: RobotModel, draw: Draw) -> None:
+    """By forward dynamics: the joints accelerate as if nothing acted, however the base is pushed."""
+    observer = DisturbanceObserver(robot, BANDWIDTH, TICK)
+    q, v, efforts, acting = draw.q(), draw.v(0.3), draw.vector(20, 3.0), draw.vector(20, 3.0)
+    observer.begin_with(acting)
+    taken_off = np.concatenate([np.zeros(BASE_NV), observer.joint_effect(q, v)])
+    free, pushed = (
+        pin.aba(robot.pin, robot.data, q, v, force)[BASE_NV:].copy()
+        for force in (efforts, efforts + acting - taken_off)
+    )
+    np.testing.assert_allclose(pushed, free, rtol=1e-9, atol=1e-9)
 
 
 def test_integral_action_has_the_response_of_its_equation() -> None:
