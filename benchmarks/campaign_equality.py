@@ -59,6 +59,7 @@ _RETRIES = 10  # [-] so that no case is killed too often
 _MORE = 2  # [-] cases that are added at the end
 _LOOK_S = 0.02  # [s] between two looks at a journal
 _GONE_S = 30.0  # [s] that orphans have to end
+_TAIL = 2000  # [-] characters of what a run said that are told where it failed
 DRIVER, WORKER, CASES = "driver", "worker", "process of cases"
 
 
@@ -221,7 +222,9 @@ def kill(trial: Trial, kills: int) -> Counter[str]:
                 time.sleep(_LOOK_S)
         if child.returncode >= 0:
             break
-    require(child.returncode == 0 and not at, f"the run ended with {child.returncode}, {len(at)} kills left")
+    said = (trial.folder / "killed.log").read_text(encoding="utf-8", errors="replace")[-_TAIL:]
+    ended = f"the run ended with {child.returncode}, {len(at)} kills left: {said}"
+    require(child.returncode == 0 and not at, ended)
     trial.require_rows(out, "killed")
     return found
 

@@ -37,7 +37,8 @@ class PreviewState:
 
     ``start_ns`` is when the phase began, with joints (n,) rad and tools as they were. ``grasp_frame`` is
     where ``holder`` has the deputy; ``deputy_in_world`` is where it was last. ``corrections`` tell by arm how
-    far off the targets at ``stamp_ns`` were what was expected: a shift in ``world``, and a turn of its axes.
+    far off the targets at ``stamp_ns`` were what was expected: a shift in ``world``, and a turn of its axes;
+    ``drifts`` how these change, on average of the latest time.
     """
 
     phase: TaskPhase
@@ -50,8 +51,9 @@ class PreviewState:
     deputy_in_world: Pose
     time_law: str
     corrections: Mapping[str, Pose]
+    drifts: Mapping[str, Twist]
 
     def __post_init__(self) -> None:
         freeze(self, "joints_at_start")
-        for name in ("tools_at_start", "corrections"):
+        for name in ("tools_at_start", "corrections", "drifts"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))

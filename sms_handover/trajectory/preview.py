@@ -12,6 +12,7 @@ from sms_handover.previewed_targets import PreviewedTargets, PreviewState
 from sms_handover.trajectory.generator import goal_in_world
 from sms_handover.trajectory.pose_path import AT_REST, PosePath
 from sms_handover.trajectory.schedule import ArmTarget, GraspFrameTarget, Hold, JointTarget, Schedule
+from sms_handover.trajectory.target_drift import change_of, low_passed
 from sms_handover.trajectory.time_law import TIME_LAWS, Progress
 from sms_handover.types import (
     BASE_NQ,
@@ -53,7 +54,7 @@ class TargetPreview:
     one is taken which fits the targets of now best; the deputy is where the schedule has it, then in the
     grasp of the arm that has grasped it, whose tool goes on with the twist of now in its own axes; targets on
     the deputy go with it. What the targets of now are off by, those to come are too, and ever more if that
-    grows. A preview ends where commands are due, as what follows depends on their outcome.
+    drifts. A preview ends where commands are due, as what follows depends on their outcome.
     """
 
     def __init__(self, robot: RobotModel, schedule: Schedule) -> None:
@@ -96,8 +97,11 @@ class TargetPreview:
         now = replace(now, time_law=self._fitting(now, reference, tool_in_world))
         found = self._corrections_of(now, phase.stamp_ns, tool_in_world)
         since = ns_to_seconds(phase.stamp_ns - now.stamp_ns)
-        self._drifts = {arm: _drift(now.corrections.get(arm), one, since) for arm, one in found.items()}
-        self._now = replace(now, stamp_ns=phase.stamp_ns, corrections=found)
+        elapsed, drifts = ns_to_seconds(phase.stamp_ns - now.start_ns), dict(now.drifts)
+        for arm in found.keys() & now.corrections.keys():
+            change = change_of(now.corrections[arm], found[arm], since)
+            drifts[arm] = low_passed(drifts.get(arm, AT_REST), change, since, elapsed)
+        self._now = replace(now, stamp_ns=phase.stamp_ns, corrections=found, drifts=drifts)
         self._base = q[:BASE_NQ]
 
     def grasped(self, event: GraspEvent) -> None:
@@ -125,7 +129,7 @@ class TargetPreview:
         law = now.time_law if now else next(iter(TIME_LAWS))
         grip = (now.holder, now.grasp_frame) if now else ("", "")
         stamp_ns = phase.stamp_ns
-        return PreviewState(phase, stamp_ns, stamp_ns, joints, tools, *grip, deputy, law, {})
+        return PreviewState(phase, stamp_ns, stamp_ns, joints, tools, *grip, deputy, law, {}, {})
 
     def _leg_of(self, now: PreviewState) -> _Leg:
         """Return the leg of the phase of now."""
@@ -237,7 +241,7 @@ class TargetPreview:
             end, end_twist = self._moved(now, leg, arm, goal, stamp_ns)
             pose, twist = PosePath(leg.tools[arm], end, end_twist).at(done)
             if arm in now.corrections:
-                ahead, drift = ns_to_seconds(stamp_ns - now.stamp_ns), self._drifts[arm]
+                ahead, drift = ns_to_seconds(stamp_ns - now.stamp_ns), now.drifts.get(arm, AT_REST)
                 turn = pin.exp3(ahead * drift.angular) @ se3_of(now.corrections[arm]).rotation
                 shift = now.corrections[arm].position + ahead * drift.linear
                 pose = pose_of(pin.SE3(turn @ se3_of(pose).rotation, pose.position + shift))
@@ -255,14 +259,6 @@ class TargetPreview:
             held = pose_of(se3_of(frame).inverse())
             return PreviewedTargets(tools, twists, joints, rates, now.holder, held, touching)
         return PreviewedTargets(tools, twists, joints, rates, "", now.deputy_in_world, touching)
-
-
-def _drift(before: Pose | None, now: Pose, since: float) -> Twist:
-    """Return how a correction changes, in ``world`` axes, zero where it is the first."""
-    if before is None or since <= 0.0:
-        return Twist(np.zeros(3), np.zeros(3))
-    turned = se3_of(now).rotation @ se3_of(before).rotation.T
-    return Twist((now.position - before.position) / since, pin.log3(turned) / since)
 
 
 def _progress(law: str, leg: _Leg, stamp_ns: int) -> Progress:

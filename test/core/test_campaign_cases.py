@@ -239,6 +239,18 @@ def test_a_process_that_cannot_start_is_an_error(tmp_path: Path) -> None:
         CaseProcess(frozen, number, 3, Limits(), ("/bin/false",)).run(TASK)
 
 
+def test_a_process_that_is_killed_as_it_starts_is_started_again(tmp_path: Path) -> None:
+    """As often as cases are tried again, which here is once."""
+    frozen, number = freeze(written(tmp_path))
+    seen = tmp_path / "seen"
+    killed_once = f'[ -e "{seen}" ] && exec "$@"; touch "{seen}"; kill -9 $$'
+    process = CaseProcess(frozen, number, 3, Limits(), ("/bin/sh", "-c", killed_once, "sh", *STUB))
+    assert process.run(TASK).row.status is Status.MISSION_FAILED  # as the stub has it of case 0
+    process.close()
+    with pytest.raises(SmsHandoverError, match="cannot start: its process ended by signal SIGKILL"):
+        CaseProcess(frozen, number, 3, Limits(), ("/bin/sh", "-c", "kill -9 $$")).run(TASK)
+
+
 def test_a_trajectory_has_a_row_per_reference(tmp_path: Path) -> None:
     run = cases_of(tmp_path).run(TASK).run
     assert run is not None

@@ -58,13 +58,20 @@ class CaseProcess:
         self._seed, self._limits, self._program = seed, limits, tuple(program)
         self._child: subprocess.Popen[bytes] | None = None
         self._scratch: Path | None = None
-        self._pending, self._said = b"", b""
+        self._pending, self._said, self._killed = b"", b"", False
 
     def run(self, task: Task) -> Done:
-        """Return what comes of a task; raises SmsHandoverError if the child cannot even start."""
+        """Return what comes of a task; raises SmsHandoverError if the child cannot even start.
+
+        One that is killed as it starts is started again, as often as one that is killed at a case.
+        """
         begin = time.monotonic()
         for tries in range(1, self._limits.retries + 2):
-            self._start()
+            unable = self._start()
+            if unable and self._killed and tries <= self._limits.retries:
+                continue
+            if unable:
+                raise SmsHandoverError(f"a process for cases cannot start: {unable}")
             answer, status, cause = self._ask(json.dumps(task), self._limits.wall_time)
             if answer is not None:
                 return self._done(answer, tries)
@@ -92,12 +99,12 @@ class CaseProcess:
         if self._scratch is not None:
             shutil.rmtree(self._scratch, ignore_errors=True)
 
-    def _start(self) -> None:
-        """Start the child unless it runs."""
+    def _start(self) -> str:
+        """Start the child unless it runs; return why it cannot, '' if it can."""
         if self._child is not None and self._child.poll() is None:
-            return
+            return ""
         self.close()
-        self._pending = b""
+        self._pending, self._killed = b"", False
         self._scratch = Path(tempfile.mkdtemp(prefix="sms_handover_cases_"))  # ours, as a child may be killed
         self._child = subprocess.Popen(
             self._program,
@@ -109,9 +116,10 @@ class CaseProcess:
         )
         answer, _, cause = self._ask(json.dumps({**self._first, "folder": str(self._scratch)}), _START_S)
         if answer is None:
-            raise SmsHandoverError(f"a process for cases cannot start: {cause}")
+            return cause
         if "error" in answer:
             raise ConfigurationError(str(answer["error"]))
+        return ""
 
     def _ask(self, text: str, limit_s: float) -> tuple[dict[str, object] | None, Status, str]:
         """Send a line and wait for the answer; without one tell how and why that ended."""
@@ -163,7 +171,8 @@ class CaseProcess:
             pass
         self.close()
         code, how = child.returncode, f"with exit code {child.returncode}"
-        if code < 0:
+        self._killed = code < 0
+        if self._killed:
             with suppress(ValueError):
                 how = f"by signal {signal.Signals(-code).name}"
         lines = [line for line in self._said.decode(errors="replace").splitlines() if line.strip()]
