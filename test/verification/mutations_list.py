@@ -1401,6 +1401,13 @@ BREAKS: tuple[Break, ...] = (
         "mpc",
     ),
     _core(
+        "what a measurement jumps by gone on with over the horizon",
+        "trajectory/target_drift",
+        "share = max(1.0 - exp(-since / _TIME_CONSTANT), since / elapsed)",
+        "share = 1.0",
+        "target_drift",
+    ),
+    _core(
         "a preview that begins where tools were before joints led them",
         "trajectory/preview",
         "tools = {**self._robot.tools_at(np.concatenate([self._base, leg.ends])), **leg.goals}",
