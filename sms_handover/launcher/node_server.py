@@ -70,7 +70,7 @@ class NodeServer:
         """End the server; the nodes stay."""
         if self._channel is not None:
             self._channel.close()
-            self._process.terminate()  # it may be importing still
+            self._process.kill()  # it may be importing still, or suspended: then another signal would wait
             self._process.wait()
             _adopts_orphans(False)
 

@@ -57,16 +57,16 @@ def test_a_server_that_does_not_answer_ends_the_run(monkeypatch: pytest.MonkeyPa
         os.kill(server._process.pid, signal.SIGSTOP)
         with pytest.raises(GraphError, match=r"the node server has not started 'ik' within 0\.01 s"):
             server.start("ik", UNKNOWN, {}, [1])
-        os.kill(server._process.pid, signal.SIGKILL)
+    assert server._process.returncode == -signal.SIGKILL  # suspended as it is
 
 
-def test_a_signal_ends_the_wait_for_a_server() -> None:
+def test_a_signal_ends_the_wait_for_a_server(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(node_server, "_IMPORT_TIMEOUT_S", 10.0)
     with Interrupts() as interrupts, NodeServer() as server:
         os.kill(server._process.pid, signal.SIGSTOP)
         os.kill(os.getpid(), signal.SIGINT)
         with pytest.raises(KeyboardInterrupt):
             server.wait_until_ready(interrupts.heed)
-        os.kill(server._process.pid, signal.SIGKILL)
 
 
 def test_where_there_is_no_server_a_node_starts_by_itself(tmp_path: Path) -> None:
