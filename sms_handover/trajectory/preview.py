@@ -98,7 +98,7 @@ class TargetPreview:
         found = self._corrections_of(now, phase.stamp_ns, tool_in_world)
         since = ns_to_seconds(phase.stamp_ns - now.stamp_ns)
         elapsed, drifts = ns_to_seconds(phase.stamp_ns - now.start_ns), dict(now.drifts)
-        for arm in found.keys() & now.corrections.keys():
+        for arm in [arm for arm in found if arm in now.corrections and since > 0.0]:
             change = change_of(now.corrections[arm], found[arm], since)
             drifts[arm] = low_passed(drifts.get(arm, AT_REST), change, since, elapsed)
         self._now = replace(now, stamp_ns=phase.stamp_ns, corrections=found, drifts=drifts)

@@ -11,7 +11,7 @@ _TIME_CONSTANT = 0.3  # [s] of the low pass, less than a horizon; own choice
 
 
 def change_of(before: Pose, now: Pose, since: float) -> Twist:
-    """Return the twist in ``world`` axes by which a shift and a turn have changed in ``since`` s."""
+    """Return the twist in ``world`` axes by which a shift and a turn have changed in ``since`` > 0 s."""
     turned = pin.log3(se3_of(now).rotation @ se3_of(before).rotation.T)
     return Twist((now.position - before.position) / since, turned / since)
 
