@@ -112,10 +112,7 @@ def _recorded(options: Namespace, cases: Cases, task: Task, row: Row | None, scr
         print(f"it ends as its row says: {row.cause}")
         code = EXIT_OK
     else:
-        if ended in (
-            EXIT_LOSS,
-            EXIT_INTERRUPTED,
-        ):  # any other is of the mission, as in its row
+        if ended in (EXIT_LOSS, EXIT_INTERRUPTED):  # any other is of the mission, as in its row
             return ended
         equal = row is not None and run_digest(read_run(bag_of(options.output))) == row.run_digest
         code = _told(row, equal)

@@ -31,14 +31,7 @@ from sms_handover.errors import ConfigurationError
 from sms_handover.model.known_payload import EMPTY_HANDS, Grip, KnownPayload
 from sms_handover.plan_report import PlannedPaths, PlanReport, PlanStatus
 from sms_handover.previewed_targets import PreviewState
-from sms_handover.types import (
-    BASE_NQ,
-    BASE_NV,
-    Array,
-    GraspEvent,
-    frozen,
-    read_only,
-)
+from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, frozen, read_only
 from sms_handover.units import ns_to_seconds, seconds_to_ns
 
 
