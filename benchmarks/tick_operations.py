@@ -5,7 +5,7 @@ from typing import Any
 import casadi
 
 from sms_handover.compiled.resisted_functions import ResistedFunctions
-from sms_handover.compiled.source import _acceleration, _efforts, _symbols, with_parameters
+from sms_handover.compiled.source import acceleration_of, efforts_of, symbols_of, with_parameters
 from sms_handover.compiled.tree import body_tree
 from sms_handover.simulation.scenario import Scenario
 
@@ -20,11 +20,11 @@ def operations(ideal: Scenario, nominal: Scenario) -> dict[str, tuple[int, int]]
     further one has its factors and acceleration again.
     """
     known, truth = body_tree(nominal.model.robot), body_tree(nominal.truth.robot)
-    turn, v, _ = _symbols(truth)
+    turn, v, _ = symbols_of(truth)
     resisted = ResistedFunctions(turn, v, *with_parameters(truth))
     inertia, factors, held = map(_count, resisted.functions)
-    by, conditioned = _acceleration(body_tree(ideal.truth.robot)), _acceleration(truth)
-    prepared, own = (_count(_efforts(known, prepared=first)) for first in (True, False))
+    by, conditioned = acceleration_of(body_tree(ideal.truth.robot)), acceleration_of(truth)
+    prepared, own = (_count(efforts_of(known, prepared=first)) for first in (True, False))
     return {
         "law, which finds factors of H for the plant where truth and model are one": (prepared, own),
         "H and c of the plant, for friction": (0, inertia),

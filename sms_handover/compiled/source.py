@@ -53,14 +53,14 @@ _NATIVE_FILES = (
 def dynamics_source(bodies: Sequence[Body], tools: Sequence[Tool], schemes: Mapping[str, Tableau]) -> str:
     """Return the C code of a kind of robot: its equations, and the loop and inverse kinematics on them."""
     joints = len(bodies) - 1
-    by = _acceleration(bodies)
-    angles, (turn, v, _) = ca.SX.sym("angles", joints), _symbols(bodies)
+    by = acceleration_of(bodies)
+    angles, (turn, v, _) = ca.SX.sym("angles", joints), symbols_of(bodies)
     numbers, known = with_parameters(bodies)
     resisted = ResistedFunctions(turn, v, numbers, known)
     functions = [
         *(step_function(step_name(n), by, scheme, joints, goes_on=False) for n, scheme in schemes.items()),
         *(step_function(rest_name(n), by, scheme, joints, goes_on=True) for n, scheme in schemes.items()),
-        _efforts(bodies, prepared=False),
+        efforts_of(bodies, prepared=False),
         _prepared_torque(bodies),
         *(_loaded_torque(bodies, arm, tool.body) for arm, tool in enumerate(tools)),
         *resisted.functions,
@@ -111,9 +111,9 @@ def own_sine_cosine() -> str:
     return (_NATIVE / "sine_cosine.c").read_text(encoding="ascii")
 
 
-def _acceleration(bodies: Sequence[Body]) -> Acceleration:
+def acceleration_of(bodies: Sequence[Body]) -> Acceleration:
     """Return the functions for v' by the mass matrix, and by articulated bodies for later stages."""
-    turn, v, force = _symbols(bodies)
+    turn, v, force = symbols_of(bodies)
     parameters, known = with_parameters(bodies)
     robot = RigidBodies(known, *turn, v)
     factors, bias = robot.inertia_factors(), robot.bias()
@@ -137,12 +137,12 @@ def _kept(bias: Any, factors: Factors) -> Any:
     return ca.vertcat(bias, *factors.inverse, *(x for row in factors.lower for x in row.values()))
 
 
-def _efforts(bodies: Sequence[Body], *, prepared: bool) -> Any:
+def efforts_of(bodies: Sequence[Body], *, prepared: bool) -> Any:
     """Return the function that maps cosines, sines, v, joint accelerations and parameters to efforts.
 
     One that is ``prepared`` has the numbers that the first stage of a step keeps as a second result.
     """
-    turn, v, _ = _symbols(bodies)
+    turn, v, _ = symbols_of(bodies)
     parameters, known = with_parameters(bodies)
     joints = len(bodies) - 1
     wanted = ca.SX.sym("wanted", joints)
@@ -155,7 +155,7 @@ def _efforts(bodies: Sequence[Body], *, prepared: bool) -> Any:
 
 def _prepared_torque(bodies: Sequence[Body]) -> Any:
     """Return the function of q, v, desired motion (3, n), gains and parameters, which is prepared."""
-    inner = _efforts(bodies, prepared=True)
+    inner = efforts_of(bodies, prepared=True)
     return _by_feedback(PREPARED_TORQUE, inner, len(bodies) - 1, [parameter_count(bodies)])
 
 
@@ -166,7 +166,7 @@ def _loaded_torque(bodies: Sequence[Body], arm: int, last: int) -> Any:
     gains, parameters, and those of the body (11,) in truth and in model; results are efforts by the model,
     and the numbers that the first stage keeps by the truth.
     """
-    turn, v, _ = _symbols(bodies)
+    turn, v, _ = symbols_of(bodies)
     parameters, known = with_parameters(bodies)
     joints = len(bodies) - 1
     wanted = ca.SX.sym("wanted", joints)
@@ -233,7 +233,7 @@ def _body_of(body: Body, numbers: Any) -> Body:
     return replace(body, **values)
 
 
-def _symbols(bodies: Sequence[Body]) -> tuple[tuple[Any, Any], Any, Any]:
+def symbols_of(bodies: Sequence[Body]) -> tuple[tuple[Any, Any], Any, Any]:
     """Return cosines and sines of the joint angles (n,), velocity (6 + n,) and force (6 + n,)."""
     joints = len(bodies) - 1
     turn = ca.SX.sym("cosines", joints), ca.SX.sym("sines", joints)
