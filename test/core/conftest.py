@@ -1,7 +1,7 @@
 """What the tests of the core share: the robot, random states, schedules in files, and two whole runs."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -115,6 +115,14 @@ def compiled_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder for the libraries of this run, of all workers of pytest-xdist, so that each is made once."""
     base = tmp_path_factory.getbasetemp()
     return (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "compiled"
+
+
+@pytest.fixture(scope="module")
+def kept_libraries(compiled_cache: Path) -> Iterator[None]:
+    """That folder for the libraries of a whole module."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(compiled_cache))
+        yield
 
 
 @pytest.fixture(scope="session")

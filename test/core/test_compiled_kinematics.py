@@ -1,9 +1,8 @@
 """Compiled kinematics and inverse kinematics: the values of Pinocchio to rounding, the same iterations."""
 
 import ctypes
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -34,13 +33,7 @@ _ROUNDING = 1e-13  # [m, rad, m/s, rad/s, kg m/s, J] ten frames of a dozen opera
 _ANGLE = 1e-10  # [rad] of inverse kinematics: rounding, and what the last iterations make of it
 _FAR = Pose(np.array([9.0, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 1.0]))
 
-
-@pytest.fixture(autouse=True, scope="module")
-def cache(compiled_cache: Path) -> Iterator[None]:
-    """The folder of all modules for the libraries, so that each is made once."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(compiled_cache))
-        yield
+pytestmark = pytest.mark.usefixtures("kept_libraries")
 
 
 def _one_armed() -> RobotModel:

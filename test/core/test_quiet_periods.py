@@ -3,7 +3,6 @@
 import gc
 import sys
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -43,13 +42,7 @@ COMPILED: Overrides = {"common": {"dynamics": "compiled"}}
 UNLIKE: dict[str, Any] = {"deputy.mass": 2.0, "model.deputy.mass": 2.2}  # [kg]
 _PERIOD = 20  # ticks
 
-
-@pytest.fixture(autouse=True, scope="module")
-def cache(compiled_cache: Path) -> Iterator[None]:
-    """The folder of all modules for the libraries, so that each is made once."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(compiled_cache))
-        yield
+pytestmark = pytest.mark.usefixtures("kept_libraries")
 
 
 def python_loop(scenario: Scenario) -> Loop:

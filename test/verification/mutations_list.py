@@ -359,7 +359,7 @@ BREAKS: tuple[Break, ...] = (
         "compiled/example",
         "if not apart <= _TOLERANCE:",
         "if not apart <= 1e9:",
-        "compiled_dynamics",
+        "compiled_library",
     ),
     _core(
         "effort limits inverted",
