@@ -13,9 +13,8 @@ from sms_handover.compiled.kinematics import CompiledKinematics
 from sms_handover.simulation import loop as loop_module
 from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.period_runner import PythonRunner
-from sms_handover.simulation.recorder import RunRecorder
 from sms_handover.simulation.scenario import Scenario, load_scenario
-from sms_handover.simulation.simulate import simulate
+from sms_handover.simulation.simulate import run_of, simulate
 from sms_handover.simulation.wiring import make_ik
 from sms_handover.types import IkRequest
 from sms_handover.units import NS_PER_S
@@ -40,7 +39,7 @@ def by_period(scenario: Scenario) -> None:
     """Run it with its ticks in C and its reference periods in Python."""
     loop = Loop(scenario)
     loop._quiet = None
-    _record(loop)
+    run_of(loop)
 
 
 def by_tick(scenario: Scenario) -> None:
@@ -48,15 +47,7 @@ def by_tick(scenario: Scenario) -> None:
     with patch.object(
         loop_module, "make_runner", lambda plant, controller, *_: PythonRunner(plant, controller)
     ):
-        _record(Loop(scenario))
-
-
-def _record(loop: Loop) -> None:
-    robot = loop.scenario.model.robot
-    recorder = RunRecorder(robot.joint_names, robot.arms)
-    while not loop.finished:
-        recorder.add(loop.advance_quietly())
-    recorder.data()
+        run_of(Loop(scenario))
 
 
 def ticks_of(mass: float, conditions: str = "ideal") -> Callable[[], object]:

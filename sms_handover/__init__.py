@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     from sms_handover.simulation.observed_ticks import Observation as Observation
     from sms_handover.simulation.scenario import Scenario as Scenario
     from sms_handover.simulation.scenario import load_scenario as load_scenario
+    from sms_handover.simulation.simulate import RunWithoutPlanError as RunWithoutPlanError
     from sms_handover.simulation.simulate import simulate as simulate
     from sms_handover.simulation.snapshot import Snapshot as Snapshot
     from sms_handover.simulation.snapshot import load_snapshot as load_snapshot

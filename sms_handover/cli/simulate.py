@@ -10,10 +10,11 @@ from sms_handover.cli.collisions import warn_of_collisions
 from sms_handover.cli.exit_codes import EXIT_FAILED
 from sms_handover.cli.options import add_scenario_options, scenario_of
 from sms_handover.cli.task_code import task_code
+from sms_handover.errors import NoPlanError
 from sms_handover.launcher.display import Display
 from sms_handover.simulation.check import check_scenario
 from sms_handover.simulation.save import save_run
-from sms_handover.simulation.simulate import simulate
+from sms_handover.simulation.simulate import RunWithoutPlanError, simulate
 from sms_handover.types import TaskPhase
 
 
@@ -47,7 +48,11 @@ def command(options: Namespace) -> int:
             display.lasts_until(common.last_tick(phase.end_ns, failed=phase.failed) * common.tick_ns)
             display.show_run(stamp_ns, phase.name)
 
-        run = simulate(scenario, progress=show)
+        no_plan = ""
+        try:
+            run = simulate(scenario, progress=show)
+        except RunWithoutPlanError as error:
+            run, no_plan = error.run, str(error)
         display.show_run(int(run.tick_ns[-1]), run.phases[-1].name, last=True)
     name, tolerance = scenario.parameters.controller.law, scenario.parameters.plant.grasp_tolerance
     urdf, schedule = scenario.truth.robot.urdf, scenario.truth.schedule.text
@@ -62,6 +67,8 @@ def command(options: Namespace) -> int:
     if options.output:
         save_run(run, options.output)
         print(f"arrays written to {options.output}")
+    if no_plan:
+        raise NoPlanError(f"{no_plan}; the figures are of the run up to there")
     if options.reject_collisions and clearance and clearance.collisions:
         return EXIT_FAILED
     return task_code(run.grasp_events, run.run_events, failed=run.phases[-1].failed)

@@ -7,13 +7,15 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from sms_handover.analysis.latex import escaped, latex_table
 from sms_handover.analysis.layout import Row, Section
 from sms_handover.cli.main import main
 from sms_handover.cli.verbs import FAMILIES, OLD_NAMES, VERBS, call_of
-from sms_handover.errors import ConfigurationError
+from sms_handover.errors import ConfigurationError, NoPlanError
+from sms_handover.simulation.loop import Loop
 
 from .bag_messages import made_up_run, write_run
 
@@ -180,3 +182,28 @@ def test_ros_is_imported_by_the_verbs_alone_that_need_it(run: str, tmp_path: Pat
     assert done.stderr.count("\n") == len(NEED_ROS) + 1, "one line of each, as of the run that is made up"
     assert done.stderr.count(": error: this needs ROS, which cannot be imported: ") == len(NEED_ROS)
     assert all(codes[line] == "2" for line in NEED_ROS)
+
+
+@pytest.mark.parametrize(("last_ns", "kept"), [(20_000_000, 20), (0, 0)])
+def test_a_run_that_ends_without_a_plan_is_kept_as_far_as_it_came(
+    last_ns: int,
+    kept: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    advance, out = Loop._advance, tmp_path / "run.npz"
+
+    def gives_up(loop: Loop, most: int) -> object:
+        if loop.state.stamp_ns == last_ns:
+            raise NoPlanError("no plan, at rest at 0.02 s: rate arm_a_joint_3 is 1e-3 too large")
+        return advance(loop, most)
+
+    monkeypatch.setattr(Loop, "_advance", gives_up)
+    assert main(["simulate", "smooth", "-p", "common.duration:=0.04", "-o", str(out)]) == 1
+    told, errors = capsys.readouterr()
+    assert errors.count("no plan, at rest at 0.02 s") == 1 and "Traceback" not in errors
+    assert ("control effort" in told) is out.exists() is bool(kept)
+    if kept:
+        with np.load(out, allow_pickle=False) as arrays:
+            assert len(arrays["tick_ns"]) == kept

@@ -966,8 +966,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "a law without a plan taken for a broken program",
         "campaign/cases/case",
-        "return Status.MISSION_FAILED, str(error), run",
-        "return Status.ERROR, str(error), run",
+        "return Status.MISSION_FAILED, str(error), error.run",
+        "return Status.ERROR, str(error), error.run",
         "campaign_cases",
     ),
     _core(

@@ -21,8 +21,10 @@ from sms_handover.campaign.sampling.streams import run_seed
 from sms_handover.errors import ConfigurationError, ControllerError, NoPlanError
 from sms_handover.run_data import RunData
 from sms_handover.simulation.loop import Loop
-from sms_handover.simulation.recorder import RunRecorder
+from sms_handover.simulation.observed_ticks import Ticks
+from sms_handover.simulation.quiet_periods import QuietPeriods
 from sms_handover.simulation.scenario import Scenario, load_scenario
+from sms_handover.simulation.simulate import RunWithoutPlanError, run_of
 from sms_handover.types import Array
 
 _ONE_LINE = 300  # [characters] of a cause
@@ -98,22 +100,21 @@ class Cases:
             inputs[path] = read_back(loop, path)
             if is_exact(loop, path) and not is_same(asked, inputs[path]):
                 raise RuntimeError(f"{path} was drawn as {asked}, and is {inputs[path]}")
-        most = campaign.limits.ticks
-        panels = tuple(panel.joint for panel in scenario.truth.robot.description.flexible_panels)
-        robot = scenario.model.robot
-        recorder = RunRecorder(robot.joint_names, robot.arms, loop.last_tick + 1, panels)
-        done = 0
-        while not loop.finished:
-            try:
-                ticks = loop.advance_quietly(recorder.room)
-            except NoPlanError as error:  # as far as it came, and without metrics: less effort is no merit
-                run = recorder.data(loop.base_wrenches, loop.applied) if done else None
-                return Status.MISSION_FAILED, str(error), run
-            recorder.add(ticks)
+        most, done = campaign.limits.ticks, 0
+
+        def is_beyond(ticks: Ticks | QuietPeriods) -> bool:
+            nonlocal done
             done += len(ticks.rows.stamp_ns)
-            if most and done > most:
-                return Status.LIMIT, f"more than {most} ticks", None
-        run = recorder.data(loop.base_wrenches, loop.applied)
+            return bool(most) and done > most
+
+        try:
+            run = run_of(loop, until=is_beyond)
+        except RunWithoutPlanError as error:  # without metrics: less effort is no merit
+            return Status.MISSION_FAILED, str(error), error.run
+        except NoPlanError as error:
+            return Status.MISSION_FAILED, str(error), None
+        if most and done > most:
+            return Status.LIMIT, f"more than {most} ticks", None
         if not _is_finite(run):
             return Status.NUMERIC_FAILURE, "numbers that are not finite", None
         further = (*campaign.metrics, *campaign.success.names, campaign.worst_by)
