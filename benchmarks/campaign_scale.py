@@ -18,6 +18,7 @@ from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
+import dask
 import distributed
 
 from benchmarks.campaign_stub import row_text
@@ -42,6 +43,10 @@ WORKERS = (1, 2, 4, 8, 16, 32, 64)
 _PROCESSES = 2  # of workers; of more workers each is a thread of them, with a process of cases of its own
 _CASE_S = 3.0  # [s] that a stub sleeps for a case
 _PER_WORKER = 8  # [-] cases for each worker
+_SATURATION = (
+    "distributed.scheduler.worker-saturation"  # [-] tasks that a thread is given at a time, rounded up
+)
+_ONE_EACH, _DASK_HAS = 1.0, 1.1
 _GB, _MB, _MS = 1e9, 1e6, 1e3
 _H = 3600.0  # [s]
 _TASKS = (300.0, 700.0)  # [1/s] that the scheduler of Dask takes
@@ -116,8 +121,21 @@ def peak_mb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / _MB
 
 
+class Pace(NamedTuple):
+    """Wall time in s that a case takes beyond its own, with so many workers.
+
+    ``by_default`` is what it is with the saturation that Dask has, None where that is how we start workers.
+    """
+
+    workers: int
+    overhead: float
+    by_default: float | None
+
+
 @contextmanager
-def cluster(frozen: Frozen, cases: int, workers: int, seconds: float) -> Iterator[DaskWorkers]:
+def cluster(
+    frozen: Frozen, cases: int, workers: int, seconds: float, saturation: float
+) -> Iterator[DaskWorkers]:
     """Yield workers with stubs that sleep: a process each, or threads of a few where they are many."""
     stub = (sys.executable, "-m", "benchmarks.campaign_stub", str(seconds))
     if workers <= _PROCESSES:
@@ -127,14 +145,17 @@ def cluster(frozen: Frozen, cases: int, workers: int, seconds: float) -> Iterato
         finally:
             made.close()
         return
-    with distributed.LocalCluster(  # type: ignore[no-untyped-call]
-        n_workers=_PROCESSES,
-        threads_per_worker=workers // _PROCESSES,
-        host="127.0.0.1",
-        dashboard_address=None,
-        memory_limit=None,
-        silence_logs=logging.CRITICAL,
-    ) as there:
+    with (
+        dask.config.set({_SATURATION: saturation}),
+        distributed.LocalCluster(  # type: ignore[no-untyped-call]
+            n_workers=_PROCESSES,
+            threads_per_worker=workers // _PROCESSES,
+            host="127.0.0.1",
+            dashboard_address=None,
+            memory_limit=None,
+            silence_logs=logging.CRITICAL,
+        ) as there,
+    ):
         made = DaskWorkers(frozen, cases, scheduler=there.scheduler_address, program=stub)
         try:
             yield made
@@ -142,13 +163,19 @@ def cluster(frozen: Frozen, cases: int, workers: int, seconds: float) -> Iterato
             made.close()
 
 
-def overhead(workers: int, seconds: float) -> float:
+def pace(workers: int, seconds: float) -> Pace:
+    """Return what a case takes beyond its own with so many workers, in both ways where there are two."""
+    by_default = overhead(workers, seconds, _DASK_HAS) if workers > _PROCESSES else None
+    return Pace(workers, overhead(workers, seconds, _ONE_EACH), by_default)
+
+
+def overhead(workers: int, seconds: float, saturation: float) -> float:
     """Return the wall time in s that a case takes beyond its own, with so many workers."""
     cases = _PER_WORKER * workers
     tasks = [Task(case, "smooth", "nmpc") for case in range(cases)]
     with (
         tempfile.TemporaryDirectory() as scratch,
-        cluster(frozen_in(Path(scratch)), cases, workers, seconds) as made,
+        cluster(frozen_in(Path(scratch)), cases, workers, seconds, saturation) as made,
     ):
         for _ in made.run(tasks[: 2 * workers]):  # until the processes have started
             pass
@@ -158,17 +185,20 @@ def overhead(workers: int, seconds: float) -> float:
         return (time.perf_counter() - begin) / _PER_WORKER - seconds
 
 
-def page(
-    drivers: Sequence[Driver], alone: Driver, overheads: Sequence[tuple[int, float]], seconds: float
-) -> str:
+def page(drivers: Sequence[Driver], alone: Driver, paces: Sequence[Pace], seconds: float) -> str:
     """Return the text of the page."""
     rows = [
         (f"{one.cases:,}", *(f"{number:.0f}" for number in one[1:5]), *(f"{size:.0f}" for size in one[5:]))
         for one in drivers
     ]
     added = [
-        (str(workers), f"{_MS * more:.0f}", f"{seconds / (seconds + more):.3f}")
-        for workers, more in overheads
+        (
+            str(one.workers),
+            f"{_MS * one.overhead:.0f}",
+            f"{seconds / (seconds + one.overhead):.3f}",
+            "-" if one.by_default is None else f"{_MS * one.by_default:.0f}",
+        )
+        for one in paces
     ]
     first, last = drivers[-2], drivers[-1]
     per_row = (last.reading - first.reading) * _MB / (last.cases - first.cases)
@@ -227,7 +257,13 @@ worker, start not counted; efficiency is the share of the wall time in which a w
 {_PROCESSES} workers are a process each, more are threads of {_PROCESSES} processes, each with a process of
 cases of its own, {most} at last; the stubs sleep, so that there are no cores to be short of.
 
-{table(["Workers", "Overhead per case [ms]", "Efficiency"], added)}
+{table(["Workers", "Overhead per case [ms]", "Efficiency", "Overhead, Dask's defaults [ms]"], added)}
+
+Threads are measured with `{_SATURATION}` at {_ONE_EACH}, one chunk a thread, and at
+the {_DASK_HAS} that Dask has: rounded up, a worker of 8 threads then gets a ninth, which waits there while
+another worker is idle, and which Dask moves between smaller workers only. That is one case at the end of
+a campaign, here shared by {_PER_WORKER} rounds. Workers of `-j` have one thread each; a scheduler of yours
+whose workers have many is best started with `DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION={_ONE_EACH}`.
 
 ## On paper, beyond what was measured
 
@@ -272,11 +308,11 @@ def main() -> None:
         return
     drivers = [measured(cases, CHUNK) for cases in CASES if cases <= options.largest]
     alone = measured(min(ALONE, options.largest), 1)
-    overheads = []
+    paces = []
     for workers in (workers for workers in WORKERS if workers <= options.workers):
-        overheads.append((workers, overhead(workers, options.seconds)))
-        print(*overheads[-1], file=sys.stderr, flush=True)
-    text = page(drivers, alone, overheads, options.seconds)
+        paces.append(pace(workers, options.seconds))
+        print(paces[-1], file=sys.stderr, flush=True)
+    text = page(drivers, alone, paces, options.seconds)
     if options.print:
         print(text)
     else:
