@@ -8,8 +8,6 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
-from errno import ENOSPC
 from pathlib import Path
 
 import distributed
@@ -17,8 +15,6 @@ import psutil
 import pytest
 
 from sms_handover.campaign.cases.case import Cases
-from sms_handover.campaign.cases.case_process import Done
-from sms_handover.campaign.cases.case_row import Beside
 from sms_handover.campaign.definition.frozen import freeze
 from sms_handover.campaign.engine.choice import workers_for
 from sms_handover.campaign.engine.dask_workers import DaskWorkers, answers_of
@@ -26,7 +22,7 @@ from sms_handover.campaign.engine.run import run_campaign
 from sms_handover.campaign.engine.scheduler_url import require_safe
 from sms_handover.campaign.page.campaign_page import campaign_page
 from sms_handover.campaign.record.campaign_folder import CampaignFolder, merge, open_campaign
-from sms_handover.campaign.record.journal import JOURNAL, JournalWriter
+from sms_handover.campaign.record.journal import JOURNAL
 from sms_handover.campaign.record.manifest import Shard
 from sms_handover.cli.main import main
 from sms_handover.errors import ConfigurationError, SmsHandoverError
@@ -139,93 +135,6 @@ def test_shards_and_more_cases_leave_the_rows(tmp_path: Path) -> None:
     assert CampaignFolder(tmp_path / "merged").cases == 12
 
 
-def test_folders_of_other_campaigns_do_not_mix(tmp_path: Path) -> None:
-    run_here(written(tmp_path / "a"), tmp_path / "one", program=STUB)
-    with pytest.raises(ConfigurationError, match=r"holds another campaign, which differs in campaign.yaml"):
-        run_here(written(tmp_path / "b", seed=4), tmp_path / "one", program=STUB)
-    with pytest.raises(ConfigurationError, match="holds shard 1/1"):
-        run_here(written(tmp_path / "a"), tmp_path / "one", shard=Shard(1, 2), program=STUB)
-    run_here(written(tmp_path / "b", seed=4), tmp_path / "other", program=STUB)
-    with pytest.raises(ConfigurationError, match="hold different campaigns"):
-        merge(tmp_path / "merged", [tmp_path / "one", tmp_path / "other"])
-    frozen, number = freeze(written(tmp_path / "a"))
-    row = next(iter(rows_of(tmp_path / "one").values()))
-    with open_campaign(tmp_path / "lies", frozen, number, Shard()) as opened:
-        opened.add(Done(replace(row, seed=row.seed + 1), Beside(0.0, 0.0, "elsewhere")))
-    with pytest.raises(ConfigurationError, match="case 0 of smooth under nmpc has another row than"):
-        merge(tmp_path / "merged", [tmp_path / "one", tmp_path / "lies"])
-    (tmp_path / "one" / "campaign.yaml").write_text("name: forged\n", encoding="utf-8")
-    with pytest.raises(ConfigurationError, match="the frozen campaign was changed"):
-        CampaignFolder(tmp_path / "one")
-    with pytest.raises(ConfigurationError, match="something else than a campaign"):
-        run_here(written(tmp_path / "a"), tmp_path / "b", program=STUB)
-
-
-def test_a_corrupted_line_is_named_and_done_again(tmp_path: Path) -> None:
-    file, out = written(tmp_path, cases=6), tmp_path / "out"
-    run_here(file, out, program=STUB)
-    expected, path = digests_of(out), out / JOURNAL
-    lines = path.read_bytes().splitlines(keepends=True)
-    lines[1] = lines[1].replace(b'"grasp_error":0.001', b'"grasp_error":0.002')  # valid JSON, wrong value
-    lines[2] = lines[2][:20] + b"\r" + lines[2][21:]  # still one line
-    lines[4] = b"\x00" * 30 + b"\n"
-    path.write_bytes(b"".join(lines))
-    frozen, number = freeze(file)
-    with open_campaign(out, frozen, number, Shard()) as opened:
-        assert [fault.partition(" is corrupted")[0] for fault in opened.faults] == [
-            f"{path}, line 2",
-            f"{path}, line 3",
-            f"{path}, line 5",
-        ]
-        with pytest.raises(ConfigurationError, match="is written to by another run of the campaign"):
-            open_campaign(out, frozen, number, Shard())
-    assert len(rows_of(out)) == 3
-    assert run_here(file, out, program=STUB).before == 3
-    assert digests_of(out) == expected and (out / "broken.jsonl").read_bytes().count(b"\n") == 3
-
-
-def test_a_forged_row_is_no_row(tmp_path: Path) -> None:
-    """Nothing in a folder is run or unpickled: what is no row is named, whatever it is."""
-    file, out = written(tmp_path, cases=2), tmp_path / "out"
-    run_here(file, out, program=STUB)
-    evil = b"cos\nsystem\n(S'touch " + str(tmp_path / "owned").encode() + b"'\ntR.\n"
-    for name in (JOURNAL, "manifest.json", "campaign.yaml"):
-        (out / name).write_bytes(evil if name == JOURNAL else (out / name).read_bytes())
-    assert rows_of(out) == {}
-    (out / "manifest.json").write_bytes(evil)
-    with pytest.raises(ConfigurationError, match="cannot be read"):
-        CampaignFolder(out)
-    assert not (tmp_path / "owned").exists()
-    sources = (Path(__file__).parents[2] / "sms_handover" / "campaign").rglob("*.py")
-    text = "\n".join(path.read_text(encoding="utf-8") for path in sources)
-    assert not [
-        word for word in ("import pickle", "loads(pickle", "allow_pickle=True", "eval(") if word in text
-    ]
-
-
-def test_a_full_disk_is_a_clear_error_and_the_same_command_goes_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    file, out, writes, write = written(tmp_path, cases=6), tmp_path / "out", list[int](), os.write
-
-    def full(descriptor: int, data: bytes) -> int:
-        writes.append(len(data))
-        if len(writes) == 4:
-            write(descriptor, data[:40])  # what there was still room for
-            raise OSError(ENOSPC, os.strerror(ENOSPC))
-        return write(descriptor, data)
-
-    with monkeypatch.context() as patched:
-        patched.setattr("sms_handover.campaign.record.journal.os.write", full)
-        with pytest.raises(SmsHandoverError, match="No space left on device; make room, then the same"):
-            run_here(file, out, program=STUB)
-    assert len(rows_of(out)) == journal_lines(out) == 3
-    assert (out / JOURNAL).read_bytes().endswith(b"}\n"), "no part of a line is left behind"
-    run_here(file, out, program=STUB)
-    run_here(file, tmp_path / "good", program=STUB)
-    assert digests_of(out) == digests_of(tmp_path / "good")
-
-
 def test_it_stops_at_a_look_whatever_the_order(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     stop = {"half_width": 0.28, "looks": [4, 8, 12]}
     file = written(tmp_path, cases=40, stop=stop)
@@ -304,19 +213,6 @@ class Broken:
 def test_whatever_fails_in_a_cluster_is_one_error(error: Exception, told: str) -> None:
     with pytest.raises(SmsHandoverError, match=told):
         answers_of(Broken(error))
-
-
-def test_rows_that_come_together_wait_for_the_disk_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    file, out, synced = written(tmp_path), tmp_path / "out", list[int]()
-    run_here(file, out, program=STUB)
-    entries = list(CampaignFolder(out).entries())
-    writer = JournalWriter(tmp_path / "journal.jsonl")
-    monkeypatch.setattr("sms_handover.campaign.record.journal.os.fsync", synced.append)
-    writer.add(*entries)
-    writer.close()
-    assert len(synced) == 1 and (tmp_path / "journal.jsonl").read_bytes() == (out / JOURNAL).read_bytes()
 
 
 def test_workers_that_cannot_be_reached_are_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
