@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,6 +15,8 @@ import psutil
 import pytest
 
 from sms_handover.campaign.cases.case import Cases
+from sms_handover.campaign.cases.case_process import Done
+from sms_handover.campaign.cases.case_row import Beside, Row, Status, Task
 from sms_handover.campaign.definition.frozen import freeze
 from sms_handover.campaign.engine.choice import workers_for
 from sms_handover.campaign.engine.dask_workers import DaskWorkers, answers_of
@@ -31,6 +33,7 @@ from .campaigns import STUB, command, digests_of, rows_of, run_here, written
 
 CASES = 20
 PATIENCE_S = 120.0
+INTERRUPT_S = 5.0  # [s] that a driver has to end, whatever it waits for
 
 
 def until(condition: object, what: str) -> None:
@@ -151,6 +154,55 @@ def test_it_stops_at_a_look_whatever_the_order(tmp_path: Path, capsys: pytest.Ca
     assert "stopped" not in capsys.readouterr().out
 
 
+def test_drivers_share_a_scheduler(tmp_path: Path) -> None:
+    """Each gets its own rows; the first to end leaves the other its workers, at its next look too."""
+    quiet = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
+    with distributed.LocalCluster(**quiet) as cluster:
+
+        def driver(*laws: str) -> DaskWorkers:
+            frozen, number = freeze(written(tmp_path / laws[0], laws=list(laws), cases=9))
+            return DaskWorkers(frozen, number, scheduler=cluster.scheduler_address, program=STUB)
+
+        def tasks(law: str, cases: range) -> list[Task]:
+            return [Task(case, "smooth", law) for case in cases]
+
+        one, same, other = driver("nmpc"), driver("nmpc"), driver("pid")
+        running = one.run(tasks("nmpc", range(9)))
+        found = [done.row.task for done in next(running)]
+        for another, law in ((other, "pid"), (same, "nmpc")):
+            asked = tasks(law, range(5))
+            assert sorted(done.row.task for chunk in another.run(asked) for done in chunk) == asked
+            another.close()
+        found += [done.row.task for chunk in running for done in chunk]
+        found += [done.row.task for chunk in one.run(tasks("nmpc", range(9, 12))) for done in chunk]
+        assert sorted(found) == tasks("nmpc", range(12))
+        one.close()
+
+
+class Confused:
+    """Workers that give another case than they were asked for."""
+
+    def __init__(self, shift: int, times: int) -> None:
+        self._shift, self._times = shift, times
+
+    def run(self, tasks: Iterable[Task]) -> Iterator[Sequence[Done]]:
+        for case, scenario, law in tasks:
+            row = Row(Task(case + self._shift, scenario, law), case, {}, Status.SUCCEEDED, "", {}, "00")
+            yield [Done(row, Beside(0.0, 0.0, "here"))] * self._times
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize(("shift", "times"), [(1, 1), (0, 2)])
+def test_rows_that_nobody_asked_for_are_an_error(shift: int, times: int, tmp_path: Path) -> None:
+    frozen, number = freeze(written(tmp_path))
+    told = pytest.raises(SmsHandoverError, match=f"gave a row of case {shift} .* were not asked for")
+    with open_campaign(tmp_path / "out", frozen, number, Shard()) as opened, told:
+        run_campaign(opened, lambda: Confused(shift, times), lambda tally: None)
+    assert not journal_lines(tmp_path / "out")
+
+
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_ctrl_c_leaves_within_seconds_and_says_how_to_go_on(jobs: str, tmp_path: Path) -> None:
     """As a terminal sends it: to the driver and to every process of its group."""
@@ -162,7 +214,10 @@ def test_ctrl_c_leaves_within_seconds_and_says_how_to_go_on(jobs: str, tmp_path:
         below.extend(family(child.pid))
         assert below
         os.killpg(child.pid, signal.SIGINT)
+        begin = time.monotonic()
         _, said = child.communicate(timeout=PATIENCE_S)
+        took = time.monotonic() - begin  # from the signal to the end of the driver
+    assert took < INTERRUPT_S
     assert child.returncode == 130 and "interrupted: the same command goes on" in said
     assert "Traceback" not in said
 
@@ -177,6 +232,9 @@ def test_ctrl_c_leaves_within_seconds_and_says_how_to_go_on(jobs: str, tmp_path:
         ("tcp://10.0.0.1:8786", False, "is plain TCP to another machine"),
         ("ws://10.0.0.1:8786", True, "must be of the form"),
         ("tls://cluster", False, "must be of the form"),
+        ("tcp://127.0.0.1:99999", False, "must be of the form .*: Port out of range"),
+        ("tls://cluster:abc", False, "must be of the form .*: Port could not be cast"),
+        ("tls://[::1:8786", False, "must be of the form .*: Invalid IPv6 URL"),
     ],
 )
 def test_a_scheduler_is_reached_safely_or_on_request(url: str, trusted: bool, told: str) -> None:
