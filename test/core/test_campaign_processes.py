@@ -127,7 +127,7 @@ def test_a_program_that_is_not_there_leaves_nothing(
         def without(*_: object) -> None:
             raise FileNotFoundError("[Errno 2] No such file or directory: '/bin/sh'")
 
-        monkeypatch.setattr("sms_handover.campaign.cases.case_process.SessionGuard", without)
+        monkeypatch.setattr("sms_handover.campaign.cases.case_process.CaseGuard", without)
     with pytest.raises(SmsHandoverError, match=r"a process for cases cannot start: .*No such file"):
         CaseProcess(FROZEN, 1, 3, Limits(), program).run(TASK)
     assert not list(tmp_path.iterdir())

@@ -17,7 +17,7 @@ from select import select
 from typing import IO, NamedTuple
 
 from sms_handover.campaign.cases.case_row import Beside, Row, Status, Task, row_of
-from sms_handover.campaign.cases.case_session import SessionGuard, end_session, takes_more
+from sms_handover.campaign.cases.case_session import CaseGuard, end_session, takes_more
 from sms_handover.campaign.definition.campaign_file import Limits
 from sms_handover.campaign.definition.frozen import Frozen
 from sms_handover.campaign.sampling.streams import run_seed
@@ -58,7 +58,7 @@ class CaseProcess:
         self._seed, self._limits, self._program = seed, limits, tuple(program)
         self._child: subprocess.Popen[bytes] | None = None
         self._scratch: Path | None = None
-        self._guard: SessionGuard | None = None
+        self._guard: CaseGuard | None = None
         self._pending, self._said, self._killed = b"", b"", False
 
     def run(self, task: Task) -> Done:
@@ -119,7 +119,7 @@ class CaseProcess:
                 env={**os.environ, **_ONE_THREAD},
                 start_new_session=True,  # Ctrl-C is for the parent, which ends it
             )
-            self._guard = SessionGuard(self._child.pid, self._scratch)
+            self._guard = CaseGuard(self._child.pid, self._scratch)
         except OSError as error:
             self._kill()
             return str(error)

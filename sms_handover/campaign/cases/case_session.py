@@ -16,7 +16,7 @@ _LOOK_S = 0.002  # [s] between two looks at whether it has
 _GUARD = 'read -r _; kill -s KILL -- "-$1"; rm -rf -- "$2"'  # a line never comes, only the end of the input
 
 
-class SessionGuard:
+class CaseGuard:
     """A shell that ends a session and removes its folder once the process that made the guard has ended.
 
     That may be killed, and a process for cases may be in a library that keeps Python from seeing it.
