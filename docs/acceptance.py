@@ -1,6 +1,6 @@
 """Acceptance runs of the laws with a model: writes a section of docs/control.md.
 
-Runs that are in build/acceptance/ from before are not repeated: remove it after a change of the laws.
+Runs of the same sources that are in build/acceptance/ from before are not repeated.
 """
 
 import json
