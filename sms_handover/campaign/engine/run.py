@@ -112,7 +112,7 @@ class _Running:
         for task in tasks:
             if task not in self._tasks:
                 raise SmsHandoverError(f"workers gave a row of {task}, which they were not asked for")
-            self._tasks.remove(task)
+            self._tasks.discard(task)
 
 
 class _Lazy:
