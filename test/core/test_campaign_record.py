@@ -273,7 +273,8 @@ def test_names_are_on_disk_before_what_counts_on_them(
     first = ["campaign.yaml", "manifest.json", "smooth.yaml"]
     assert sorted(renamed[:3]) == first
     assert renamed[3:] == ["broken.jsonl", JOURNAL, "manifest.json", "0_smooth_nmpc.npz"]
-    assert ("sync", tmp_path / "runs") in events and ("sync", tmp_path) in events, "made with its parents"
+    assert events[:3] == [("sync", path) for path in (tmp_path, tmp_path / "runs", out)], "and the journal"
+    assert events[events.index(("rename", out / JOURNAL)) + 1] == ("sync", out)
     for place, (kind, target) in enumerate(events):
         if kind == "rename":
             later = events[place:]
