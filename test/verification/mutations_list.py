@@ -1064,7 +1064,7 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "what is not defined taken for false, and its contrary for true",
         "campaign/definition/success_expression",
-        "return value == value and not value",
+        "return _defined([value], not value)",
         "return not value or value != value",
         "campaign_file",
     ),
