@@ -34,6 +34,9 @@ from sms_handover.simulation.simulate import simulate
 
 from .campaigns import MASS, STUB, rows_of, run_here, written
 
+UNIFORM = {"uniform": {"low": -2, "high": -1}}
+ABORT = {"choice": {"values": ["abort"]}}
+
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -291,7 +294,11 @@ def test_a_recording_that_fails_says_so_with_its_last_line(
         (["campaign", "run", "FILE", "--shard", "4/3"], "shard '4/3' must be NUMBER/OF"),
         (["campaign", "run", "FILE", "--trust-network"], "--trust-network is for --scheduler"),
         (["campaign", "run", "FILE", "--scheduler", "tcp://10.1.1.1:1"], "is plain TCP to another machine"),
-        (["check", "FILE", "--controller", "pid"], "is a campaign, which takes no options"),
+        (["check", "FILE", "--controller", "pid"], "takes no options, given is --controller: put values"),
+        (["check", "FILE", "--conditions", "harsh"], "takes no options, given is --conditions: put values"),
+        (["check", "laws", "--duration", "0"], "laws.yaml is a campaign, which takes no options, given is"),
+        (["check", "laws", "--no-dry-run"], "takes no options, given is --no-dry-run: put values into"),
+        (["check", "config/robot.yaml", "--conditions", "harsh"], "is a robot, checked alone"),
         (["campaign", "merge", "OUT", "-o", "OUT"], "OUT exists: merge into a new folder"),
     ],
 )
@@ -321,28 +328,28 @@ def test_check_tells_draws_and_cost(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("verb", "changes", "told"),
     [
-        ({"success": "grasp_eror < 1"}, "unknown metric 'grasp_eror' (did you mean 'grasp_error'?)"),
-        ({"metrics": ["approach.arm_c.final_error"]}, "unknown metric 'approach.arm_c.final_error'"),
-        ({"draws": {"robot.base.mas": {"uniform": {"low": 1, "high": 2}}}}, "unknown path 'robot.base.mas'"),
-        ({"draws": {"schedule.phases.carry.on_miss": {"choice": {"values": ["abort"]}}}}, "cannot be drawn"),
+        ("check", {"success": "grasp_eror < 1"}, "unknown metric 'grasp_eror' (did you mean 'grasp_error'?)"),
+        ("check", {"metrics": ["approach.arm_c.final_error"]}, "unknown metric 'approach.arm_c.final_error'"),
+        ("run", {"worst_by": "grasp_eror"}, "unknown metric 'grasp_eror'"),
+        ("check", {"draws": {"robot.base.mas": UNIFORM}}, "unknown path 'robot.base.mas'"),
+        ("run", {"draws": {"schedule.phases.carry.on_miss": ABORT}}, "cannot be drawn"),
+        ("run", {"draws": {"robot.base.mass": UNIFORM}}, "case 0 of smooth under nmpc: robot.base.mass:=-"),
+        (
+            "run",
+            {"draws": {"truth.common.tick": UNIFORM}},
+            "case 0 of smooth under nmpc: value 'truth.common",
+        ),
     ],
 )
-def test_check_finds_what_no_case_could_have(
-    changes: dict[str, object], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_campaign_that_no_case_could_have_does_not_begin(
+    verb: str, changes: dict[str, object], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["check", str(written(tmp_path, **changes))]) == 2
-    assert told in capsys.readouterr().err
-
-
-def test_a_campaign_with_an_unknown_metric_does_not_begin(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = written(tmp_path, worst_by="grasp_eror")
-    assert main(["campaign", "run", str(file), "-o", str(tmp_path / "out")]) == 2
-    assert "unknown metric 'grasp_eror'" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
+    words, out = ["check"] if verb == "check" else ["campaign", "run"], tmp_path / "out"
+    more = [] if verb == "check" else ["-o", str(out)]
+    assert main([*words, str(written(tmp_path, **changes)), *more]) == 2
+    assert told in capsys.readouterr().err.splitlines()[-1] and not out.exists()
 
 
 def test_the_shipped_campaign_is_one() -> None:

@@ -101,7 +101,7 @@ class SuccessExpression:
         return tuple(dict.fromkeys(_names(self.tree)))
 
     def holds(self, metrics: Metrics) -> bool:
-        """Return whether it is true; one that is neither true nor false, as a metric is not defined, is not."""
+        """Return whether it is true; one that is not defined, as a metric of it is not, does not hold."""
         value = self.tree.of(metrics)
         return value == value and bool(value)
 
