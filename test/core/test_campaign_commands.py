@@ -9,6 +9,7 @@ import sys
 import time
 from argparse import ArgumentParser
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from threading import Thread
 from types import SimpleNamespace
@@ -19,6 +20,7 @@ import psutil
 import pyarrow.parquet as parquet
 import pytest
 
+from sms_handover.analysis.equality import before, compare_runs
 from sms_handover.campaign.cases.case_row import Task
 from sms_handover.campaign.definition.campaign_file import read_campaign
 from sms_handover.campaign.definition.frozen import campaign_path
@@ -34,6 +36,7 @@ from sms_handover.simulation.simulate import simulate
 
 from .campaigns import MASS, STUB, rows_of, run_here, written
 
+SHORT = {"common.duration": 0.04}
 UNIFORM = {"uniform": {"low": -2, "high": -1}}
 ABORT = {"choice": {"values": ["abort"]}}
 
@@ -230,6 +233,7 @@ def test_an_interrupted_recording_ends_with_all_that_it_has_started(
         (1, 130, 130),  # interrupted: what there is is not compared
         (1, 3, 3),  # messages are missing
         (4, GraphError("container:\nmissed by 4 mm"), 0),
+        (0, GraphError("container:\nmissed by 0 mm"), 1),  # it ends so, and is another run
         (4, GraphError("it hangs"), None),
         (5, GraphError("missed by 4 mm"), None),  # a success has no cause
     ],
@@ -252,6 +256,8 @@ def test_what_becomes_of_a_case_over_dds(
         add_parser=lambda parser: setattr(parser, "parse_args", lambda words: words), command=run
     )
     monkeypatch.setattr(rerun, "import_module", lambda name: takes_words)
+    monkeypatch.setattr(rerun, "read_run", lambda path: simulate(load_scenario("smooth", SHORT)))
+    monkeypatch.setattr(rerun, "run_digest", lambda run: "00" if case else "11")
     parser = ArgumentParser()
     rerun.add_parser(parser)
     options = parser.parse_args([str(recorded(tmp_path)), str(case), "--bag", "-o", str(tmp_path / "bag")])
@@ -260,7 +266,18 @@ def test_what_becomes_of_a_case_over_dds(
             rerun.command(options)
     else:
         assert rerun.command(options) == code
-    assert ("it ends as its row says: missed by 4 mm" in capsys.readouterr().out) is (code == 0)
+    told = capsys.readouterr().out
+    assert ("it ends as its row says: missed by 4 mm" in told) is (code == 0)
+    assert ("equal to its row, bit for bit" in told, "DIFFERS" in told) == (code == 0, code == 1)
+
+
+def test_of_a_run_that_ends_without_a_plan_what_has_commands_is_compared() -> None:
+    """Over DDS there is a state more, at which the law gives up."""
+    run = simulate(load_scenario("smooth", SHORT))
+    assert compare_runs(rerun.commanded(run), run) == ()
+    command = np.where(run.tick_ns[:, None] >= 20_000_000, np.nan, run.joint_command)
+    given_up = rerun.commanded(replace(run, joint_command=command))
+    assert compare_runs(given_up, before(run, 20_000_000)) == () and len(given_up.tick_ns) == 20
 
 
 def test_a_recording_that_fails_says_so_with_its_last_line(

@@ -1090,10 +1090,10 @@ BREAKS: tuple[Break, ...] = (
         "campaign_commands",
     ),
     _core(
-        "bounds far above the mean whose draws are few values",
+        "a draw far above its mean that is not mirrored back",
         "campaign/definition/distributions",
-        "return self.low > self.mean",
-        "return False",
+        "self.mean + self.std * (-deviate if mirrored else deviate)",
+        "self.mean + self.std * deviate",
         "campaign_file",
     ),
     _core(
