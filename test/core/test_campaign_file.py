@@ -214,7 +214,9 @@ def test_a_table_has_the_cases(tmp_path: Path) -> None:
 
 
 def test_what_is_frozen_needs_no_other_file_and_no_number_of_cases(tmp_path: Path) -> None:
-    (tmp_path / "mine.yaml").write_text("extends: smooth\nlaw: pid\n", encoding="utf-8")
+    mesh = "robot: {clearance: {shapes: {base_link: [{mesh: {file: base.stl}}]}}}\n"
+    (tmp_path / "mine.yaml").write_text(f"extends: smooth\nlaw: pid\n{mesh}", encoding="utf-8")
+    (tmp_path / "base.stl").write_text("solid", encoding="utf-8")
     file = written(tmp_path, scenarios={"mine": {"scenario": "mine.yaml", "values": SHORT}})
     frozen, number = freeze(file)
     (tmp_path / "mine.yaml").unlink()
@@ -222,10 +224,12 @@ def test_what_is_frozen_needs_no_other_file_and_no_number_of_cases(tmp_path: Pat
     assert read_frozen(tmp_path / "there").digest == frozen.digest and number == 4
     again, none = freeze(tmp_path / "there" / "campaign.yaml")  # what a folder has goes on by itself
     assert again.digest == frozen.digest and none is None
-    (tmp_path / "mine.yaml").write_text("extends: smooth\nlaw: pid\n", encoding="utf-8")
+    (tmp_path / "mine.yaml").write_text(f"extends: smooth\nlaw: pid\n{mesh}", encoding="utf-8")
     same = freeze(written(tmp_path, scenarios={"mine": {"scenario": "mine.yaml", "values": SHORT}}, cases=9))
     other = freeze(written(tmp_path, scenarios={"mine": {"scenario": "mine.yaml", "values": LONG}}))
     assert same[0].digest == frozen.digest != other[0].digest
+    (tmp_path / "base.stl").write_text("another solid", encoding="utf-8")  # which stays where it is
+    assert freeze(file)[0].files["meshes.yaml"] != frozen.files["meshes.yaml"]
 
 
 def test_files_that_values_name_are_frozen_by_their_content(tmp_path: Path) -> None:

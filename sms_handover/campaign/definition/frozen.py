@@ -11,7 +11,14 @@ from typing import Any
 from sms_handover.campaign.definition.campaign_file import Campaign, read_campaign
 from sms_handover.campaign.definition.distributions import Choice, Value
 from sms_handover.campaign.definition.fields import EXTENDABLE, LIST
-from sms_handover.campaign.definition.named_files import FOLDERS, is_file_path, keep_cell, kept, kept_draw
+from sms_handover.campaign.definition.named_files import (
+    FOLDERS,
+    is_file_path,
+    keep_cell,
+    kept,
+    kept_draw,
+    mesh_digests,
+)
 from sms_handover.campaign.definition.sampler import csv_file_of
 from sms_handover.configuration.documents import as_yaml
 from sms_handover.configuration.package_files import config_file
@@ -22,7 +29,7 @@ from sms_handover.errors import ConfigurationError, UnknownNameError
 from sms_handover.simulation.scenario_yaml import scenario_yaml
 
 CAMPAIGN_FILE = "campaign.yaml"
-_TABLE, _SCENARIOS = "cases.csv", "scenarios"
+_TABLE, _SCENARIOS, _MESHES = "cases.csv", "scenarios", "meshes.yaml"
 _SUFFIX = ".yaml"
 
 
@@ -107,6 +114,10 @@ def freeze(path: Path) -> tuple[Frozen, int | None]:
     if table is not None:
         files[_TABLE] = table.read_text(encoding="utf-8")
         content["sampler"] = {LIST: {"file": _TABLE}}
+    with root.located():
+        digests = mesh_digests(files)
+    if digests:
+        files[_MESHES] = as_yaml(digests)
     files[CAMPAIGN_FILE] = as_yaml(content)
     return Frozen(files), campaign.cases if extendable else None
 
@@ -144,7 +155,7 @@ def _kept_values(
 def read_frozen(folder: Path) -> Frozen:
     """Return the campaign that was frozen below a folder; raises ConfigurationError."""
     inner = [path for name in (_SCENARIOS, *FOLDERS) for path in (folder / name).glob(f"*{_SUFFIX}")]
-    names = [CAMPAIGN_FILE, _TABLE, *(path.relative_to(folder).as_posix() for path in inner)]
+    names = [CAMPAIGN_FILE, _TABLE, _MESHES, *(path.relative_to(folder).as_posix() for path in inner)]
     try:
         files = {
             name: (folder / name).read_text(encoding="utf-8") for name in names if (folder / name).is_file()

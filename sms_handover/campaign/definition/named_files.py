@@ -1,9 +1,11 @@
 """Named files of values: conditions, robots and schedules, kept with a campaign as they are at its begin."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from hashlib import sha256
 from itertools import count
 from pathlib import Path
 from types import MappingProxyType
+from urllib.parse import unquote, urlsplit
 
 from sms_handover.configuration.conditions_content import condition_names, read_conditions_content
 from sms_handover.configuration.documents import as_yaml
@@ -16,7 +18,7 @@ _FOLDERS: Mapping[str, str] = MappingProxyType(
     {_CONDITIONS: "conditions", "common.robot": "robots", "common.schedule": "schedules"}
 )
 FOLDERS = tuple(_FOLDERS.values())  # of a frozen campaign, in which they are
-_SUFFIX = ".yaml"
+_SUFFIX, _MESH = ".yaml", "mesh"
 
 
 def is_file_path(path: str) -> bool:
@@ -68,6 +70,35 @@ def located(values: Mapping[str, object], folder: Path) -> dict[str, object]:
             if (folder / name).is_file():
                 found[path] = str(folder / name)
     return found
+
+
+def mesh_digests(files: Mapping[str, str]) -> dict[str, str]:
+    """Return SHA-256 of every mesh that frozen scenarios and robots name by a ``file:`` URI, by that URI.
+
+    Meshes stay where they are; that one was changed is another campaign. Raises ConfigurationError on one
+    that cannot be read.
+    """
+    found: dict[str, str] = {}
+    for name, text in files.items():
+        uris = _meshes(load_mapping(text, Path(name))) if _MESH in text else ()
+        for uri in uris:
+            path = Path(unquote(urlsplit(uri).path))
+            try:
+                found[uri] = sha256(path.read_bytes()).hexdigest()
+            except OSError as error:
+                raise ConfigurationError(f"{name}: cannot read the mesh {path}: {error.strerror}") from error
+    return found
+
+
+def _meshes(value: object) -> Iterator[str]:
+    """Yield the URIs of all meshes in the content of a file."""
+    items = value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
+    for item in items:
+        yield from _meshes(item)
+    mesh = value.get(_MESH) if isinstance(value, Mapping) else None
+    uri = mesh.get("file") if isinstance(mesh, Mapping) else None
+    if isinstance(uri, str) and uri.startswith("file:"):
+        yield uri
 
 
 def _text(path: str, source: Path) -> str:
