@@ -358,6 +358,9 @@ def test_check_tells_draws_and_cost(tmp_path: Path, capsys: pytest.CaptureFixtur
             {"draws": {"truth.common.tick": UNIFORM}},
             "case 0 of smooth under nmpc: value 'truth.common",
         ),
+        ("check", {"success": "carry.final_error < 1"}, "unknown metric 'carry.final_error' (did you mean"),
+        ("check", {"success": "base_turn < solve_max"}, "metric 'solve_max' is of wall time"),
+        ("check", {"limits": {"ticks": 10}}, "case 0 of smooth under nmpc: more than 10 ticks"),
     ],
 )
 def test_a_campaign_that_no_case_could_have_does_not_begin(

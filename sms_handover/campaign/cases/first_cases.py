@@ -4,6 +4,7 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
+from sms_handover.analysis.records import WALL_TIMES
 from sms_handover.campaign.cases.case import Cases
 from sms_handover.campaign.cases.case_metrics import known_metrics
 from sms_handover.campaign.cases.case_row import Task
@@ -55,8 +56,14 @@ def _uncompiled(cases: Cases, scenario: Scenario) -> Scenario:
 
 
 def _require_metrics(cases: Cases, scenario: Scenario, path: Path) -> None:
-    """Raise UnknownNameError unless a scenario has all metrics that the campaign names."""
+    """Raise ConfigurationError unless a scenario has all metrics that the campaign names."""
     campaign, known = cases.campaign, dict.fromkeys(known_metrics(scenario))
+    for metric in (*campaign.success.names, *campaign.metrics, campaign.worst_by):
+        if metric in WALL_TIMES:
+            raise ConfigurationError(
+                f"{path}: metric {metric!r} is of wall time, which differs from run to run: take one of "
+                "simulated time; the page has the solve times of laws that plan"
+            )
     campaign.success.require_known(known)
     for metric in (*campaign.metrics, campaign.worst_by):
         if metric not in known:

@@ -74,7 +74,7 @@ def plan_in_words(path: Path) -> str:
     """
     frozen, number = freeze(path)
     require_runnable(frozen, number, path)
-    cost = _Cost()
+    cost, broken = _Cost(), list[str]()
     with tempfile.TemporaryDirectory(prefix="sms_handover_check_") as folder:
         cases = Cases(frozen, number, Path(folder))
         campaign, count = cases.campaign, cases.samples.count
@@ -82,6 +82,8 @@ def plan_in_words(path: Path) -> str:
             for law in campaign.laws:
                 result = cases.run(Task(0, scenario, law))
                 _require_run(result.row, path)
+                if result.row.status is Status.NUMERIC_FAILURE:
+                    broken.append(f"{result.row.task} is a numeric failure: {result.row.cause}")
                 cost.add(result, campaign.keep)
     runs = count * campaign.runs_per_case
     table = Section("Drawn value", tuple(_draws(campaign)))
@@ -90,6 +92,7 @@ def plan_in_words(path: Path) -> str:
         "",
         f"{count} cases x {len(campaign.scenarios)} scenarios x {len(campaign.laws)} laws = {runs} runs",
         cost.in_words(count, campaign.keep),
+        *broken,
     ]
     if campaign.sampler.kind == SOBOL and count & (count - 1):
         less = 1 << count.bit_length() - 1
@@ -112,6 +115,6 @@ def _draws(campaign: Campaign) -> Iterator[Row]:
 
 
 def _require_run(row: CaseRow, path: Path) -> None:
-    """Raise ConfigurationError if the first case could not even be run."""
-    if row.status in (Status.REJECTED, Status.ERROR):
+    """Raise ConfigurationError if the first case could not be run, or not to its end."""
+    if row.status in (Status.REJECTED, Status.ERROR, Status.LIMIT):
         raise ConfigurationError(f"{path}: {row.task}: {row.cause}")
