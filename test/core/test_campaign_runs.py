@@ -6,10 +6,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
-from errno import ENOSPC
 from pathlib import Path
 
 import distributed
@@ -18,7 +16,7 @@ import pytest
 
 from sms_handover.campaign.cases.case import Cases
 from sms_handover.campaign.cases.case_process import Done
-from sms_handover.campaign.cases.case_row import Beside
+from sms_handover.campaign.cases.case_row import Beside, Row, Status, Task
 from sms_handover.campaign.definition.frozen import freeze
 from sms_handover.campaign.engine.choice import workers_for
 from sms_handover.campaign.engine.dask_workers import DaskWorkers, answers_of
@@ -26,7 +24,7 @@ from sms_handover.campaign.engine.run import run_campaign
 from sms_handover.campaign.engine.scheduler_url import require_safe
 from sms_handover.campaign.page.campaign_page import campaign_page
 from sms_handover.campaign.record.campaign_folder import CampaignFolder, merge, open_campaign
-from sms_handover.campaign.record.journal import JOURNAL, JournalWriter
+from sms_handover.campaign.record.journal import JOURNAL
 from sms_handover.campaign.record.manifest import Shard
 from sms_handover.cli.main import main
 from sms_handover.errors import ConfigurationError, SmsHandoverError
@@ -35,6 +33,7 @@ from .campaigns import STUB, command, digests_of, rows_of, run_here, written
 
 CASES = 20
 PATIENCE_S = 120.0
+INTERRUPT_S = 5.0  # [s] that a driver has to end, whatever it waits for
 
 
 def until(condition: object, what: str) -> None:
@@ -139,93 +138,6 @@ def test_shards_and_more_cases_leave_the_rows(tmp_path: Path) -> None:
     assert CampaignFolder(tmp_path / "merged").cases == 12
 
 
-def test_folders_of_other_campaigns_do_not_mix(tmp_path: Path) -> None:
-    run_here(written(tmp_path / "a"), tmp_path / "one", program=STUB)
-    with pytest.raises(ConfigurationError, match=r"holds another campaign, which differs in campaign.yaml"):
-        run_here(written(tmp_path / "b", seed=4), tmp_path / "one", program=STUB)
-    with pytest.raises(ConfigurationError, match="holds shard 1/1"):
-        run_here(written(tmp_path / "a"), tmp_path / "one", shard=Shard(1, 2), program=STUB)
-    run_here(written(tmp_path / "b", seed=4), tmp_path / "other", program=STUB)
-    with pytest.raises(ConfigurationError, match="hold different campaigns"):
-        merge(tmp_path / "merged", [tmp_path / "one", tmp_path / "other"])
-    frozen, number = freeze(written(tmp_path / "a"))
-    row = next(iter(rows_of(tmp_path / "one").values()))
-    with open_campaign(tmp_path / "lies", frozen, number, Shard()) as opened:
-        opened.add(Done(replace(row, seed=row.seed + 1), Beside(0.0, 0.0, "elsewhere")))
-    with pytest.raises(ConfigurationError, match="case 0 of smooth under nmpc has another row than"):
-        merge(tmp_path / "merged", [tmp_path / "one", tmp_path / "lies"])
-    (tmp_path / "one" / "campaign.yaml").write_text("name: forged\n", encoding="utf-8")
-    with pytest.raises(ConfigurationError, match="the frozen campaign was changed"):
-        CampaignFolder(tmp_path / "one")
-    with pytest.raises(ConfigurationError, match="something else than a campaign"):
-        run_here(written(tmp_path / "a"), tmp_path / "b", program=STUB)
-
-
-def test_a_corrupted_line_is_named_and_done_again(tmp_path: Path) -> None:
-    file, out = written(tmp_path, cases=6), tmp_path / "out"
-    run_here(file, out, program=STUB)
-    expected, path = digests_of(out), out / JOURNAL
-    lines = path.read_bytes().splitlines(keepends=True)
-    lines[1] = lines[1].replace(b'"grasp_error":0.001', b'"grasp_error":0.002')  # valid JSON, wrong value
-    lines[2] = lines[2][:20] + b"\r" + lines[2][21:]  # still one line
-    lines[4] = b"\x00" * 30 + b"\n"
-    path.write_bytes(b"".join(lines))
-    frozen, number = freeze(file)
-    with open_campaign(out, frozen, number, Shard()) as opened:
-        assert [fault.partition(" is corrupted")[0] for fault in opened.faults] == [
-            f"{path}, line 2",
-            f"{path}, line 3",
-            f"{path}, line 5",
-        ]
-        with pytest.raises(ConfigurationError, match="is written to by another run of the campaign"):
-            open_campaign(out, frozen, number, Shard())
-    assert len(rows_of(out)) == 3
-    assert run_here(file, out, program=STUB).before == 3
-    assert digests_of(out) == expected and (out / "broken.jsonl").read_bytes().count(b"\n") == 3
-
-
-def test_a_forged_row_is_no_row(tmp_path: Path) -> None:
-    """Nothing in a folder is run or unpickled: what is no row is named, whatever it is."""
-    file, out = written(tmp_path, cases=2), tmp_path / "out"
-    run_here(file, out, program=STUB)
-    evil = b"cos\nsystem\n(S'touch " + str(tmp_path / "owned").encode() + b"'\ntR.\n"
-    for name in (JOURNAL, "manifest.json", "campaign.yaml"):
-        (out / name).write_bytes(evil if name == JOURNAL else (out / name).read_bytes())
-    assert rows_of(out) == {}
-    (out / "manifest.json").write_bytes(evil)
-    with pytest.raises(ConfigurationError, match="cannot be read"):
-        CampaignFolder(out)
-    assert not (tmp_path / "owned").exists()
-    sources = (Path(__file__).parents[2] / "sms_handover" / "campaign").rglob("*.py")
-    text = "\n".join(path.read_text(encoding="utf-8") for path in sources)
-    assert not [
-        word for word in ("import pickle", "loads(pickle", "allow_pickle=True", "eval(") if word in text
-    ]
-
-
-def test_a_full_disk_is_a_clear_error_and_the_same_command_goes_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    file, out, writes, write = written(tmp_path, cases=6), tmp_path / "out", list[int](), os.write
-
-    def full(descriptor: int, data: bytes) -> int:
-        writes.append(len(data))
-        if len(writes) == 4:
-            write(descriptor, data[:40])  # what there was still room for
-            raise OSError(ENOSPC, os.strerror(ENOSPC))
-        return write(descriptor, data)
-
-    with monkeypatch.context() as patched:
-        patched.setattr("sms_handover.campaign.record.journal.os.write", full)
-        with pytest.raises(SmsHandoverError, match="No space left on device; make room, then the same"):
-            run_here(file, out, program=STUB)
-    assert len(rows_of(out)) == journal_lines(out) == 3
-    assert (out / JOURNAL).read_bytes().endswith(b"}\n"), "no part of a line is left behind"
-    run_here(file, out, program=STUB)
-    run_here(file, tmp_path / "good", program=STUB)
-    assert digests_of(out) == digests_of(tmp_path / "good")
-
-
 def test_it_stops_at_a_look_whatever_the_order(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     stop = {"half_width": 0.28, "looks": [4, 8, 12]}
     file = written(tmp_path, cases=40, stop=stop)
@@ -242,6 +154,55 @@ def test_it_stops_at_a_look_whatever_the_order(tmp_path: Path, capsys: pytest.Ca
     assert "stopped" not in capsys.readouterr().out
 
 
+def test_drivers_share_a_scheduler(tmp_path: Path) -> None:
+    """Each gets its own rows; the first to end leaves the other its workers, at its next look too."""
+    quiet = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
+    with distributed.LocalCluster(**quiet) as cluster:
+
+        def driver(*laws: str) -> DaskWorkers:
+            frozen, number = freeze(written(tmp_path / laws[0], laws=list(laws), cases=9))
+            return DaskWorkers(frozen, number, scheduler=cluster.scheduler_address, program=STUB)
+
+        def tasks(law: str, cases: range) -> list[Task]:
+            return [Task(case, "smooth", law) for case in cases]
+
+        one, same, other = driver("nmpc"), driver("nmpc"), driver("pid")
+        running = one.run(tasks("nmpc", range(9)))
+        found = [done.row.task for done in next(running)]
+        for another, law in ((other, "pid"), (same, "nmpc")):
+            asked = tasks(law, range(5))
+            assert sorted(done.row.task for chunk in another.run(asked) for done in chunk) == asked
+            another.close()
+        found += [done.row.task for chunk in running for done in chunk]
+        found += [done.row.task for chunk in one.run(tasks("nmpc", range(9, 12))) for done in chunk]
+        assert sorted(found) == tasks("nmpc", range(12))
+        one.close()
+
+
+class Confused:
+    """Workers that give another case than they were asked for."""
+
+    def __init__(self, shift: int, times: int) -> None:
+        self._shift, self._times = shift, times
+
+    def run(self, tasks: Iterable[Task]) -> Iterator[Sequence[Done]]:
+        for case, scenario, law in tasks:
+            row = Row(Task(case + self._shift, scenario, law), case, {}, Status.SUCCEEDED, "", {}, "00")
+            yield [Done(row, Beside(0.0, 0.0, "here"))] * self._times
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize(("shift", "times"), [(1, 1), (0, 2)])
+def test_rows_that_nobody_asked_for_are_an_error(shift: int, times: int, tmp_path: Path) -> None:
+    frozen, number = freeze(written(tmp_path))
+    told = pytest.raises(SmsHandoverError, match=f"gave a row of case {shift} .* were not asked for")
+    with open_campaign(tmp_path / "out", frozen, number, Shard()) as opened, told:
+        run_campaign(opened, lambda: Confused(shift, times), lambda tally: None)
+    assert not journal_lines(tmp_path / "out")
+
+
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_ctrl_c_leaves_within_seconds_and_says_how_to_go_on(jobs: str, tmp_path: Path) -> None:
     """As a terminal sends it: to the driver and to every process of its group."""
@@ -253,7 +214,10 @@ def test_ctrl_c_leaves_within_seconds_and_says_how_to_go_on(jobs: str, tmp_path:
         below.extend(family(child.pid))
         assert below
         os.killpg(child.pid, signal.SIGINT)
+        begin = time.monotonic()
         _, said = child.communicate(timeout=PATIENCE_S)
+        took = time.monotonic() - begin  # from the signal to the end of the driver
+    assert took < INTERRUPT_S
     assert child.returncode == 130 and "interrupted: the same command goes on" in said
     assert "Traceback" not in said
 
@@ -268,6 +232,9 @@ def test_ctrl_c_leaves_within_seconds_and_says_how_to_go_on(jobs: str, tmp_path:
         ("tcp://10.0.0.1:8786", False, "is plain TCP to another machine"),
         ("ws://10.0.0.1:8786", True, "must be of the form"),
         ("tls://cluster", False, "must be of the form"),
+        ("tcp://127.0.0.1:99999", False, "must be of the form .*: Port out of range"),
+        ("tls://cluster:abc", False, "must be of the form .*: Port could not be cast"),
+        ("tls://[::1:8786", False, "must be of the form .*: Invalid IPv6 URL"),
     ],
 )
 def test_a_scheduler_is_reached_safely_or_on_request(url: str, trusted: bool, told: str) -> None:
@@ -304,19 +271,6 @@ class Broken:
 def test_whatever_fails_in_a_cluster_is_one_error(error: Exception, told: str) -> None:
     with pytest.raises(SmsHandoverError, match=told):
         answers_of(Broken(error))
-
-
-def test_rows_that_come_together_wait_for_the_disk_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    file, out, synced = written(tmp_path), tmp_path / "out", list[int]()
-    run_here(file, out, program=STUB)
-    entries = list(CampaignFolder(out).entries())
-    writer = JournalWriter(tmp_path / "journal.jsonl")
-    monkeypatch.setattr("sms_handover.campaign.record.journal.os.fsync", synced.append)
-    writer.add(*entries)
-    writer.close()
-    assert len(synced) == 1 and (tmp_path / "journal.jsonl").read_bytes() == (out / JOURNAL).read_bytes()
 
 
 def test_workers_that_cannot_be_reached_are_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

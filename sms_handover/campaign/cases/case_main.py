@@ -1,7 +1,7 @@
 """Main program of the process that carries out cases: tasks on standard input, rows on standard output.
 
 Both are JSON, one value a line. The process ends when its standard input does, whatever it is doing: nobody
-would take its rows.
+would take its rows. Where a library keeps Python from seeing that, the guard of its session ends it.
 """
 
 import json

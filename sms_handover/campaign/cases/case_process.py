@@ -17,6 +17,7 @@ from select import select
 from typing import IO, NamedTuple
 
 from sms_handover.campaign.cases.case_row import Beside, Row, Status, Task, row_of
+from sms_handover.campaign.cases.case_session import CaseGuard, end_session, takes_more
 from sms_handover.campaign.definition.campaign_file import Limits
 from sms_handover.campaign.definition.frozen import Frozen
 from sms_handover.campaign.sampling.streams import run_seed
@@ -26,8 +27,7 @@ _SAFE_PATH = ("-P",) if sys.version_info >= (3, 11) else ()  # no module from th
 CASE_PROGRAM = (sys.executable, *_SAFE_PATH, "-m", "sms_handover.campaign.cases.case_main")
 _START_S = 300.0  # [s] to import everything and, the first time, to compile
 _LOOK_S = 0.05  # [s] between two looks at the memory
-_END_S = 5.0  # [s] to end when asked to
-_MB = 1e6  # [byte]
+_END_S = 1.0  # [s] to end when asked to, so that Ctrl-C takes a few seconds
 _READ = 1 << 16  # [byte]
 _LONGEST_SAID = 4096  # [byte] of standard error that are kept
 _LONGEST_LINE = 200  # [characters] of it in a cause
@@ -58,6 +58,7 @@ class CaseProcess:
         self._seed, self._limits, self._program = seed, limits, tuple(program)
         self._child: subprocess.Popen[bytes] | None = None
         self._scratch: Path | None = None
+        self._guard: CaseGuard | None = None
         self._pending, self._said, self._killed = b"", b"", False
 
     def run(self, task: Task) -> Done:
@@ -81,23 +82,25 @@ class CaseProcess:
         return Done(row, Beside(0.0, time.monotonic() - begin, platform.node(), tries))
 
     def close(self) -> None:
-        """End the child."""
-        child, self._child = self._child, None
-        if child is None:
-            return
-        with suppress(OSError):
-            if child.stdin:
-                child.stdin.close()
-        try:
-            child.wait(_END_S)
-        except subprocess.TimeoutExpired:
-            child.kill()
+        """End the child and all that it has started."""
+        child, guard = self._child, self._guard
+        self._child = self._guard = None
+        if child is not None:
+            with suppress(OSError):
+                if child.stdin:
+                    child.stdin.close()
+            with suppress(subprocess.TimeoutExpired):
+                child.wait(_END_S)
+            end_session(child)
             child.wait()
-        for stream in (child.stdout, child.stderr):
-            if stream:
-                stream.close()
+            for stream in (child.stdout, child.stderr):
+                if stream:
+                    stream.close()
+        if guard is not None:
+            guard.close()
         if self._scratch is not None:
             shutil.rmtree(self._scratch, ignore_errors=True)
+            self._scratch = None
 
     def _start(self) -> str:
         """Start the child unless it runs; return why it cannot, '' if it can."""
@@ -105,15 +108,21 @@ class CaseProcess:
             return ""
         self.close()
         self._pending, self._killed = b"", False
-        self._scratch = Path(tempfile.mkdtemp(prefix="sms_handover_cases_"))  # ours, as a child may be killed
-        self._child = subprocess.Popen(
-            self._program,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env={**os.environ, **_ONE_THREAD},
-            start_new_session=True,  # Ctrl-C is for the parent, which ends it
-        )
+        try:
+            # ours, as a child may be killed
+            self._scratch = Path(tempfile.mkdtemp(prefix="sms_handover_cases_"))
+            self._child = subprocess.Popen(
+                self._program,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                env={**os.environ, **_ONE_THREAD},
+                start_new_session=True,  # Ctrl-C is for the parent, which ends it
+            )
+            self._guard = CaseGuard(self._child.pid, self._scratch)
+        except OSError as error:
+            self._kill()
+            return str(error)
         answer, _, cause = self._ask(json.dumps({**self._first, "folder": str(self._scratch)}), _START_S)
         if answer is None:
             return cause
@@ -131,6 +140,7 @@ class CaseProcess:
             child.stdin.write(text.encode() + b"\n")
             child.stdin.flush()
         while b"\n" not in self._pending:
+            has_ended = child.poll() is not None  # asked first, so that all of its answer is there by then
             ready = select(streams, [], [], _LOOK_S)[0]
             if child.stderr in ready:
                 self._hear(child.stderr, streams)
@@ -139,10 +149,12 @@ class CaseProcess:
                 if not part:
                     return None, Status.DIED, self._end_in_words()
                 self._pending += part
+            elif has_ended:  # what it has started may keep its output open
+                return None, Status.DIED, self._end_in_words()
             elif time.monotonic() > deadline:
                 self._kill()
                 return None, Status.LIMIT, f"more than {limit_s:g} s of wall time"
-            elif _resident_mb(child.pid) > self._limits.memory:
+            elif takes_more(child.pid, self._limits.memory):
                 self._kill()
                 return None, Status.LIMIT, f"more than {self._limits.memory:g} MB of memory"
         line, _, self._pending = self._pending.partition(b"\n")
@@ -158,10 +170,10 @@ class CaseProcess:
         return bool(part)
 
     def _kill(self) -> None:
-        """End the child at once."""
+        """End the child and all that it has started at once."""
         if self._child is not None:
-            self._child.kill()
-            self.close()
+            end_session(self._child)
+        self.close()
 
     def _end_in_words(self) -> str:
         """Return how the child ended, and the last line that it said."""
@@ -185,12 +197,3 @@ class CaseProcess:
         row, beside = row_of(json.loads(str(answer["row"]))), answer["beside"]
         assert isinstance(beside, dict)
         return Done(row, Beside(**{**beside, "tries": tries}), b64decode(str(answer.get("trajectory", ""))))
-
-
-def _resident_mb(pid: int) -> float:
-    """Return the resident memory of a process in MB, 0 where the system does not tell."""
-    try:
-        pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
-    except (OSError, ValueError, IndexError):
-        return 0.0
-    return pages * os.sysconf("SC_PAGE_SIZE") / _MB

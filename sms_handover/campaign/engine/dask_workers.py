@@ -12,9 +12,10 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
-from itertools import islice
+from itertools import count, islice
 from queue import Empty, SimpleQueue
 from typing import Any
+from uuid import uuid4
 
 import dask
 import distributed
@@ -26,7 +27,8 @@ from sms_handover.campaign.definition.frozen import Frozen
 from sms_handover.errors import SmsHandoverError
 
 _HERE = "127.0.0.1"
-_PLUGIN = "sms_handover_cases"
+_PREFIX = "sms_handover_cases"  # of the names that a campaign has on a scheduler
+_DIGITS = 12  # [-] of the digest of a campaign in them
 _CHUNK_S = 2.0  # [s] of wall time that a chunk of cases takes
 _LARGEST_CHUNK = 50  # [-] cases
 _WAITING = 2  # [-] chunks of each worker that are handed out
@@ -41,10 +43,9 @@ _Answer = tuple[str, dict[str, Any], bytes]
 class CasePlugin(distributed.WorkerPlugin):
     """What each worker has for the campaign: processes for cases, one for each of its threads."""
 
-    name = _PLUGIN
-
     def __init__(
         self,
+        name: str,
         files: dict[str, str],
         cases: int | None,
         seed: int,
@@ -53,7 +54,11 @@ class CasePlugin(distributed.WorkerPlugin):
         *,
         is_here: bool,
     ) -> None:
-        """Take what the processes need, and whether the worker is one that we started on this machine."""
+        """Take what the processes need, and whether the worker is one that we started on this machine.
+
+        The ``name`` is that of this driver alone, as others may have the same workers.
+        """
+        self.name = name
         self._files, self._cases, self._seed = files, cases, seed
         self._limits, self._program, self._is_here = limits, tuple(program), is_here
 
@@ -62,9 +67,15 @@ class CasePlugin(distributed.WorkerPlugin):
         if self._is_here:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
         self._idle: SimpleQueue[CaseProcess] = SimpleQueue()
+        self._has_ended = False
 
     def teardown(self, worker: Any) -> None:
-        """End the processes."""
+        """End the processes; one that is in use ends after its chunk."""
+        self._has_ended = True
+        self._close_idle()
+
+    def _close_idle(self) -> None:
+        """End the processes that nobody uses."""
         with suppress(Empty):
             while True:
                 self._idle.get_nowait().close()
@@ -82,12 +93,14 @@ class CasePlugin(distributed.WorkerPlugin):
             yield process
         finally:
             self._idle.put(process)
+            if self._has_ended:
+                self._close_idle()
 
 
-def run_chunk(tasks: Sequence[tuple[int, str, str]]) -> list[_Answer]:
-    """Carry out some tasks on a worker; return row, what is beside it, and trajectory of each."""
+def run_chunk(name: str, tasks: Sequence[tuple[int, str, str]]) -> list[_Answer]:
+    """Carry out tasks of the driver of a name on a worker; return row, what is beside it, and trajectory."""
     worker = distributed.get_worker()
-    plugin: Any = worker.plugins[_PLUGIN]
+    plugin: Any = worker.plugins[name]
     with plugin.process() as process:
         done = [process.run(Task(*task)) for task in tasks]
     return [(one.row.text, asdict(one.beside), one.trajectory) for one in done]
@@ -112,10 +125,11 @@ class DaskWorkers:
         """
         self._cluster: Any = None
         self._threads, self._next_count = 1, 0.0
+        self._name = f"{_PREFIX}-{frozen.digest[:_DIGITS]}-{uuid4().hex}"  # several drivers share a scheduler
+        self._numbers = count(1)  # of chunks
         campaign = frozen.campaign(cases)
-        plugin = CasePlugin(
-            dict(frozen.files), cases, campaign.seed, campaign.limits, program, is_here=not scheduler
-        )
+        files, seed, limits = dict(frozen.files), campaign.seed, campaign.limits
+        plugin = CasePlugin(self._name, files, cases, seed, limits, program, is_here=not scheduler)
         dask.config.set({"distributed.scheduler.allowed-failures": _DEATHS})
         if not scheduler:
             self._cluster = distributed.LocalCluster(
@@ -134,7 +148,7 @@ class DaskWorkers:
             self.close()
             raise SmsHandoverError(f"scheduler {scheduler} cannot be reached: {error}") from error
         try:
-            self._client.register_plugin(plugin, name=_PLUGIN)
+            self._client.register_plugin(plugin, name=self._name)
         except Exception as error:  # whatever a worker has to say, such as that the package is not there
             self.close()
             raise SmsHandoverError(f"workers cannot take cases: {_in_words(error)}") from error
@@ -148,18 +162,17 @@ class DaskWorkers:
 
     def _chunks(self, tasks: Iterable[Task]) -> Iterator[Sequence[Done]]:
         """Hand out chunks and yield what came of each; raises what Dask raises."""
-        left, self._chunk_size, number = iter(tasks), 1, 0
-        running = distributed.as_completed()
+        left, self._chunk_size = iter(tasks), 1
+        running = distributed.as_completed(loop=self._client.loop)
         waiting = 0
 
         def hand_out() -> bool:
-            nonlocal number, waiting
+            nonlocal waiting
             chunk = [tuple(task) for task in islice(left, self._chunk_size)]
             if not chunk:
                 return False
-            number += 1
-            key = f"{_PLUGIN}-{number}"
-            running.add(self._client.submit(run_chunk, chunk, key=key, pure=False))
+            key = f"{self._name}-{next(self._numbers)}"
+            running.add(self._client.submit(run_chunk, self._name, chunk, key=key, pure=False))
             waiting += 1
             return True
 
@@ -185,7 +198,7 @@ class DaskWorkers:
         if client is not None:
             with suppress(Exception):
                 if self._cluster is None:
-                    client.unregister_worker_plugin(_PLUGIN)
+                    client.unregister_worker_plugin(self._name)
                 client.close(timeout=_CLOSE_S)
         if self._cluster is not None:
             self._kill_workers()

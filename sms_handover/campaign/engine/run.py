@@ -11,6 +11,7 @@ from sms_handover.campaign.engine.workers import Workers
 from sms_handover.campaign.record.campaign_folder import OpenCampaign, tasks_of
 from sms_handover.campaign.statistics.proportion import Proportion, proportion
 from sms_handover.campaign.statistics.stop_rule import stopped_at
+from sms_handover.errors import SmsHandoverError
 
 Group = tuple[str, str]  # scenario and law
 
@@ -61,7 +62,8 @@ def run_campaign(
     """Run what is missing in a folder; return how far it is then.
 
     With a stop rule, nothing beyond the next look is begun before it, so that where it stops depends on no
-    order. Workers are made only if there is something to do, and are closed in any case.
+    order. Workers are made only if there is something to do, and are closed in any case. Raises
+    SmsHandoverError where they cannot go on, or give what they were not asked for.
     """
     campaign, cases = folder.campaign, folder.cases
     groups = tuple((scenario, law) for scenario in campaign.scenarios for law in campaign.laws)
@@ -77,10 +79,11 @@ def run_campaign(
     def missing(begin: int, end: int) -> Iterator[Task]:
         return (task for task in tasks_of(campaign, range(begin, end), shard) if task not in done)
 
-    begin = 0
+    begin, running = 0, _Running()
     with _Lazy(make_workers) as workers:
         for end in (*looks, cases):
-            for done_now in workers.run(missing(begin, end)):
+            for done_now in workers.run(running.handing_out(missing(begin, end))):
+                running.take_back(one.row.task for one in done_now)
                 folder.add(*done_now)
                 for one in done_now:
                     tally.add(one.row)
@@ -90,6 +93,26 @@ def run_campaign(
                 tally.stopped_at = end
                 break
     return tally
+
+
+class _Running:
+    """Tasks that are handed out and have not come back; a row of any other is of another campaign."""
+
+    def __init__(self) -> None:
+        self._tasks: set[Task] = set()
+
+    def handing_out(self, tasks: Iterable[Task]) -> Iterator[Task]:
+        """Yield tasks and keep them in mind."""
+        for task in tasks:
+            self._tasks.add(task)
+            yield task
+
+    def take_back(self, tasks: Iterable[Task]) -> None:
+        """Forget tasks; raises SmsHandoverError on one that was not handed out."""
+        for task in tasks:
+            if task not in self._tasks:
+                raise SmsHandoverError(f"workers gave a row of {task}, which they were not asked for")
+            self._tasks.discard(task)
 
 
 class _Lazy:

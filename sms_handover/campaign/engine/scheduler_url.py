@@ -11,9 +11,14 @@ def require_safe(url: str, *, trust_network: bool) -> None:
 
     Whoever reaches a scheduler over plain TCP can run code on every worker.
     """
-    parts = urlsplit(url)
-    if parts.scheme not in ("tls", "tcp") or not parts.hostname or not parts.port:
-        raise ConfigurationError(f"scheduler {url!r} must be of the form tls://HOST:PORT or tcp://HOST:PORT")
+    form = f"scheduler {url!r} must be of the form tls://HOST:PORT or tcp://HOST:PORT"
+    try:
+        parts = urlsplit(url)
+        port = parts.port
+    except ValueError as error:
+        raise ConfigurationError(f"{form}: {error}") from None
+    if parts.scheme not in ("tls", "tcp") or not parts.hostname or not port:
+        raise ConfigurationError(form)
     if parts.scheme == "tcp" and not trust_network and not _is_here(parts.hostname):
         raise ConfigurationError(
             f"scheduler {url!r} is plain TCP to another machine, where whoever reaches it can run code: take "

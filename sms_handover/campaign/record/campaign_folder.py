@@ -4,6 +4,7 @@ Nothing in it is ever unpickled.
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +14,8 @@ from sms_handover.campaign.cases.case_row import Task
 from sms_handover.campaign.cases.retained import TRAJECTORIES, file_of
 from sms_handover.campaign.definition.campaign_file import Campaign
 from sms_handover.campaign.definition.frozen import Frozen, read_frozen
+from sms_handover.campaign.record.beginning import is_beginning, write_frozen
+from sms_handover.campaign.record.durable_file import make_folder, unwritable, write_durably
 from sms_handover.campaign.record.journal import JOURNAL, Entry, JournalFaults, JournalWriter, entries_of
 from sms_handover.campaign.record.manifest import (
     MANIFEST,
@@ -24,7 +27,9 @@ from sms_handover.campaign.record.manifest import (
     write_manifest,
 )
 from sms_handover.campaign.sampling.samples import Samples
-from sms_handover.errors import ConfigurationError, SmsHandoverError
+from sms_handover.errors import ConfigurationError
+
+_TOGETHER = 100  # [-] rows of a merge that wait for the disk together
 
 
 class CampaignFolder:
@@ -70,13 +75,11 @@ class CampaignFolder:
 class OpenCampaign(CampaignFolder):
     """A campaign folder that is written to, by nobody else; use it as a context manager."""
 
-    def __init__(self, path: Path) -> None:
-        """Lock the journal and mend it; raises ConfigurationError while another run writes to it."""
+    def __init__(self, path: Path, journal: JournalWriter, faults: Sequence[str] = ()) -> None:
+        """Take a folder whose journal is locked, and what is to be told of it besides that it was mended."""
         super().__init__(path)
-        self._journal = JournalWriter(path / JOURNAL)
-        self.faults = self._journal.faults.in_words(self._journal.path)
-        write_manifest(path, self.manifest.with_session(session()))
-        self.manifest = read_manifest(path)
+        self._journal = journal
+        self.faults = (*faults, *journal.faults.mended_in_words(journal.path))
 
     def __enter__(self) -> "OpenCampaign":
         return self
@@ -86,35 +89,100 @@ class OpenCampaign(CampaignFolder):
 
     def add(self, *done: Done) -> None:
         """Keep finished cases; when this returns, they are on disk. Raises SmsHandoverError if it is full."""
-        for one in done:
-            if one.trajectory:
-                self._keep(file_of(self.path, TRAJECTORIES, one.row.task), one.trajectory)
-        self._journal.add(*(Entry(one.row, one.beside) for one in done))
-
-    @staticmethod
-    def _keep(path: Path, data: bytes) -> None:
-        """Write retained data before the row that says it is there."""
-        try:
-            path.parent.mkdir(exist_ok=True)
-            path.write_bytes(data)
-        except OSError as error:
-            raise SmsHandoverError(
-                f"{path} cannot be written: {error.strerror}; make room, then the same command goes on"
-            ) from error
+        _add(self.path, self._journal, done)
 
 
 def open_campaign(path: Path, frozen: Frozen, cases: int | None, shard: Shard) -> OpenCampaign:
     """Return the folder of a campaign, made if it is not there, to go on with.
 
-    Raises ConfigurationError if it holds another campaign, or another part of it, or anything else.
+    Raises ConfigurationError if it holds another campaign, or another part of it, or anything else, or while
+    another run writes to it; SmsHandoverError where it cannot be written.
     """
+    _require_same(path, frozen, shard)  # before anything in it is touched
+    with _locked(path) as journal:
+        _require_same(path, frozen, shard)  # another run may have begun it meanwhile
+        if (path / MANIFEST).exists():
+            manifest = read_manifest(path)
+        else:
+            write_frozen(path, frozen)
+            manifest = Manifest(frozen.digest, frozen.campaign(cases).name, cases, shard)
+        if cases is not None and cases > (manifest.cases or 0):
+            manifest = replace(manifest, cases=cases)
+        write_manifest(path, manifest.with_session(session()))
+        return OpenCampaign(path, journal)
+
+
+def merge(path: Path, parts: Sequence[Path]) -> OpenCampaign:
+    """Return a new folder with the rows of the parts of one campaign, in the order of cases.
+
+    It is no campaign folder until all rows are in it; one that was ended before goes on. Raises
+    ConfigurationError if the parts are not of the same campaign, or if rows of one run differ.
+    """
+    folders = [CampaignFolder(part) for part in parts]
+    first = folders[0]
+    for folder in folders[1:]:
+        if folder.manifest.digest != first.manifest.digest:
+            raise ConfigurationError(f"{folder.path} and {first.path} hold different campaigns")
+    if path.exists() and not is_beginning(path, first.frozen, of_merge=True):
+        raise ConfigurationError(f"{path} exists: merge into a new folder")
+    entries, told = dict[Task, Entry](), list[str]()
+    for folder in folders:
+        faults = JournalFaults()
+        for entry in folder.entries(faults):
+            known = entries.setdefault(entry.row.task, entry)
+            if known.row.digest != entry.row.digest:
+                raise ConfigurationError(f"{folder.path}: {entry.row.task} has another row than elsewhere")
+        told.extend(faults.in_words(folder.path / JOURNAL))
+    cases = max((folder.manifest.cases or 0 for folder in folders), default=0) or None
+    with _locked(path) as journal:
+        write_frozen(path, first.frozen)
+        for entry in entries_of(journal.path, JournalFaults()):  # of a merge that was ended
+            if entry != entries.pop(entry.row.task, None):
+                raise ConfigurationError(f"{path} holds rows of other parts: merge into a new folder")
+        tasks = sorted(entries)
+        for begin in range(0, len(tasks), _TOGETHER):
+            chunk = tasks[begin : begin + _TOGETHER]
+            _add(path, journal, [Done(*entries[task], _trajectory(folders, task)) for task in chunk])
+        sessions = (*all_sessions([folder.manifest for folder in folders]), session())
+        name = first.frozen.campaign(cases).name
+        write_manifest(path, Manifest(first.manifest.digest, name, cases, Shard(), sessions))
+        return OpenCampaign(path, journal, told)
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[JournalWriter]:
+    """Yield the journal of a folder, made if it is not there; it stays locked unless an error is raised."""
+    try:
+        make_folder(path)
+    except OSError as error:
+        raise unwritable(path, error) from error
+    journal = JournalWriter(path / JOURNAL)
+    try:
+        yield journal
+    except BaseException:
+        journal.close()
+        raise
+
+
+def _add(path: Path, journal: JournalWriter, done: Sequence[Done]) -> None:
+    """Keep finished cases durably, what is retained of them before the rows that say it is there."""
+    kept = {file_of(path, TRAJECTORIES, one.row.task): one.trajectory for one in done if one.trajectory}
+    write_durably(kept)
+    journal.add(*(Entry(one.row, one.beside) for one in done))
+
+
+def _trajectory(folders: Sequence[CampaignFolder], task: Task) -> bytes:
+    """Return the trajectory that one of some folders has of a case, b'' if none has one."""
+    files = (file_of(folder.path, TRAJECTORIES, task) for folder in folders)
+    return next((file.read_bytes() for file in files if file.exists()), b"")
+
+
+def _require_same(path: Path, frozen: Frozen, shard: Shard) -> None:
+    """Raise ConfigurationError unless a folder is a part of a campaign, or becomes one."""
     if not (path / MANIFEST).exists():
-        if path.exists() and any(path.iterdir()):
+        if path.exists() and not is_beginning(path, frozen):
             raise ConfigurationError(f"{path} holds something else than a campaign: choose another folder")
-        path.mkdir(parents=True, exist_ok=True)
-        name = frozen.unpacked(path, cases).name
-        write_manifest(path, Manifest(frozen.digest, name, cases, shard))
-        return OpenCampaign(path)
+        return
     there = CampaignFolder(path)
     if there.manifest.digest != frozen.digest:
         changed = ", ".join(sorted(_changed(there.frozen, frozen)))
@@ -123,40 +191,6 @@ def open_campaign(path: Path, frozen: Frozen, cases: int | None, shard: Shard) -
         )
     if there.manifest.shard != shard:
         raise ConfigurationError(f"{path} holds shard {there.manifest.shard}: choose another folder")
-    if cases is not None and cases > (there.manifest.cases or 0):
-        write_manifest(path, replace(there.manifest, cases=cases))
-    return OpenCampaign(path)
-
-
-def merge(path: Path, parts: Sequence[Path]) -> OpenCampaign:
-    """Return a new folder with the rows of the parts of one campaign, in the order of cases.
-
-    Raises ConfigurationError if they are not of the same campaign, or if rows of one run differ.
-    """
-    folders = [CampaignFolder(part) for part in parts]
-    first = folders[0]
-    for folder in folders[1:]:
-        if folder.manifest.digest != first.manifest.digest:
-            raise ConfigurationError(f"{folder.path} and {first.path} hold different campaigns")
-    if path.exists() and (not path.is_dir() or any(path.iterdir())):
-        raise ConfigurationError(f"{path} exists: merge into a new folder")
-    entries: dict[Task, Entry] = {}
-    for folder in folders:
-        for entry in folder.entries():
-            known = entries.setdefault(entry.row.task, entry)
-            if known.row.digest != entry.row.digest:
-                raise ConfigurationError(f"{folder.path}: {entry.row.task} has another row than elsewhere")
-    cases = max((folder.manifest.cases or 0 for folder in folders), default=0) or None
-    path.mkdir(parents=True, exist_ok=True)
-    name = first.frozen.unpacked(path, cases).name
-    sessions = all_sessions([folder.manifest for folder in folders])
-    write_manifest(path, Manifest(first.manifest.digest, name, cases, Shard(), sessions))
-    merged = OpenCampaign(path)
-    for task in sorted(entries):
-        kept = [file_of(folder.path, TRAJECTORIES, task) for folder in folders]
-        data = next((file.read_bytes() for file in kept if file.exists()), b"")
-        merged.add(Done(*entries[task], data))
-    return merged
 
 
 def _changed(there: Frozen, given: Frozen) -> set[str]:

@@ -4,9 +4,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from sms_handover.campaign.record.durable_file import write_durably
 from sms_handover.campaign.record.journal import Entry
 from sms_handover.campaign.sampling.designs import needed
-from sms_handover.errors import ConfigurationError
 
 TABLE = "cases.parquet"
 INPUT, METRIC = "input.", "metric."  # what the names of columns begin with
@@ -15,7 +15,7 @@ INPUT, METRIC = "input.", "metric."  # what the names of columns begin with
 def write_table(path: Path, entries: Iterable[Entry]) -> int:
     """Write the rows of a campaign in the order of cases; return their number.
 
-    Raises MissingDependencyError without pyarrow.
+    Raises MissingDependencyError without pyarrow, SmsHandoverError where it cannot be written.
     """
     arrow, parquet = needed("pyarrow", "pyarrow"), needed("pyarrow.parquet", "pyarrow")
     rows = sorted(entries, key=lambda entry: entry.row.task)
@@ -44,12 +44,9 @@ def write_table(path: Path, entries: Iterable[Entry]) -> int:
         "solve": arrow.array([entry.beside.solve for entry in rows], arrow.float64()),
         "tries": arrow.array([entry.beside.tries for entry in rows], arrow.int64()),
     }
-    unfinished = path.with_name(f".{path.name}")
-    try:
-        parquet.write_table(arrow.table(columns), str(unfinished), compression="zstd")
-        unfinished.replace(path)
-    except OSError as error:
-        raise ConfigurationError(f"{path} cannot be written: {error}") from error
+    table = arrow.BufferOutputStream()
+    parquet.write_table(arrow.table(columns), table, compression="zstd")
+    write_durably({path: memoryview(table.getvalue())})
     return len(rows)
 
 

@@ -14,11 +14,18 @@ from pathlib import Path
 from typing import NamedTuple
 
 from sms_handover.campaign.cases.case_row import Beside, Row, row_of
-from sms_handover.errors import ConfigurationError, SmsHandoverError
+from sms_handover.campaign.record.durable_file import (
+    sync_folder,
+    unfinished_name,
+    unwritable,
+    write_durably,
+)
+from sms_handover.errors import ConfigurationError
 
 JOURNAL = "journal.jsonl"
 _BROKEN = "broken.jsonl"
 _CHECK = 16  # hexadecimal digits
+_NO_ENTRY = (ValueError, KeyError, TypeError, ArithmeticError, RecursionError)  # of a line that is broken
 
 
 class Entry(NamedTuple):
@@ -36,13 +43,19 @@ class JournalFaults:
     torn: int = 0
 
     def in_words(self, path: Path) -> tuple[str, ...]:
-        """Return each fault in a line."""
+        """Return each fault in a line, for whoever only reads the journal."""
+        said = [
+            f"{path}, line {number} is corrupted and left out: 'campaign run' runs its case again"
+            for number in self.broken
+        ]
+        torn = f"{path}: the last line has no end, as while it is written, and is left out"
+        return (*said, torn) if self.torn else (*said,)
+
+    def mended_in_words(self, path: Path) -> tuple[str, ...]:
+        """Return what was done about each fault in a line."""
         said = [f"{path}, line {number} is corrupted: its case is run again" for number in self.broken]
-        return (
-            (*said, f"{path}: {self.torn} bytes of an unfinished last line are cut off")
-            if self.torn
-            else (*said,)
-        )
+        torn = f"{path}: {self.torn} bytes of an unfinished last line are cut off"
+        return (*said, torn) if self.torn else (*said,)
 
 
 def entries_of(path: Path, faults: JournalFaults) -> Iterator[Entry]:
@@ -59,7 +72,7 @@ def entries_of(path: Path, faults: JournalFaults) -> Iterator[Entry]:
                 return
             try:
                 yield _entry(line)
-            except (ValueError, KeyError, TypeError):
+            except _NO_ENTRY:
                 faults.broken[number] = line
 
 
@@ -67,42 +80,56 @@ class JournalWriter:
     """Appends to a journal that nobody else writes to."""
 
     def __init__(self, path: Path) -> None:
-        """Lock the journal and mend it; raises ConfigurationError while somebody else writes to it."""
+        """Lock the journal and mend it.
+
+        Raises ConfigurationError while somebody else writes to it, SmsHandoverError where it cannot be
+        written.
+        """
         self.path = path
+        self.faults = JournalFaults()
         self._descriptors: list[int] = []
         try:
             self._descriptor = self._locked(path)
-        except BlockingIOError:
+            self._mend()
+        except BaseException as error:
             self.close()
-            raise ConfigurationError(
-                f"{path} is written to by another run of the campaign; wait for it, or end it first"
-            ) from None
-        self.faults = JournalFaults()
-        self._mend()
+            if isinstance(error, BlockingIOError):
+                raise ConfigurationError(
+                    f"{path} is written to by another run of the campaign; wait for it, or end it first"
+                ) from None
+            if isinstance(error, OSError):
+                raise unwritable(path, error) from error
+            raise
 
     def _mend(self) -> None:
-        """Cut off a torn last line, and put broken lines aside."""
+        """Cut off a torn last line, and put broken lines aside; the journal is whole at any time."""
         for _ in entries_of(self.path, self.faults):
             pass
         if self.faults.torn:
             os.ftruncate(self._descriptor, os.fstat(self._descriptor).st_size - self.faults.torn)
         if not self.faults.broken:
             return
-        with self.path.with_name(_BROKEN).open("ab") as aside:
-            aside.writelines(self.faults.broken.values())
-        with self.path.open("rb") as stream:  # by its lines, as they were numbered: \r ends none
-            sound = [line for number, line in enumerate(stream, start=1) if number not in self.faults.broken]
-        unfinished = self.path.with_name(f".{self.path.name}")
+        aside = self.path.with_name(_BROKEN)
+        there = _lines(aside) if aside.exists() else []
+        new = [line for line in self.faults.broken.values() if line not in there]
+        write_durably({aside: b"".join([*there, *new])})
+        lines = enumerate(_lines(self.path), start=1)
+        sound = [line for number, line in lines if number not in self.faults.broken]
+        unfinished = unfinished_name(self.path)
         unfinished.unlink(missing_ok=True)
         self._descriptor = self._locked(unfinished)
         self._write(b"".join(sound))
-        unfinished.replace(self.path)  # so that whoever is killed here leaves a whole journal
+        unfinished.replace(self.path)
+        sync_folder(self.path.parent)
 
     def _locked(self, path: Path) -> int:
         """Open and lock a file until the journal is closed; raises BlockingIOError if somebody else has."""
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
         self._descriptors.append(descriptor)
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if not os.path.samestat(os.fstat(descriptor), path.stat()):  # mended by another run meanwhile
+            raise BlockingIOError
+        sync_folder(path.parent)
         return descriptor
 
     def add(self, *entries: Entry) -> None:
@@ -119,14 +146,18 @@ class JournalWriter:
             os.fsync(self._descriptor)
         except OSError as error:
             os.ftruncate(self._descriptor, size)
-            raise SmsHandoverError(
-                f"{self.path} cannot be written: {error.strerror}; make room, then the same command goes on"
-            ) from error
+            raise unwritable(self.path, error) from error
 
     def close(self) -> None:
         """Let go of the journal."""
         for descriptor in self._descriptors:
             os.close(descriptor)
+
+
+def _lines(path: Path) -> list[bytes]:
+    """Return the lines of a file, as they are numbered: a carriage return ends none."""
+    with path.open("rb") as stream:
+        return list(stream)
 
 
 def _line(row: Row, beside: Beside) -> bytes:
@@ -136,7 +167,7 @@ def _line(row: Row, beside: Beside) -> bytes:
 
 
 def _entry(line: bytes) -> Entry:
-    """Return what a line says; raises ValueError, KeyError or TypeError if it is broken."""
+    """Return what a line says; raises one of _NO_ENTRY if it is broken."""
     values = json.loads(line)
     row, beside = row_of(values["row"]), Beside(**values["beside"])
     measured = json.dumps(asdict(beside), sort_keys=True)

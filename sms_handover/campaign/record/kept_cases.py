@@ -3,6 +3,7 @@
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
+from io import BytesIO
 from pathlib import Path
 
 from sms_handover.campaign.cases.case import Cases
@@ -10,10 +11,11 @@ from sms_handover.campaign.cases.case_row import Row, Task
 from sms_handover.campaign.cases.retained import worst_path
 from sms_handover.campaign.definition.fields import BAG
 from sms_handover.campaign.record.campaign_folder import CampaignFolder
+from sms_handover.campaign.record.durable_file import sync_folder, unfinished_name, write_durably
 from sms_handover.campaign.record.output import Output
 from sms_handover.campaign.statistics.worst_cases import rerun_command, worst_of
 from sms_handover.errors import SmsHandoverError
-from sms_handover.simulation.save import save_run
+from sms_handover.simulation.save import write_arrays
 
 Record = Callable[[CampaignFolder, Task, Path], None]
 """Runs a case as a graph and records it to a new folder; raises SmsHandoverError unless equal to its row."""
@@ -59,28 +61,31 @@ def keep_worst(folder: CampaignFolder, record: Record | None) -> Iterator[Output
 def _keep(folder: CampaignFolder, cases: Cases, row: Row, record: Record | None) -> Path:
     """Keep a case, recorded if that is given; return where. Raises SmsHandoverError or OSError."""
     path = worst_path(folder.path, folder.campaign.keep, row.task)
-    unfinished = path.with_name(f".{path.name}")
+    if record is None:
+        write_durably({path: _arrays(cases, row)})
+        return path
+    unfinished = unfinished_name(path)
     _remove(unfinished)  # of a session that was killed
     path.parent.mkdir(exist_ok=True)
     try:
-        if record:
-            record(folder, row.task, unfinished)
-        else:
-            _save(cases, row, unfinished)
+        record(folder, row.task, unfinished)
         unfinished.replace(path)
+        sync_folder(path.parent)
     finally:
         _remove(unfinished)
     return path
 
 
-def _save(cases: Cases, row: Row, path: Path) -> None:
-    """Run a case here and save its arrays; raises SmsHandoverError if it differs from its row."""
+def _arrays(cases: Cases, row: Row) -> memoryview:
+    """Run a case here and return its arrays; raises SmsHandoverError if it differs from its row."""
     result = cases.run(row.task)
     if result.run is None or result.row.text != row.text:
         raise SmsHandoverError(
             "run again it differs from its row, as it may on another class of processors or other libraries"
         )
-    save_run(result.run, path)
+    stream = BytesIO()
+    write_arrays(result.run, stream)
+    return stream.getbuffer()
 
 
 def _remove(path: Path) -> None:

@@ -1,13 +1,13 @@
 """Manifest of a campaign: what it was made with, session by session, and how far it is to go."""
 
 import json
-import os
 import platform
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from sms_handover.bag.provenance import package_version, provenance
+from sms_handover.campaign.record.durable_file import write_durably
 from sms_handover.errors import ConfigurationError
 
 MANIFEST = "manifest.json"
@@ -76,14 +76,11 @@ def session() -> dict[str, str]:
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
-    """Write the manifest of a folder whole or not at all."""
-    path, unfinished = folder / MANIFEST, folder / f".{MANIFEST}.{os.getpid()}"
-    with unfinished.open("w", encoding="utf-8") as stream:
-        json.dump(asdict(manifest), stream, indent=1)
-        stream.write("\n")
-        stream.flush()
-        os.fsync(stream.fileno())
-    unfinished.replace(path)
+    """Write the manifest of a folder whole or not at all, durably; raises SmsHandoverError.
+
+    The journal of the folder must be locked, as what is written was read before.
+    """
+    write_durably({folder / MANIFEST: f"{json.dumps(asdict(manifest), indent=1)}\n".encode()})
 
 
 def read_manifest(folder: Path) -> Manifest:

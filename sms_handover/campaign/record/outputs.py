@@ -6,6 +6,7 @@ from pathlib import Path
 from sms_handover.campaign.page.campaign_page import PAGE, campaign_page
 from sms_handover.campaign.record.campaign_folder import CampaignFolder
 from sms_handover.campaign.record.cases_table import TABLE, write_table
+from sms_handover.campaign.record.durable_file import write_durably
 from sms_handover.campaign.record.kept_cases import Record, keep_worst
 from sms_handover.campaign.record.output import Output
 from sms_handover.errors import MissingDependencyError
@@ -25,7 +26,7 @@ def write_outputs(path: Path, record: Record | None) -> Iterator[Output]:
         yield Output(f"{TABLE} is not written: {error}")
     is_written = False
     try:
-        (path / PAGE).write_text(campaign_page(folder), encoding="utf-8")
+        write_durably({path / PAGE: campaign_page(folder).encode()})
         is_written = True
         yield Output(f"{path / PAGE}: open it in a browser")
     except MissingDependencyError as error:
@@ -35,4 +36,4 @@ def write_outputs(path: Path, record: Record | None) -> Iterator[Output]:
         kept.append(output)
         yield output
     if is_written and kept:
-        (path / PAGE).write_text(campaign_page(folder), encoding="utf-8")
+        write_durably({path / PAGE: campaign_page(folder).encode()})

@@ -29,6 +29,8 @@ def add_parser(parser: ArgumentParser) -> None:
 def command(options: Namespace) -> int:
     """Run the command; return the exit code."""
     with merge(options.output, options.folders) as merged:
+        for fault in merged.faults:
+            print(fault, file=sys.stderr)
         entries = list(merged.entries())
         there, total = len(entries), merged.runs(stopped_at(merged.campaign, merged.cases, entries))
         print(f"{there} of {total} rows", flush=True)
