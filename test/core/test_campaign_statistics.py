@@ -102,12 +102,12 @@ def test_only_cases_that_both_laws_have_are_paired() -> None:
 
 
 def test_pairs_that_agree_are_left_out_of_wilcoxons_test() -> None:
-    """Of 8 pairs 2 agree and 6 favour one law: p is that of 6 coins, 2^-5; it stays exact [Wilcoxon1945]."""
-    base = np.linspace(1.0, 2.0, 8)
-    for other, p in ((base, nan), (base + np.maximum(np.arange(8) - 1, 0), 2.0**-5)):
+    """Of 14 pairs 2 agree, 12 favour one law: p is that of 12 coins, 2^-11; it stays exact [Wilcoxon1945]."""
+    base = np.linspace(1.0, 2.0, 14)
+    for other, p in ((base, nan), (base + np.maximum(np.arange(14) - 1, 0), 2.0**-11)):
         pair = {("s", "a"): columns(list(base)), ("s", "b"): columns(list(other))}
         success, error = paired_tests(pair, ["grasp_error"])
-        assert error.p == pytest.approx(p, nan_ok=True) and error.cases == 8
+        assert error.p == pytest.approx(p, nan_ok=True) and error.cases == 14
         assert np.isnan(success.p) and (error.difference == 0.0) == bool(np.isnan(p))
 
 
