@@ -1,6 +1,6 @@
 """Acceptance runs of the laws with a model: writes a section of docs/control.md.
 
-Runs that are in build/acceptance/ from before are not repeated: remove it after a change of the laws.
+Runs of the same sources that are in build/acceptance/ from before are not repeated.
 """
 
 import json
@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from docs.measurement_folder import measurement_folder
 from docs.tables import table
 from sms_handover.analysis.clearance import TaskTexts, run_clearance
 from sms_handover.analysis.completion import completion
@@ -28,7 +29,7 @@ from sms_handover.types import BASE_NQ, GraspStatus
 from sms_handover.units import MM_PER_M, ns_to_seconds
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE, FOLDER = ROOT / "docs" / "control.md", ROOT / "build" / "acceptance"
+PAGE = ROOT / "docs" / "control.md"
 TICK = 0.004  # [s], four times the shipped one, to save time
 SLOW = 0.005  # [s], of which the periods of the sensors of nominal conditions are multiples
 GRASPED = 40.1  # [s], just after the transfer of the scenarios that are cut off there
@@ -150,10 +151,10 @@ def _least_distance(scenario: Scenario, run: RunData) -> float:
 
 def measured(wanted: str) -> dict[str, Outcome]:
     """Return the outcomes of all runs whose name begins so, and of those from before."""
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    found = {}
+    folder, found = measurement_folder("acceptance"), {}
+    folder.mkdir(parents=True, exist_ok=True)
     for name, scenario, values in cases():
-        file = FOLDER / f"{name.replace(' ', '_').replace('%', 'percent')}.json"
+        file = folder / f"{name.replace(' ', '_').replace('%', 'percent')}.json"
         if not file.exists():
             if not name.startswith(wanted):
                 continue

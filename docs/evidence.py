@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from docs.measurement_folder import measurement_folder
 from docs.tables import plain, table
 from sms_handover.analysis.layout import MISSING, number
 from sms_handover.campaign.definition.frozen import campaign_path, freeze
@@ -25,7 +26,7 @@ from sms_handover.types import Array
 from sms_handover.units import DEG_PER_RAD, MM_PER_M
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE, FOLDER = ROOT / "docs" / "laws.md", ROOT / "build" / "evidence" / "laws"
+PAGE = ROOT / "docs" / "laws.md"
 _MS_PER_S = 1000.0  # [ms/s]
 _FIGURES = {  # metric: its title, and the factor from its unit
     "grasp_error": ("grasp error [mm]", MM_PER_M),
@@ -236,14 +237,15 @@ def main() -> None:
     options = parser.parse_args()
     frozen, cases = freeze(campaign_path("laws"))
     cases = options.cases or cases
-    with open_campaign(FOLDER, frozen, cases, Shard()) as folder, Progress() as progress:
+    place = measurement_folder("evidence")
+    with open_campaign(place, frozen, cases, Shard()) as folder, Progress() as progress:
 
         def show(tally: Tally) -> None:
             if progress.due:
                 progress.show(f"{tally.done} of {tally.total}", share=tally.done / tally.total)
 
         run_campaign(folder, lambda: workers_for(frozen, folder.cases, jobs=options.jobs), show)
-    PAGE.write_text(page(CampaignFolder(FOLDER)), encoding="utf-8")
+    PAGE.write_text(page(CampaignFolder(place)), encoding="utf-8")
 
 
 if __name__ == "__main__":

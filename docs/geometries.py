@@ -1,7 +1,6 @@
 """Geometries page: how often each claim of the paper holds in random geometries that are possible."""
 
 import argparse
-import json
 import sys
 from collections import Counter
 from collections.abc import Sequence
@@ -20,6 +19,7 @@ from matplotlib.patches import Rectangle
 
 from docs.geometry_search import Tally, possible
 from docs.geometry_trial import Bench
+from docs.measurement_folder import KeptRows, measurement_folder
 from docs.tables import table
 from sms_handover.analysis.claims import PEAK_TORQUE
 from sms_handover.campaign.statistics.proportion import proportion
@@ -29,7 +29,6 @@ from sms_handover.units import MM_PER_M
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE, FIGURE = ROOT / "docs" / "geometries.md", ROOT / "docs" / "images" / "geometries.svg"
-FOLDER = ROOT / "build" / "geometries"
 SEED, COUNT = 16, 60
 _FEW = 30  # [-] geometries below which the page says that there are few
 _MOST_CAUSES = 8  # [-] rows of the table of failures
@@ -47,12 +46,6 @@ class Row:
     rate: float  # [-] share of its limit
     simulated: int
     failures: dict[str, int]
-
-
-def rows_of(file: Path) -> list[Row]:
-    """Return the rows of a file, one JSON object a line, none if there is no file."""
-    lines = file.read_text(encoding="utf-8").splitlines() if file.exists() else []
-    return [Row(**json.loads(line)) for line in lines]
 
 
 @cache
@@ -75,16 +68,14 @@ def measured(seed: int, index: int) -> tuple[Row, str]:
 
 def grown(seed: int, count: int, folder: Path, jobs: int = 1) -> list[Row]:
     """Return ``count`` rows; those that a folder lacks are worked out, ``jobs`` at a time, and appended."""
-    folder.mkdir(parents=True, exist_ok=True)
-    file = folder / f"rows_{seed}.jsonl"
-    rows = rows_of(file)
+    kept = KeptRows(folder / f"rows_{seed}.jsonl")
+    rows = [Row(**row) for row in kept.rows]
     if len(rows) >= count:
         return rows[:count]
     with ProcessPoolExecutor(jobs) as pool:
         for row, text in pool.map(partial(measured, seed), range(len(rows), count)):
             (folder / f"geometry_{seed}_{row.index}.yaml").write_text(text, encoding="utf-8")
-            with file.open("a", encoding="utf-8") as stream:
-                stream.write(json.dumps(asdict(row)) + "\n")
+            kept.add(asdict(row))
             rows.append(row)
             held = sum(row.claims.values())
             print(f"{row.index + 1} of {count}: {held} claims hold, {row.simulated} simulated", flush=True)
@@ -120,7 +111,7 @@ def page(rows: Sequence[Row], seed: int) -> str:
 
 This page is written by `make geometries` ({COUNT} of them), this time by
 `python -m docs.geometries --seed {seed} --count {number}`.
-It goes on where it was stopped.{few}
+It goes on where it was stopped, with the same sources.{few}
 
 The paper gives no pose: not where the deputy floats, not how the arms begin, not where they meet. Its claims
 are judged on one geometry of ours, the scenario `paper`. This page asks how far they carry: {number} random
@@ -214,7 +205,7 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("--count", type=int, default=COUNT, help="geometries on the page")
     parser.add_argument("-j", "--jobs", type=int, default=2, help="geometries at the same time")
     options = parser.parse_args(arguments)
-    rows = grown(options.seed, options.count, FOLDER, options.jobs)
+    rows = grown(options.seed, options.count, measurement_folder("geometries"), options.jobs)
     draw(rows, FIGURE)
     PAGE.write_text(page(rows, options.seed), encoding="utf-8")
     print(f"{PAGE.name} written")

@@ -29,6 +29,7 @@ from sms_handover.control.nmpc import NMPC
 from sms_handover.control.pid import PID
 from sms_handover.errors import ConfigurationError
 from sms_handover.model.poses import pose_of, se3_of
+from sms_handover.model.robot_model import RobotModel
 from sms_handover.run_data import RunData
 from sms_handover.simulation.observed_ticks import Ticks
 from sms_handover.simulation.quiet_periods import QuietPeriods
@@ -36,7 +37,7 @@ from sms_handover.simulation.scenario import Scenario, World, load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.trajectory.load import schedule_of
 from sms_handover.trajectory.schedule import Schedule
-from sms_handover.types import BASE_NV, Array, GraspEvent, GraspStatus, Pose
+from sms_handover.types import BASE_NQ, BASE_NV, Array, GraspEvent, GraspStatus, Pose
 
 LAWS = (PID.name, NMPC.name)  # the one that fails more often first
 _SHARES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4)  # [-] of a straight joint path; PID overshoots
@@ -105,7 +106,6 @@ class Bench:
         meet = {BodyKind.GRIPPER, BodyKind.DEPUTY}
         near = [{one.kind, other.kind} == meet for one, other in self._bodies.pairs]
         self._floor = np.where(near, _NEAR, _APART)
-        self._rate_limit = robot.pin.velocityLimit[BASE_NV:]
 
     def collides(self, geometry: Geometry) -> str:
         """Return the phase in which bodies come too near each other on straight joint paths, '' if in none.
@@ -141,19 +141,14 @@ class Bench:
     def attempt(self, schedule: Schedule, law: str, floor: float = 0.0) -> Attempt:
         """Return what comes of a schedule under one law."""
         world = World(self.robot, schedule)
-        watch = _Watch(self._bodies, self._rate_limit, floor, self._per_reference)
+        watch = _Watch(self._bodies, self.robot, floor, self._per_reference)
         try:
             run = simulate(Scenario(self._scenarios[law].parameters, world, world), until=watch.fails_in)
         except ConfigurationError as error:
             return Attempt(str(error), schedule.phases[0].name, -inf, inf)
         if watch.failure:
             return Attempt(watch.failure, watch.phase, watch.least, watch.rate)
-        beyond = "position limit" if self._beyond(run) else ""
-        return Attempt(beyond, watch.phase, watch.least, watch.rate, run)
-
-    def _beyond(self, run: RunData) -> bool:
-        """Whether a joint was beyond its position limits."""
-        return bool(((run.joint_position < self.robot.lower) | (run.joint_position > self.robot.upper)).any())
+        return Attempt("", watch.phase, watch.least, watch.rate, run)
 
     def _passed(self, geometry: Geometry) -> Iterator[tuple[str, Array, Pose]]:
         """Yield phase, joints (14,) and deputy along straight joint paths."""
@@ -181,9 +176,10 @@ class Bench:
 class _Watch:
     """Looks at every reference period of a run in turn, up to the one in which something fails."""
 
-    def __init__(self, bodies: ClearanceModel, rate_limit: Array, floor: float, per_reference: int) -> None:
+    def __init__(self, bodies: ClearanceModel, robot: RobotModel, floor: float, per_reference: int) -> None:
         """Begin a run; bodies fail nearer than ``floor`` m."""
-        self._bodies, self._rate_limit = bodies, rate_limit
+        self._bodies, self._robot = bodies, robot
+        self._rate_limit = robot.pin.velocityLimit[BASE_NV:]
         self._floor, self._per_reference = floor, per_reference
         self.least, self.rate, self.failure, self.phase = inf, 0.0, "", ""
 
@@ -197,7 +193,7 @@ class _Watch:
 
     def _failure(self, q: Array, v: Array, deputy: Pose, events: tuple[GraspEvent, ...]) -> str:
         """Return what fails in a period, '' if nothing does, and note how near and fast it was."""
-        distances = self._bodies.distances(q, deputy)
+        distances = self._bodies.distances(q[0], deputy)
         nearest = int(distances.argmin())
         self.least = min(self.least, float(distances[nearest]))
         self.rate = max(self.rate, float((np.abs(v[:, BASE_NV:]) / self._rate_limit).max()))
@@ -206,21 +202,25 @@ class _Watch:
         if self.least < self._floor:
             one, other = self._bodies.pairs[nearest]
             return f"{one.label} - {other.label}"
-        return "rate limit" if self.rate > 1.0 else ""
+        if self.rate > 1.0:
+            return "rate limit"
+        joints = q[:, BASE_NQ:]
+        beyond = (joints < self._robot.lower) | (joints > self._robot.upper)
+        return "position limit" if beyond.any() else ""
 
 
 def _periods(
     ticks: Ticks | QuietPeriods, per_reference: int
 ) -> Iterator[tuple[str, Array, Array, Pose, tuple[GraspEvent, ...]]]:
-    """Yield phase, q (7 + n,) as it begins, v (ticks, 6 + n) in it, deputy and grasps of every period."""
+    """Yield phase, q (ticks, 7 + n) and v (ticks, 6 + n), deputy as it begins, and grasps of every period."""
     q, v = ticks.rows.q, ticks.rows.v
     if isinstance(ticks, Ticks):
         assert ticks.period is not None
-        yield ticks.period.phase.name, q[0], v, ticks.period.deputy.deputy_in_world, ticks.period.events
+        yield ticks.period.phase.name, q, v, ticks.period.deputy.deputy_in_world, ticks.period.events
         return
     for index, (phase, row) in enumerate(zip(ticks.phases, ticks.periods.deputy_pose, strict=True)):
-        first = index * per_reference
-        yield phase.name, q[first], v[first : first + per_reference], Pose(row[:3], row[3:]), ()
+        its = slice(index * per_reference, (index + 1) * per_reference)
+        yield phase.name, q[its], v[its], Pose(row[:3], row[3:]), ()
 
 
 def _or_late(time: float) -> float:

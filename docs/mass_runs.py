@@ -1,12 +1,12 @@
 """Mass runs: handovers of deputies of some masses, by laws that know the mass or do not."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
+from docs.measurement_folder import KeptRows
 from sms_handover.analysis.clearance import TaskTexts, run_clearance
 from sms_handover.analysis.completion import collisions_in_words
 from sms_handover.analysis.numbers import angle_between
@@ -149,19 +149,15 @@ def load_of(mass: float) -> Load:
 
 def grown(folder: Path, part: Sequence[Case]) -> Mapping[Case, Outcome]:
     """Return the outcomes of some cases; those that a folder lacks are worked out and added to its file."""
-    folder.mkdir(parents=True, exist_ok=True)
-    file = folder / "rows.jsonl"
-    lines = file.read_text(encoding="utf-8").splitlines() if file.exists() else []
-    read = (json.loads(line) for line in lines)
+    kept = KeptRows(folder / "rows.jsonl")
     found = {
         Case(**row["case"]): Outcome(**{**row["outcome"], "distances": tuple(row["outcome"]["distances"])})
-        for row in read
+        for row in kept.rows
     }
     for case in part:
         if case not in found:
             outcome = found[case] = outcome_of(case)
-            with file.open("a", encoding="utf-8") as stream:
-                stream.write(json.dumps({"case": asdict(case), "outcome": asdict(outcome)}) + "\n")
+            kept.add({"case": asdict(case), "outcome": asdict(outcome)})
             print(case, outcome, flush=True)
     return found
 

@@ -4,13 +4,13 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from docs.mass_runs import BELIEFS, FIRST, MASSES, SIZES, Case, Load, Outcome, cases, grown, load_of, size_of
+from docs.measurement_folder import measurement_folder
 from docs.tables import table
 from sms_handover.control.nmpc import NMPC
 from sms_handover.control.pid import PID
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "deputy_with_mass.md"
-FOLDER = ROOT / "build" / "masses"
 # What an earlier prototype of ours measured in this geometry.
 _PROTOTYPE = {
     (1.0, "known", NMPC.name): "completes, 0.75 N m, 3.0 deg",
@@ -218,7 +218,7 @@ def _short(distance: float) -> str:
 def main() -> None:
     """Run what has not been run yet, and write the page."""
     loads = {mass: load_of(mass) for mass in (1.0, 4.0, 12.0)}
-    PAGE.write_text(page(grown(FOLDER, cases()), loads), encoding="utf-8")
+    PAGE.write_text(page(grown(measurement_folder("masses"), cases()), loads), encoding="utf-8")
     print(f"{PAGE.name} written")
 
 

@@ -1,6 +1,6 @@
 """Records: every figure of a comparison as one row of a long table, for a data frame or a CSV file."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
@@ -43,6 +43,26 @@ def records_of(comparison: Comparison) -> list[Record]:
         for name, metrics in comparison.runs.items()
         for row in _of_run(comparison, name, metrics)
     ]
+
+
+def figures_of(phases: Iterable[str], arms: Sequence[str]) -> Iterator[tuple[str, str, str]]:
+    """Yield phase, arm and name of each figure that a run of these phases and arms can have.
+
+    Left out are the clearance of single groups of bodies, and what is measured in wall time.
+    """
+    for phase in phases:
+        for arm in arms:
+            yield from _named(phase, arm, _TOOL, _ORIENTATION, _TORQUE, _WORK)
+        yield from _named(phase, "", _PHASE, _BASE, _DRIFT, _PHYSICS, _IK)
+    for arm in arms:
+        yield from _named("", arm, _TORQUE, _WORK)
+    plans = tuple(column for column in _PLANS if column[0] not in WALL_TIMES)
+    yield from _named("", "", _PHYSICS, _IK, _LIMITS, plans)
+
+
+def _named(phase: str, arm: str, *tables: Iterable[_Column[Any]]) -> Iterator[tuple[str, str, str]]:
+    for columns in tables:
+        yield from ((phase, arm, figure) for figure, _, _ in columns)
 
 
 def _of_run(comparison: Comparison, name: str, metrics: RunMetrics) -> Iterator[_Row]:
@@ -148,16 +168,14 @@ _LIMITS: tuple[_Column[LimitUse], ...] = (
     ("farthest_beyond_position_limit", "rad", lambda limits: limits.position.value),
     ("time_beyond_position_limit", "s", lambda limits: limits.position.beyond),
 )
+_SOLVE_TIMES = {"solve_median": "s", "solve_tail": "s", "solve_max": "s", "program_median": "s"}
 _PLANS = _attributes(
     solves="-",
     failed_solves="-",
     reused_plans="-",
     late_plans="-",
     binding_share="-",
-    solve_median="s",
-    solve_tail="s",
-    solve_max="s",
-    program_median="s",
+    **_SOLVE_TIMES,
 )
 _IK = _attributes("ik_{}", solves="-", failures="-", stalled="-", iteration_limit="-")
 _LOOP = _attributes(
@@ -172,6 +190,7 @@ _LOOP = _attributes(
     late_ticks="-",
     held_commands="-",
 )
+WALL_TIMES = frozenset([*_SOLVE_TIMES, *(figure for figure, _, _ in _LOOP)])  # differ from run to run
 _OF_PHASES: tuple[_Column[Any], ...] = (*_TOOL, *_ORIENTATION, *_TORQUE, *_WORK, *_PHASE, *_BASE, *_DRIFT)
 _OF_RUNS: tuple[_Column[Any], ...] = (*_PHYSICS, *_IK, *_LIMITS, *_PLANS, *_LOOP)
 UNITS: Mapping[str, str] = MappingProxyType(

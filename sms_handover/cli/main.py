@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"{said_by}: error: {reason}", file=sys.stderr)
         return EXIT_USAGE
     except (SmsHandoverError, OSError, MemoryError) as error:
-        print(f"{said_by}: error: {error or 'out of memory'}", file=sys.stderr)
+        print(f"{said_by}: error: {str(error) or 'out of memory'}", file=sys.stderr)
         return EXIT_USAGE if isinstance(error, ConfigurationError) else EXIT_FAILED
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)

@@ -10,7 +10,7 @@ import pytest
 
 from sms_handover.analysis.comparison import compare
 from sms_handover.analysis.metrics import measure
-from sms_handover.analysis.records import records_of
+from sms_handover.analysis.records import WALL_TIMES, figures_of, records_of
 from sms_handover.bag.run.reader import read_run
 from sms_handover.cli.main import main
 from sms_handover.run_data import RunData
@@ -82,6 +82,19 @@ def test_records_have_every_figure_of_every_phase_and_arm_once(nmpc: RunData) ->
                 assert {"peak_torque", "rms_torque", "control_effort", "saturated_ticks", "net_work"} < named
             named = {row.figure for row in rows if row[:3] == (run, phase, "")}
             assert {"drift_position_rate", "drift_attitude_change", "energy_residual", "ik_failures"} < named
+
+
+def test_what_a_run_can_have_is_told_without_one(nmpc: RunData) -> None:
+    """But for what takes the robot or a law that plans."""
+    rows = {row[1:4] for row in records_of(compare({"one": nmpc}))}
+    named = set(figures_of(("approach", "carry", "withdraw", "let go"), nmpc.arms))
+    assert rows <= named and {figure[:2] for figure in named - rows} == {("", "")}
+    assert {figure for *_, figure in named - rows} == {
+        *("solves", "failed_solves", "reused_plans", "late_plans", "binding_share"),
+        *("largest_rate_share", "time_above_rate_limit"),
+        *("farthest_beyond_position_limit", "time_beyond_position_limit"),
+    }
+    assert "solve_max" in WALL_TIMES and "held_commands" in WALL_TIMES
 
 
 def test_records_are_the_metrics(nmpc: RunData) -> None:

@@ -325,6 +325,9 @@ def test_check_tells_draws_and_cost(tmp_path: Path, capsys: pytest.CaptureFixtur
     [
         ({"success": "grasp_eror < 1"}, "unknown metric 'grasp_eror' (did you mean 'grasp_error'?)"),
         ({"metrics": ["approach.arm_c.final_error"]}, "unknown metric 'approach.arm_c.final_error'"),
+        ({"success": "carry.final_error < 1"}, "unknown metric 'carry.final_error' (did you mean"),
+        ({"success": "base_turn < solve_max"}, "metric 'solve_max' is of wall time"),
+        ({"limits": {"ticks": 10}}, "case 0 of smooth under nmpc: more than 10 ticks"),
         ({"draws": {"robot.base.mas": {"uniform": {"low": 1, "high": 2}}}}, "unknown path 'robot.base.mas'"),
         ({"draws": {"schedule.phases.carry.on_miss": {"choice": {"values": ["abort"]}}}}, "cannot be drawn"),
     ],

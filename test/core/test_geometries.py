@@ -1,16 +1,28 @@
 """The shipped handovers are possible under both laws, and so is what the search calls possible."""
 
 import json
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from docs.geometries import Row, grown, page, rows_of
-from docs.geometry_candidates import APPROACH, ORIGIN, Geometry, design_of, drawn, resolved, schedule_text
+from docs import geometry_trial
+from docs.geometries import Row, grown, page
+from docs.geometry_candidates import (
+    APPROACH,
+    CARRY,
+    ORIGIN,
+    Geometry,
+    design_of,
+    drawn,
+    resolved,
+    schedule_text,
+)
 from docs.geometry_margins import Variation, varied_robot
-from docs.geometry_trial import Bench
+from docs.geometry_trial import Bench, _Watch
+from docs.measurement_folder import KeptRows
 from sms_handover.analysis.clearance import TaskTexts, run_clearance
 from sms_handover.analysis.joint_limits import limit_use
 from sms_handover.campaign.statistics.proportion import proportion
@@ -19,6 +31,7 @@ from sms_handover.ik.levenberg_marquardt import find_joints
 from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
 from sms_handover.types import GraspStatus, IkRequest
+from sms_handover.units import NS_PER_S
 
 LEAST = {"paper": 0.001, "smooth": 0.02}  # m, outside declared contacts
 
@@ -60,6 +73,25 @@ def test_a_run_ends_where_the_first_bodies_touch(bench: Bench) -> None:
     assert (attempt.phase, attempt.failure) == (APPROACH, "gripper arm_a - deputy")
     assert attempt.least == pytest.approx(0.0, abs=2e-3)  # m in one reference period at 0.1 m/s
     assert attempt.run is None
+
+
+def test_a_joint_beyond_its_limit_is_found_in_the_phase_in_which_it_is(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The limit is one that the joint passes while it carries, and it comes back before the end."""
+    schedule = bench.schedule(load_scenario("paper").truth.schedule.text)
+    run = bench.attempt(schedule, "nmpc").run
+    assert run is not None
+    approach, withdraw = (run.tick_ns < 20 * NS_PER_S), (run.tick_ns > 55 * NS_PER_S)
+    joints = run.joint_position
+    within = np.maximum(joints[approach].max(axis=0), joints[withdraw].max(axis=0))
+    beyond = joints.max(axis=0) - within
+    narrow = copy(bench.robot)
+    narrow.upper = np.where(beyond == beyond.max(), within + 0.5 * beyond, bench.robot.upper)
+    assert beyond.max() > 0.01  # rad
+    monkeypatch.setattr(geometry_trial, "_Watch", lambda bodies, robot, *rest: _Watch(bodies, narrow, *rest))
+    attempt = bench.attempt(schedule, "nmpc")
+    assert (attempt.phase, attempt.failure, attempt.run) == (CARRY, "position limit", None)
 
 
 def test_a_geometry_is_the_same_after_its_file(bench: Bench, geometry: Geometry) -> None:
@@ -125,9 +157,12 @@ def row(index: int, *, settling: bool) -> Row:
 def test_rows_that_are_there_are_not_worked_out_again(tmp_path: Path) -> None:
     rows = [row(0, settling=True), row(1, settling=False)]
     lines = "".join(json.dumps(vars(item)) + "\n" for item in rows)
-    (tmp_path / "rows_3.jsonl").write_text(lines, encoding="utf-8")
-    assert grown(3, 2, tmp_path) == rows == rows_of(tmp_path / "rows_3.jsonl")
-    assert grown(3, 1, tmp_path) == rows[:1]
+    file = tmp_path / "rows_3.jsonl"
+    file.write_text(lines + '{"index": 2', encoding="utf-8")  # as one that was killed leaves it
+    assert grown(3, 2, tmp_path) == rows and grown(3, 1, tmp_path) == rows[:1]
+    kept = KeptRows(file)
+    kept.add(vars(row(2, settling=True)))
+    assert [Row(**one) for one in KeptRows(file).rows] == [*rows, row(2, settling=True)]
 
 
 def test_the_page_counts_what_holds() -> None:

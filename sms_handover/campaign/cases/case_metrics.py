@@ -10,7 +10,7 @@ from sms_handover.analysis.comparison import Comparison, compare
 from sms_handover.analysis.metrics import RunMetrics
 from sms_handover.analysis.numbers import largest
 from sms_handover.analysis.phases import PhaseSpan
-from sms_handover.analysis.records import UNITS, records_of
+from sms_handover.analysis.records import figures_of, records_of
 from sms_handover.run_data import RunData
 from sms_handover.simulation.scenario import Scenario
 from sms_handover.types import GraspAction, GraspStatus
@@ -59,10 +59,9 @@ def metrics_of(run: RunData, scenario: Scenario, further: Sequence[str]) -> tupl
 
 def known_metrics(scenario: Scenario) -> tuple[str, ...]:
     """Return the names of all metrics that runs of a scenario can have."""
-    phases = ["", *(phase.name for phase in scenario.model.schedule.phases)]
-    arms = ["", *scenario.model.robot.arms]
-    parts = ((phase, arm, figure) for figure in UNITS for phase in phases for arm in arms)
-    return (*USUAL, *(_name(*names) for names in parts))
+    phases = [phase.name for phase in scenario.model.schedule.phases]
+    figures = figures_of(phases, scenario.model.robot.arms)
+    return (*USUAL, *(_name(*figure) for figure in figures))
 
 
 def _name(phase: str, arm: str, figure: str) -> str:

@@ -7,6 +7,7 @@ from io import BytesIO
 from pathlib import Path
 
 from sms_handover.analysis.layout import Row, Section, layout
+from sms_handover.analysis.records import WALL_TIMES
 from sms_handover.campaign.cases.case import CaseResult, Cases
 from sms_handover.campaign.cases.case_metrics import known_metrics
 from sms_handover.campaign.cases.case_row import Row as CaseRow
@@ -75,7 +76,7 @@ def plan_in_words(path: Path) -> str:
     """
     frozen, number = freeze(path)
     require_metrics(frozen, path)
-    cost = _Cost()
+    cost, broken = _Cost(), list[str]()
     with tempfile.TemporaryDirectory(prefix="sms_handover_check_") as folder:
         cases = Cases(frozen, number, Path(folder))
         campaign, count = cases.campaign, cases.samples.count
@@ -83,6 +84,8 @@ def plan_in_words(path: Path) -> str:
             for law in campaign.laws:
                 result = cases.run(Task(0, scenario, law))
                 _require_run(result.row, path)
+                if result.row.status is Status.NUMERIC_FAILURE:
+                    broken.append(f"{result.row.task} is a numeric failure: {result.row.cause}")
                 cost.add(result, campaign.keep)
     runs = count * campaign.runs_per_case
     table = Section("Drawn value", tuple(_draws(campaign)))
@@ -91,6 +94,7 @@ def plan_in_words(path: Path) -> str:
         "",
         f"{count} cases x {len(campaign.scenarios)} scenarios x {len(campaign.laws)} laws = {runs} runs",
         cost.in_words(count, campaign.keep),
+        *broken,
     ]
     if campaign.sampler.kind == SOBOL and count & (count - 1):
         less = 1 << count.bit_length() - 1
@@ -119,6 +123,12 @@ def require_metrics(frozen: Frozen, path: Path) -> None:
         for chosen in campaign.scenarios.values():
             values = {**campaign.values, **chosen.values}
             known = dict.fromkeys(known_metrics(load_scenario(Path(folder) / chosen.source, values)))
+            for metric in (*campaign.success.names, *campaign.metrics, campaign.worst_by):
+                if metric in WALL_TIMES:
+                    raise ConfigurationError(
+                        f"{path}: metric {metric!r} is of wall time, which differs from run to run: take one "
+                        "of simulated time; the page has the solve times of laws that plan"
+                    )
             campaign.success.require_known(known)
             for metric in (*campaign.metrics, campaign.worst_by):
                 if metric not in known:
@@ -126,6 +136,6 @@ def require_metrics(frozen: Frozen, path: Path) -> None:
 
 
 def _require_run(row: CaseRow, path: Path) -> None:
-    """Raise ConfigurationError if the first case could not even be run."""
-    if row.status in (Status.REJECTED, Status.ERROR):
+    """Raise ConfigurationError if the first case could not be run, or not to its end."""
+    if row.status in (Status.REJECTED, Status.ERROR, Status.LIMIT):
         raise ConfigurationError(f"{path}: {row.task}: {row.cause}")
