@@ -1,5 +1,6 @@
 """Documents that campaigns write, of made-up figures: ranking, scale, and the section on equality."""
 
+import sys
 from argparse import Namespace
 from pathlib import Path
 
@@ -98,7 +99,7 @@ def test_the_page_of_the_scale_has_figures_and_bounds() -> None:
 
 
 def test_the_section_on_equality_takes_the_place_of_the_last_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(campaign_equality.sys, "argv", ["", "--cases", "8"])
+    monkeypatch.setattr(sys, "argv", ["", "--cases", "8"])
     tried = [campaign_equality.Tried("a cluster, workers: 2", "16 rows", 3.4)]
     text = campaign_equality.section(Namespace(cases=8, seconds=0.5), tried)
     assert "`python -m benchmarks.campaign_equality --cases 8`: 8 cases of `smooth`" in text

@@ -256,7 +256,8 @@ def test_one_draw_has_a_design_and_a_sensitivity(sampler: object, cases: int, tm
     samples = Samples(campaign)
     drawn = [float(samples.inputs(case)[PATHS[0]]) for case in range(samples.count)]
     assert len(drawn) == cases and -pi < min(drawn) < max(drawn) < pi
-    found = columns(drawn, **{PATHS[0]: drawn})
+    given: dict[str, Any] = {PATHS[0]: drawn}
+    found = columns(drawn, **given)
     (one,) = sensitivities(campaign, found, "grasp_error")
     assert one.first == pytest.approx(2.0 * pi if one.kind == "morris" else 1.0, rel=0.05)
     note = note_on_sampler(campaign.sampler.kind)
