@@ -189,6 +189,7 @@ def test_a_run_without_a_plan_is_a_failed_mission_with_its_cause(
     entries = [Entry(one.row, one.beside) for one in (good, result)]
     assert failures_by_cause(entries) == {
         (
+            "smooth",
             "pid",
             "mission failed",
             "no plan, at rest at # s: rate arm_a_joint_3 is # too large",

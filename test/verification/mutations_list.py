@@ -1201,6 +1201,41 @@ BREAKS: tuple[Break, ...] = (
         'method="holm", is_sorted=False)[1] * 0.5',
         "campaign_statistics",
     ),
+    _core(
+        "a percentile with an interval of too few cases",
+        "campaign/statistics/percentiles",
+        "if low < 0 or high >= known.size:",
+        "low, high = max(low, 0), min(high, known.size - 1)\n    if known.size < 2:",
+        "campaign_statistics",
+    ),
+    _core(
+        "elementary effects by SALib's step, not that of the cases",
+        "campaign/statistics/sensitivity",
+        "np.asarray(found[name]) / MORRIS_SPAN",
+        "np.asarray(found[name])",
+        "campaign_statistics",
+    ),
+    _core(
+        "a p value of cases that are no independent draws",
+        "campaign/statistics/sensitivity",
+        "kind = CORRELATION if campaign.sampler.kind in COUNTED else DESIGNED",
+        "kind = CORRELATION",
+        "campaign_statistics",
+    ),
+    _core(
+        "an approximation of Wilcoxon's test where pairs agree",
+        "campaign/statistics/paired_tests",
+        "apart = differences[differences != 0.0]",
+        "apart = differences if np.any(differences != 0.0) else differences[:0]",
+        "campaign_statistics",
+    ),
+    _core(
+        "tests that can tell nothing passed over in silence",
+        "campaign/statistics/notes",
+        "adjusted = min(1.0, len(made) * least)",
+        "adjusted = least",
+        "campaign_statistics",
+    ),
     # conditions
     _core(
         "noise of a torque by sigma per tick in place of density",

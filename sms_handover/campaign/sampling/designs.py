@@ -13,6 +13,7 @@ from sms_handover.errors import MissingDependencyError
 from sms_handover.types import Array, read_only
 
 _EDGE = 0.01  # [-] share that the outermost levels of morris keep from infinite quantiles
+MORRIS_SPAN = 1.0 - 2.0 * _EDGE  # [-] share from the lowest to the highest level
 _LEAST = 2.0**-53  # [-]
 _HALF_CELL = 2.0**-31  # [-] Sobol's points are the lower corners of cells of 2^-30, of which one is 0
 
@@ -33,7 +34,7 @@ def design(kind: str, numbers: dict[str, int], cases: int | None, size: int, see
         levels = numbers.get("levels", MORRIS_LEVELS)
         sample = needed("SALib.sample.morris", "SALib").sample
         found = sample(problem(size), numbers["trajectories"], num_levels=levels, seed=seed)
-        shares = _EDGE + (1.0 - 2.0 * _EDGE) * found
+        shares = _EDGE + MORRIS_SPAN * found
     elif kind == SALTELLI:
         sample = needed("SALib.sample.sobol", "SALib").sample
         shares = sample(problem(size), numbers["base"], calc_second_order=False, seed=seed)
