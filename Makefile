@@ -94,7 +94,7 @@ clearance: install  ## simulate the shipped handover under each law and write do
 geometries: install  ## try random possible geometries of the handover under both laws, write docs/geometries.md
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m docs.geometries
 
-evidence: $(VENV)/.test  ## run the campaign of the control laws, about ten minutes, and write docs/laws.md
+evidence: $(VENV)/.test  ## run the campaign of the control laws, about half an hour, and write docs/laws.md
 	$(BIN)/python -m docs.evidence
 
 campaign: $(VENV)/.test  ## compare 1000 runs of a campaign bit for bit, however they are run or killed, write docs/campaigns.md

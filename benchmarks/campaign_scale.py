@@ -1,7 +1,7 @@
 """How campaigns scale: rate, memory and bytes per case of the driver over tiny cases; overhead of workers.
 
-``python -m benchmarks.campaign_scale`` measures and writes docs/scale.md; ``--largest 1000 --seconds 0.2
---print`` is a quick look.
+``python -m benchmarks.campaign_scale`` measures and writes docs/scale.md, and ends with an error where a
+figure is beyond its bound; ``--largest 1000 --seconds 0.2 --print`` is a quick look.
 """
 
 import json
@@ -46,6 +46,9 @@ _PER_WORKER = 8  # [-] cases for each worker
 _SATURATION = (
     "distributed.scheduler.worker-saturation"  # [-] tasks that a thread is given at a time, rounded up
 )
+_MOST_OVERHEAD_S = 0.020  # [s] of a case of 3 s, with a worker for each process
+_LEAST_EFFICIENCY = 0.95  # [-] then
+_MOST_GROWTH = 1.10  # [-] of the memory of a driver, from 1e3 to 1e5 cases
 _ONE_EACH, _DASK_HAS = 1.0, 1.1
 _GB, _MB, _MS = 1e9, 1e6, 1e3
 _H = 3600.0  # [s]
@@ -131,6 +134,10 @@ class Pace(NamedTuple):
     overhead: float
     by_default: float | None
 
+    def efficiency(self, seconds: float) -> float:
+        """Return the share of the wall time in which a worker has a case of so many seconds."""
+        return seconds / (seconds + self.overhead)
+
 
 @contextmanager
 def cluster(
@@ -185,6 +192,30 @@ def overhead(workers: int, seconds: float, saturation: float) -> float:
         return (time.perf_counter() - begin) / _PER_WORKER - seconds
 
 
+def growth(drivers: Sequence[Driver]) -> float:
+    """Return the factor by which the memory of a running driver changes from 1e3 cases to the most."""
+    return drivers[-1].running / next(one for one in drivers if one.cases >= CASES[1]).running
+
+
+def beyond(drivers: Sequence[Driver], paces: Sequence[Pace], seconds: float) -> list[str]:
+    """Return each figure that is beyond its bound, in words; bounds are of the full sizes only."""
+    found = []
+    if drivers[-1].cases >= CASES[-1] and growth(drivers) > _MOST_GROWTH:
+        sizes = f"from {CASES[1]:,} to {drivers[-1].cases:,} cases"
+        found.append(f"memory of a driver {sizes}: factor {growth(drivers):.2f}, at most {_MOST_GROWTH:.2f}")
+    for one in paces if seconds >= _CASE_S else ():
+        if one.workers > _PROCESSES:
+            continue
+        where = f"with {one.workers} workers"
+        if one.overhead > _MOST_OVERHEAD_S:
+            figures = (_MS * one.overhead, _MS * _MOST_OVERHEAD_S)
+            found.append(f"overhead of a case {where}: {figures[0]:.1f} ms, at most {figures[1]:.0f} ms")
+        if one.efficiency(seconds) < _LEAST_EFFICIENCY:
+            share = one.efficiency(seconds)
+            found.append(f"efficiency {where}: {share:.3f}, at least {_LEAST_EFFICIENCY}")
+    return found
+
+
 def page(drivers: Sequence[Driver], alone: Driver, paces: Sequence[Pace], seconds: float) -> str:
     """Return the text of the page."""
     rows = [
@@ -195,7 +226,7 @@ def page(drivers: Sequence[Driver], alone: Driver, paces: Sequence[Pace], second
         (
             str(one.workers),
             f"{_MS * one.overhead:.0f}",
-            f"{seconds / (seconds + one.overhead):.3f}",
+            f"{one.efficiency(seconds):.3f}",
             "-" if one.by_default is None else f"{_MS * one.by_default:.0f}",
         )
         for one in paces
@@ -227,7 +258,7 @@ def page(drivers: Sequence[Driver], alone: Driver, paces: Sequence[Pace], second
         "All read [GB]",
     ]
     few, many = (f"{rate * _TASK_S:.0f}" for rate in _TASKS)
-    flat = last.running / next(one for one in drivers if one.cases >= CASES[1]).running
+    flat = growth(drivers)
     cores, most = f"{last.rate * seconds:,.0f}", WORKERS[-1]
     return f"""\
 # Scale of campaigns
@@ -248,14 +279,16 @@ finished journal again, and once all rows are read for the table.
 {table(head, rows)}
 
 From {CASES[1]:,} to {last.cases:,} cases the memory of a driver that runs them changes by a factor
-of {flat:.2f}.
+of {flat:.2f}; the bound is {_MOST_GROWTH:.2f}.
 
 ## Workers
 
 Wall time that a case of {seconds:g} s takes beyond its own, in one run of {_PER_WORKER} cases for each
 worker, start not counted; efficiency is the share of the wall time in which a worker has a case. Up to
 {_PROCESSES} workers are a process each, more are threads of {_PROCESSES} processes, each with a process of
-cases of its own, {most} at last; the stubs sleep, so that there are no cores to be short of.
+cases of its own, {most} at last; the stubs sleep, so that there are no cores to be short of. With up
+to {_PROCESSES} workers a case may take {_MS * _MOST_OVERHEAD_S:.0f} ms beyond its own, and efficiency must be
+{_LEAST_EFFICIENCY} or more; what is not ends the command with an error.
 
 {table(["Workers", "Overhead per case [ms]", "Efficiency", "Overhead, Dask's defaults [ms]"], added)}
 
@@ -317,6 +350,8 @@ def main() -> None:
         print(text)
     else:
         PAGE.write_text(text, encoding="utf-8")
+    if found := beyond(drivers, paces, options.seconds):
+        raise SystemExit(f"BEYOND ITS BOUND: {'; '.join(found)}")
 
 
 if __name__ == "__main__":

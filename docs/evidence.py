@@ -1,24 +1,25 @@
 """Evidence on the control laws: runs the shipped campaign ``laws`` and writes docs/laws.md from its rows."""
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 
 from docs.measurement_folder import measurement_folder
 from docs.tables import plain, table
-from sms_handover.analysis.layout import number
+from sms_handover.analysis.layout import MISSING, number
 from sms_handover.campaign.definition.frozen import campaign_path, freeze
 from sms_handover.campaign.engine.choice import workers_for
 from sms_handover.campaign.engine.run import Tally, run_campaign
 from sms_handover.campaign.record.campaign_folder import CampaignFolder, open_campaign
 from sms_handover.campaign.record.manifest import Shard
 from sms_handover.campaign.statistics.case_columns import CaseColumns, Group, columns_of
+from sms_handover.campaign.statistics.notes import PERCENTILES, note_on_tests
 from sms_handover.campaign.statistics.paired_tests import SUCCESS, paired_tests
-from sms_handover.campaign.statistics.percentiles import percentile
-from sms_handover.campaign.statistics.proportion import proportion
-from sms_handover.campaign.statistics.tables import TESTED
+from sms_handover.campaign.statistics.percentiles import Percentile, percentile
+from sms_handover.campaign.statistics.proportion import Proportion, proportion
 from sms_handover.campaign.statistics.worst_cases import failures_by_cause
 from sms_handover.terminal.progress import Progress
 from sms_handover.types import Array
@@ -37,7 +38,8 @@ _FIGURES = {  # metric: its title, and the factor from its unit
     "rate_share": ("largest share of a rate limit", 1.0),
     "time_beyond_position_limit": ("time beyond position limits [s]", 1.0),
 }
-_RANKED = ("grasp_error", "clearance", "base_turn", "control_effort")  # in the table of all laws
+_RANK = "grasp_error"  # by which laws are ranked after their success, and tested
+_LISTED = (_RANK, "clearance", "base_turn", "control_effort")  # in the table of all laws
 _LIMITS = ("saturated_ticks", "time_above_rate_limit", "time_beyond_position_limit")
 _LARGE, _SMALL = (0.5, 0.95), (0.5, 0.05)  # shares of figures that are bad where large, or where small
 _MOST_CAUSES = 10
@@ -47,11 +49,13 @@ def page(folder: CampaignFolder) -> str:
     """Return the text of the page."""
     campaign, entries = folder.campaign, list(folder.entries())
     columns = columns_of(entries)
+    counted = failures_by_cause(entries).most_common()
     causes = [
-        (law, status, plain(cause), str(times))
-        for (law, status, cause), times in failures_by_cause(entries).most_common(_MOST_CAUSES)
+        (scenario, law, status, plain(cause), str(times))
+        for (scenario, law, status, cause), times in counted[:_MOST_CAUSES]
     ]
     draws = [(f"`{path}`", str(one)) for path, one in campaign.draws.items()]
+    made = paired_tests(columns, [_RANK])
     tests = [
         (
             test.scenario,
@@ -60,14 +64,15 @@ def page(folder: CampaignFolder) -> str:
             str(test.cases),
             *map(number, (test.difference, test.p, test.adjusted)),
         )
-        for test in paired_tests(columns, TESTED)
+        for test in made
     ]
+    further = f"\n{len(counted) - len(causes)} more causes.\n" if len(counted) > len(causes) else ""
     failures = (
-        f"## Failures by cause\n\n{table(['Law', 'Status', 'Cause', 'Cases'], causes)}\n"
+        f"## Failures by cause\n\n{table(['Scenario', 'Law', 'Status', 'Cause', 'Cases'], causes)}\n{further}"
         if causes
         else "No case failed.\n"
     )
-    head = ["Scenario", "Law", "Success", *(_FIGURES[metric][0] for metric in _RANKED)]
+    head = ["Scenario", "Law", "Success", *(_FIGURES[metric][0] for metric in _LISTED)]
     laws, seconds = ", ".join(campaign.laws), campaign.values["common.duration"]
     return f"""\
 # Ranking of the control laws
@@ -91,16 +96,22 @@ there.
 
 ## All laws
 
-By success, then by grasp error. Success has Wilson's 95 % interval, the rest are medians, all with
-intervals below. Beyond limits are cases in which any torque was clipped or any joint was faster, or
-further, than it may; the solve time is the wall time of a plan, which only laws that plan have.
+By success, then by grasp error. Success has Wilson's 95 % interval, the rest are medians, with intervals
+below. **A law is ranked above another only where their intervals of success, or else of the median grasp
+error, are apart; laws of which both overlap are not ranked by this evidence**, as each scenario says. Beyond
+limits are cases in which any torque was clipped or any joint was faster, or further, than it may, among the
+cases that have these figures, with Wilson's interval; the solve time is the wall time of a plan, which only
+laws that plan have. {PERCENTILES}
 
 {table([*head, "Beyond limits", "Solve time [ms]", "CPU of a run [s]"], _ranking(folder, columns))}
 
 {_outcomes(folder, columns)}
 ## Paired tests
 
-McNemar's exact test of successes, Wilcoxon's signed-rank test of metrics, p adjusted by Holm over all.
+McNemar's exact test of successes and Wilcoxon's signed-rank test of the grasp error, by which laws are
+ranked; p adjusted by Holm over all of these. Of the other figures there are intervals.
+
+{note_on_tests(made)}
 
 {table(["Scenario", "Laws", "What", "Cases", "Difference", "p", "p, Holm"], tests)}
 
@@ -120,18 +131,61 @@ def _ranking(folder: CampaignFolder, columns: Mapping[Group, CaseColumns]) -> li
         laws.sort(key=lambda law: _rank(columns[scenario, law]))
         for law in laws:
             one = columns[scenario, law]
-            figures = (_median(one.metrics.get(metric), _FIGURES[metric][1]) for metric in _RANKED)
-            beyond = np.any([one.metrics[name] > 0.0 for name in _LIMITS if name in one.metrics], axis=0)
-            success = str(proportion(int(one.succeeded.sum()), len(one.case)))
+            figures = (_median(one.metrics.get(metric), _FIGURES[metric][1]) for metric in _LISTED)
+            success = str(_success(one))
             costs = (_median(one.solve, _MS_PER_S), number(float(one.cpu.mean())))
-            rows.append((scenario, law, success, *figures, f"{np.sum(beyond)} of {len(one.case)}", *costs))
+            rows.append((scenario, law, success, *figures, _beyond(one), *costs))
     return rows
+
+
+def _success(one: CaseColumns) -> Proportion:
+    """Return the share of successes."""
+    return proportion(int(one.succeeded.sum()), len(one.case))
+
+
+def _beyond(one: CaseColumns) -> str:
+    """Return in how many of the cases that have the figures of all limits one was exceeded."""
+    figures = np.array([one.metrics.get(name, np.full(len(one.case), np.nan)) for name in _LIMITS])
+    known = ~np.isnan(figures).any(axis=0)
+    share = proportion(int((figures[:, known] > 0.0).any(axis=0).sum()), int(known.sum()))
+    return f"{share.successes} of {share.trials}: {share}" if share.trials else MISSING
 
 
 def _rank(one: CaseColumns) -> tuple[float, float]:
     """Return by what laws are sorted, the better the smaller."""
-    errors = one.metrics.get("grasp_error", np.array([np.inf]))
-    return -float(one.succeeded.mean()), float(np.nan_to_num(percentile(errors, 0.5).value, nan=np.inf))
+    errors = one.metrics.get(_RANK, np.array([np.inf]))
+    return -_success(one).share, float(np.nan_to_num(percentile(errors, 0.5).value, nan=np.inf))
+
+
+def _order(laws: Sequence[tuple[str, CaseColumns]]) -> str:
+    """Return which laws are above which others by intervals that are apart, and which are not ranked."""
+    ranked, others = [], []
+    for (law, one), (other, another) in combinations(laws, 2):
+        successes, errors = (_success(one), _success(another)), (_error(one), _error(another))
+        if _apart(*successes):
+            first = successes[0].low > successes[1].high
+            ranked.append(_above(law, other, "success", first=first))
+        elif _apart(*errors):
+            ranked.append(_above(law, other, "grasp error", first=errors[0].high < errors[1].low))
+        else:
+            others.append(f"{law} and {other}")
+    return f"Ranked: {', '.join(ranked) or 'none'}. Not ranked: {', '.join(others) or 'none'}."
+
+
+def _above(law: str, other: str, figure: str, *, first: bool) -> str:
+    """Return which of two laws is above the other, and by what."""
+    better, worse = (law, other) if first else (other, law)
+    return f"{better} above {worse} by {figure}"
+
+
+def _error(one: CaseColumns) -> Percentile:
+    """Return the median grasp error."""
+    return percentile(one.metrics.get(_RANK, np.empty(0)), 0.5)
+
+
+def _apart(one: Proportion | Percentile, other: Proportion | Percentile) -> bool:
+    """Return whether two intervals are apart, not so where there is none."""
+    return one.high < other.low or other.high < one.low
 
 
 def _median(values: Array | None, factor: float) -> str:
@@ -144,7 +198,7 @@ def _outcomes(folder: CampaignFolder, columns: Mapping[Group, CaseColumns]) -> s
     parts = []
     for scenario in folder.campaign.scenarios:
         laws = [(law, columns[scenario, law]) for law in folder.campaign.laws if (scenario, law) in columns]
-        successes = (f"{law}: {proportion(int(one.succeeded.sum()), len(one.case))}" for law, one in laws)
+        successes = (f"{law}: {_success(one)}" for law, one in laws)
         rows = []
         for metric, (title, factor) in _FIGURES.items():
             for share in _SMALL if metric == "clearance" else _LARGE:
@@ -154,14 +208,14 @@ def _outcomes(folder: CampaignFolder, columns: Mapping[Group, CaseColumns]) -> s
         rows.append(("CPU time of a run [s], mean", *(number(float(one.cpu.mean())) for _, one in laws)))
         head = ["Figure", *(law for law, _ in laws)]
         parts.append(
-            f"## Scenario `{scenario}`\n\nSuccess with Wilson's 95 % interval: {'; '.join(successes)}.\n\n"
-            f"{table(head, rows)}\n"
+            f"## Scenario `{scenario}`\n\nSuccess with Wilson's 95 % interval: {'; '.join(successes)}.\n"
+            f"{_order(laws)}\n\n{table(head, rows)}\n"
         )
     return "\n".join(parts)
 
 
 def _percentile(one: CaseColumns, metric: str, share: float, factor: float) -> str:
-    """Return a percentile of a metric with its bootstrap interval."""
+    """Return a percentile of a metric with its interval."""
     return _known(one.metrics[metric], share, factor) if metric in one.metrics else "-"
 
 

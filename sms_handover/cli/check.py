@@ -6,10 +6,12 @@ from enum import Enum
 from math import degrees
 from pathlib import Path
 
+from sms_handover.campaign.definition.frozen import campaign_names, campaign_path
 from sms_handover.campaign.engine.plan import plan_in_words
 from sms_handover.cli.collisions import add_dry_run_options, check_collisions
 from sms_handover.cli.columns import columns
 from sms_handover.cli.options import add_scenario_options, scenario_of
+from sms_handover.configuration.scenario_file import scenario_names
 from sms_handover.configuration.sections import Section
 from sms_handover.errors import ConfigurationError
 from sms_handover.model.robot_model import RobotModel
@@ -20,7 +22,10 @@ from sms_handover.terminal.progress import Progress
 from sms_handover.units import ns_to_seconds
 
 _HEAD = ("phase", "ends [s]", "base rotation [deg]", "IK restarts")
-_OVER_A_SCENARIO = ("controller", "duration", "time_law", "dynamics", "params_file", "param")  # options
+_OVER_A_SCENARIO = (  # options
+    *("controller", "conditions", "duration", "time_law", "dynamics", "params_file", "param"),
+    *("reject_collisions", "no_dry_run"),
+)
 
 
 class _Kind(Enum):
@@ -40,7 +45,7 @@ def add_parser(parser: ArgumentParser) -> None:
         "Check whether a scenario can be run: every value, every target in reach, every grasp at its frame,\n"
         "the sampled loop stable where each phase ends; then by a dry run whether bodies collide. SCENARIO\n"
         "may also be a file with a schedule or with parameters, checked in the default scenario, with a\n"
-        "robot, or with a campaign, whose first case is run."
+        "robot, or with a campaign, or the name of a shipped one, whose first case is run."
     )
     parser.epilog = (
         "Where the targets of a phase were found only after restarts, the run may end elsewhere.\n\n"
@@ -57,6 +62,8 @@ def command(options: Namespace) -> int:
     """Run the command; return the exit code."""
     name = options.scenario
     file = Path(name) if name else None
+    if file and not file.exists() and name not in scenario_names() and name in campaign_names():
+        file = campaign_path(name)
     kind = _kind_of(file) if file and file.exists() else _Kind.SCENARIO
     if file and kind is not _Kind.SCENARIO:
         options.scenario = None
@@ -94,8 +101,7 @@ def _kind_of(file: Path) -> _Kind:
 
 def _check_robot(file: Path, options: Namespace) -> int:
     """Check a robot by itself; return the exit code."""
-    given = [name for name in _OVER_A_SCENARIO if getattr(options, name)]
-    if given:
+    if _given(options, _OVER_A_SCENARIO):
         raise ConfigurationError(
             f"{file} is a robot, checked alone: give --schedule too, or a scenario and --robot {file}"
         )
@@ -108,14 +114,22 @@ def _check_robot(file: Path, options: Namespace) -> int:
 
 def _check_campaign(file: Path, options: Namespace) -> int:
     """Check a campaign; return the exit code."""
-    given = [name for name in (*_OVER_A_SCENARIO, "robot", "schedule") if getattr(options, name)]
+    given = _given(options, (*_OVER_A_SCENARIO, "robot", "schedule"))
     if given:
-        raise ConfigurationError(f"{file} is a campaign, which takes no options: put values into the file")
+        raise ConfigurationError(
+            f"{file} is a campaign, which takes no options, given is {given[0]}: put values into the file"
+        )
     with Progress() as progress:
         progress.show("running the first case of each scenario under each law")
         text = plan_in_words(file)
     print(f"{text}\n\ncampaign {file} can be run")
     return 0
+
+
+def _given(options: Namespace, names: Sequence[str]) -> list[str]:
+    """Return which of some options are given, 0 as any other number."""
+    values = {f"--{name.replace('_', '-')}": getattr(options, name) for name in names}
+    return [name for name, value in values.items() if not (value is None or value is False or value == [])]
 
 
 def _count(robot: RobotModel, arm: str) -> int:

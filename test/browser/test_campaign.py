@@ -44,7 +44,7 @@ class MadeUp(CampaignFolder):
                     case,
                     {MASS: 240.0 + 30.0 * (share - 0.5), X: 1.05 + 0.001 * (case % 11)},
                     status if case % 50 else Status.NUMERIC_FAILURE,
-                    "" if good and case % 50 else f"{EVIL} missed by {case} mm",
+                    "" if good and case % 50 else f"{EVIL} missed by {case} mm, joint_{case % 13}",
                     metrics if case % 50 else {},
                     "00",
                 )
@@ -56,7 +56,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> MadeUp:
     """A folder of a campaign with two laws and two draws."""
     path = tmp_path_factory.mktemp("campaign")
     draws = {MASS: {"normal": {"mean": 240, "std": 9}}, X: {"uniform": {"low": 1.05, "high": 1.06}}}
-    run_here(written(path / "file", draws=draws, laws=["nmpc", "pid"]), path / "out", program=STUB)
+    run_here(
+        written(path / "file", draws=draws, laws=["nmpc", "pid"], sampler="lhs"), path / "out", program=STUB
+    )
     return MadeUp(Path(path / "out"))
 
 
@@ -74,10 +76,19 @@ def test_it_opens_whole_and_without_a_network(browsing: Browsing, html: str, siz
     assert visit.page.evaluate("document.documentElement.scrollWidth") <= size[0]
     frames = "[...document.querySelectorAll('.plot .frame')]"
     drawn = f"{frames}.map((frame) => frame.querySelectorAll('.trace').length)"
-    # success with two bounds, and distribution, two trades, map; bars are traces of their own
-    assert visit.page.evaluate(drawn) == [6, 2, 2, 2, 1]
+    # success with two bounds, and distribution, two trades, a map of each law; bars are traces of their own
+    assert visit.page.evaluate(drawn) == [6, 2, 2, 2, 1, 1]
+    captions = visit.page.locator(".plot figcaption").all_inner_texts()
+    assert [text for text in captions if "over two draws" in text] == [
+        f"smooth: cases under {law} over two draws, what is no success hollow" for law in ("nmpc", "pid")
+    ]
     assert visit.page.locator("#worst details").count() == 10
-    assert EVIL in visit.page.locator("#failures").inner_text()
+    failures = visit.page.locator("#failures")
+    assert EVIL in failures.inner_text() and failures.locator("tbody tr").count() == 20
+    assert failures.locator("tbody th").first.inner_text() == "smooth"
+    assert "more causes, of" in failures.inner_text()
+    notes = visit.page.locator("#summary").inner_text()
+    assert "intervals by order statistics" in notes and "Cases of lhs are spread evenly" in notes
 
 
 def test_ten_thousand_cases_are_no_large_page(folder: MadeUp, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -130,6 +130,23 @@ def test_what_cannot_be_read_back_cannot_be_drawn(path: str) -> None:
         read_back(Loop(load_scenario("smooth")), path)
 
 
+def test_a_drawn_file_is_in_its_row_as_in_its_draw(tmp_path: Path) -> None:
+    """Its run is that under the shipped conditions of the name, bit for bit."""
+    drawn = {"choice": {"values": ["nominal"]}}
+    row = cases_of(tmp_path, draws={"common.conditions": drawn}).run(TASK).row
+    values = {"common.duration": 0.04, "law": "nmpc", "seed": row.seed, "common.conditions": "nominal"}
+    assert row.inputs == {"common.conditions": "nominal"}
+    assert row.run_digest == run_digest(simulate(load_scenario("smooth", values)))
+
+
+def test_a_cause_does_not_depend_on_the_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cases = cases_of(tmp_path)
+    told = f"{tmp_path}/unpacked/scenarios/smooth.yaml:3: {object()!r} of mode 0x10 (at 0x7f00deadbeef)"
+    monkeypatch.setattr(cases, "scenario", lambda task: (_ for _ in ()).throw(KeyError(told)))
+    cause = cases.run(TASK).row.cause
+    assert cause == 'KeyError: "scenarios/smooth.yaml:3: <object object> of mode 0x10 ()"'.replace('"', "'")
+
+
 def test_a_draw_that_does_not_arrive_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     cases = cases_of(tmp_path)
     scenario = load_scenario("smooth", {"common.duration": 0.04})
@@ -172,6 +189,7 @@ def test_a_run_without_a_plan_is_a_failed_mission_with_its_cause(
     entries = [Entry(one.row, one.beside) for one in (good, result)]
     assert failures_by_cause(entries) == {
         (
+            "smooth",
             "pid",
             "mission failed",
             "no plan, at rest at # s: rate arm_a_joint_3 is # too large",

@@ -9,6 +9,7 @@ import sys
 import time
 from argparse import ArgumentParser
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from threading import Thread
 from types import SimpleNamespace
@@ -19,6 +20,7 @@ import psutil
 import pyarrow.parquet as parquet
 import pytest
 
+from sms_handover.analysis.equality import before, compare_runs
 from sms_handover.campaign.cases.case_row import Task
 from sms_handover.campaign.definition.campaign_file import read_campaign
 from sms_handover.campaign.definition.frozen import campaign_path
@@ -33,6 +35,10 @@ from sms_handover.simulation.scenario import load_scenario
 from sms_handover.simulation.simulate import simulate
 
 from .campaigns import MASS, STUB, rows_of, run_here, written
+
+SHORT = {"common.duration": 0.04}
+UNIFORM = {"uniform": {"low": -2, "high": -1}}
+ABORT = {"choice": {"values": ["abort"]}}
 
 
 @pytest.fixture(scope="module")
@@ -227,6 +233,7 @@ def test_an_interrupted_recording_ends_with_all_that_it_has_started(
         (1, 130, 130),  # interrupted: what there is is not compared
         (1, 3, 3),  # messages are missing
         (4, GraphError("container:\nmissed by 4 mm"), 0),
+        (0, GraphError("container:\nmissed by 0 mm"), 1),  # it ends so, and is another run
         (4, GraphError("it hangs"), None),
         (5, GraphError("missed by 4 mm"), None),  # a success has no cause
     ],
@@ -249,6 +256,8 @@ def test_what_becomes_of_a_case_over_dds(
         add_parser=lambda parser: setattr(parser, "parse_args", lambda words: words), command=run
     )
     monkeypatch.setattr(rerun, "import_module", lambda name: takes_words)
+    monkeypatch.setattr(rerun, "read_run", lambda path: simulate(load_scenario("smooth", SHORT)))
+    monkeypatch.setattr(rerun, "run_digest", lambda run: "00" if case else "11")
     parser = ArgumentParser()
     rerun.add_parser(parser)
     options = parser.parse_args([str(recorded(tmp_path)), str(case), "--bag", "-o", str(tmp_path / "bag")])
@@ -257,7 +266,18 @@ def test_what_becomes_of_a_case_over_dds(
             rerun.command(options)
     else:
         assert rerun.command(options) == code
-    assert ("it ends as its row says: missed by 4 mm" in capsys.readouterr().out) is (code == 0)
+    told = capsys.readouterr().out
+    assert ("it ends as its row says: missed by 4 mm" in told) is (code == 0)
+    assert ("equal to its row, bit for bit" in told, "DIFFERS" in told) == (code == 0, code == 1)
+
+
+def test_of_a_run_that_ends_without_a_plan_what_has_commands_is_compared() -> None:
+    """Over DDS there is a state more, at which the law gives up."""
+    run = simulate(load_scenario("smooth", SHORT))
+    assert compare_runs(rerun.commanded(run), run) == ()
+    command = np.where(run.tick_ns[:, None] >= 20_000_000, np.nan, run.joint_command)
+    given_up = rerun.commanded(replace(run, joint_command=command))
+    assert compare_runs(given_up, before(run, 20_000_000)) == () and len(given_up.tick_ns) == 20
 
 
 def test_a_recording_that_fails_says_so_with_its_last_line(
@@ -291,7 +311,11 @@ def test_a_recording_that_fails_says_so_with_its_last_line(
         (["campaign", "run", "FILE", "--shard", "4/3"], "shard '4/3' must be NUMBER/OF"),
         (["campaign", "run", "FILE", "--trust-network"], "--trust-network is for --scheduler"),
         (["campaign", "run", "FILE", "--scheduler", "tcp://10.1.1.1:1"], "is plain TCP to another machine"),
-        (["check", "FILE", "--controller", "pid"], "is a campaign, which takes no options"),
+        (["check", "FILE", "--controller", "pid"], "takes no options, given is --controller: put values"),
+        (["check", "FILE", "--conditions", "harsh"], "takes no options, given is --conditions: put values"),
+        (["check", "laws", "--duration", "0"], "laws.yaml is a campaign, which takes no options, given is"),
+        (["check", "laws", "--no-dry-run"], "takes no options, given is --no-dry-run: put values into"),
+        (["check", "config/robot.yaml", "--conditions", "harsh"], "is a robot, checked alone"),
         (["campaign", "merge", "OUT", "-o", "OUT"], "OUT exists: merge into a new folder"),
     ],
 )
@@ -321,31 +345,31 @@ def test_check_tells_draws_and_cost(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("verb", "changes", "told"),
     [
-        ({"success": "grasp_eror < 1"}, "unknown metric 'grasp_eror' (did you mean 'grasp_error'?)"),
-        ({"metrics": ["approach.arm_c.final_error"]}, "unknown metric 'approach.arm_c.final_error'"),
-        ({"success": "carry.final_error < 1"}, "unknown metric 'carry.final_error' (did you mean"),
-        ({"success": "base_turn < solve_max"}, "metric 'solve_max' is of wall time"),
-        ({"limits": {"ticks": 10}}, "case 0 of smooth under nmpc: more than 10 ticks"),
-        ({"draws": {"robot.base.mas": {"uniform": {"low": 1, "high": 2}}}}, "unknown path 'robot.base.mas'"),
-        ({"draws": {"schedule.phases.carry.on_miss": {"choice": {"values": ["abort"]}}}}, "cannot be drawn"),
+        ("check", {"success": "grasp_eror < 1"}, "unknown metric 'grasp_eror' (did you mean 'grasp_error'?)"),
+        ("check", {"metrics": ["approach.arm_c.final_error"]}, "unknown metric 'approach.arm_c.final_error'"),
+        ("run", {"worst_by": "grasp_eror"}, "unknown metric 'grasp_eror'"),
+        ("check", {"draws": {"robot.base.mas": UNIFORM}}, "unknown path 'robot.base.mas'"),
+        ("run", {"draws": {"schedule.phases.carry.on_miss": ABORT}}, "cannot be drawn"),
+        ("run", {"draws": {"robot.base.mass": UNIFORM}}, "case 0 of smooth under nmpc: robot.base.mass:=-"),
+        (
+            "run",
+            {"draws": {"truth.common.tick": UNIFORM}},
+            "case 0 of smooth under nmpc: value 'truth.common",
+        ),
+        ("check", {"success": "carry.final_error < 1"}, "unknown metric 'carry.final_error' (did you mean"),
+        ("check", {"success": "base_turn < solve_max"}, "metric 'solve_max' is of wall time"),
+        ("check", {"limits": {"ticks": 10}}, "case 0 of smooth under nmpc: more than 10 ticks"),
     ],
 )
-def test_check_finds_what_no_case_could_have(
-    changes: dict[str, object], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_campaign_that_no_case_could_have_does_not_begin(
+    verb: str, changes: dict[str, object], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["check", str(written(tmp_path, **changes))]) == 2
-    assert told in capsys.readouterr().err
-
-
-def test_a_campaign_with_an_unknown_metric_does_not_begin(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = written(tmp_path, worst_by="grasp_eror")
-    assert main(["campaign", "run", str(file), "-o", str(tmp_path / "out")]) == 2
-    assert "unknown metric 'grasp_eror'" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
+    words, out = ["check"] if verb == "check" else ["campaign", "run"], tmp_path / "out"
+    more = [] if verb == "check" else ["-o", str(out)]
+    assert main([*words, str(written(tmp_path, **changes)), *more]) == 2
+    assert told in capsys.readouterr().err.splitlines()[-1] and not out.exists()
 
 
 def test_the_shipped_campaign_is_one() -> None:

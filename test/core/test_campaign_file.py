@@ -10,6 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from sms_handover.campaign.cases.case import Cases
+from sms_handover.campaign.cases.case_row import Task
 from sms_handover.campaign.definition.campaign_file import read_campaign
 from sms_handover.campaign.definition.distributions import (
     Choice,
@@ -21,9 +23,12 @@ from sms_handover.campaign.definition.distributions import (
     correlated,
 )
 from sms_handover.campaign.definition.frozen import freeze, read_frozen
+from sms_handover.campaign.definition.named_files import located
 from sms_handover.campaign.definition.success_expression import success_expression
 from sms_handover.campaign.sampling.samples import Samples
 from sms_handover.campaign.sampling.streams import run_seed
+from sms_handover.configuration.conditions_content import read_conditions_content
+from sms_handover.configuration.documents import as_yaml
 from sms_handover.errors import ConfigurationError
 
 from .campaigns import MASS, written
@@ -31,6 +36,9 @@ from .campaigns import MASS, written
 X = "deputy.in_world.xyz[0]"
 UNIFORM = {"uniform": {"low": -1.0, "high": 2.0}}
 TWO = {MASS: {"normal": {"mean": 240, "std": 12}}, X: UNIFORM}
+SHORT, LONG = {"common.tick": 0.002}, {"common.tick": 0.004}
+ANY = {"mean": 1, "std": 1}
+GRID_CASES = "campaign.yaml:19: sampler grid has 400000000 cases, must be <= 100000000"
 
 
 @pytest.mark.parametrize(
@@ -51,8 +59,44 @@ TWO = {MASS: {"normal": {"mean": 240, "std": 12}}, X: UNIFORM}
         ({"sampler": {"saltelli": {"base": 12}}, "cases": None}, "base is 12, must be a power of two"),
         ({"success": "complete and"}, "success 'complete and' is not an expression over metrics"),
         ({"success": "__import__('os')"}, "is not allowed: see docs/campaigns.md for what is"),
-        ({"stop": {"half_width": 0.1, "looks": [5, 2]}}, "stop.looks must be whole numbers that rise"),
-        ({"stop": {"half_width": 0.1, "looks": [2.5, 5]}}, "stop.looks must be whole numbers that rise"),
+        ({"stop": {"half_width": 0.1, "looks": [5, 2]}}, "stop.looks is [5, 2], must be whole numbers that"),
+        ({"stop": {"half_width": 0.1, "looks": [2.5, 5]}}, "stop.looks is [2.5, 5], must be whole numbers"),
+        (
+            {"stop": {"half_width": 0.1, "looks": [2]}, "sampler": "lhs"},
+            "campaign.yaml:16: stop is for the samplers random and sobol, not for lhs",
+        ),
+        ({"laws": ["nmpc", "nmpc"]}, "campaign.yaml:6: laws is ['nmpc', 'nmpc'], must be one or more of"),
+        ({"metrics": "x"}, "campaign.yaml:16: metrics is 'x', must be a list of texts"),
+        (
+            {"draws": {MASS: {"choice": {"values": 3}}}},
+            "choice.values is 3, must be a list of numbers",
+        ),
+        ({"draws": {MASS: {"choice": {"values": [3], "weights": [0]}}}}, "are [0.0], must have a sum > 0"),
+        ({"correlated": [{"draws": {X: ANY}, "correlation": [[1, 2]]}]}, "is [[1, 2]], must be 1 lists of 1"),
+        ({"sampler": {"grid": {"levels": 20_000}}, "cases": None, "draws": TWO}, GRID_CASES),
+        (
+            {"values": {"common.duration": 1, "seed": 5}},
+            "campaign.yaml:10: seed is set by the campaign",
+        ),
+        (
+            {"values": {"common": {"seed": 5}}},
+            "common.seed is set by the campaign itself: give 'seed' of",
+        ),
+        ({"scenarios": {"a": {"scenario": "smooth", "values": {"law": "pid"}}}}, "give the list 'laws'"),
+        (
+            {"draws": {"controller.law": {"choice": {"values": ["pid"]}}}},
+            "campaign.yaml:11: controller.law is",
+        ),
+        (
+            {"correlated": [{"draws": {"seed": ANY}, "correlation": [[1]]}]},
+            "seed is set by the campaign",
+        ),
+        ({"values": {"common": {"scenario": "paper"}}}, "give 'scenarios' of the campaign"),
+        ({"values": {"common.tick": 1, "common": {"tick": 2}}}, "common.tick is given twice"),
+        (
+            {"values": {"truth": {"robot": {"arms": [{"description": "a.yaml"}]}}}},
+            "truth.robot.arms[0].description names the file 'a.yaml', which a campaign cannot keep",
+        ),
         ({"keep": {"worst": 1, "worst_as": "bags"}}, "unknown choice 'bags' (did you mean 'bag'?)"),
         ({"keep": {"worst_as": "bag"}}, "keep.worst_as is for the cases of keep.worst, which is 0: give it"),
         ({"correlated": [{"draws": {MASS: {"mean": 1, "std": 1}}, "correlation": [[1]]}]}, "is drawn twice"),
@@ -67,6 +111,8 @@ def test_what_is_wrong_is_told_with_its_line(changes: dict[str, Any], told: str,
 QUANTILES: list[tuple[Distribution, Any]] = [
     (Normal(3.0, 2.0), stats.norm(3.0, 2.0)),
     (Truncated(3.0, 2.0, 2.0, 4.5), stats.truncnorm(-0.5, 0.75, 3.0, 2.0)),
+    (Truncated(1.0, 2.0, 17.0, 19.0), stats.truncnorm(8.0, 9.0, 1.0, 2.0)),
+    (Truncated(1.0, 2.0, -71.0, -39.0), stats.truncnorm(-36.0, -20.0, 1.0, 2.0)),
     (Uniform(-1.0, 3.0), stats.uniform(-1.0, 4.0)),
     (Integers(-2, 5), stats.randint(-2, 6)),
 ]
@@ -79,9 +125,15 @@ def test_quantiles_are_those_of_scipy(ours: Distribution, theirs: Any) -> None:
     np.testing.assert_allclose(found, theirs.ppf(shares), rtol=1e-9)
 
 
+def test_bounds_that_no_draw_is_within_are_rejected() -> None:
+    with pytest.raises(ConfigurationError, match=r"bounds are \[40, 41\], .* probability >= 1e-300"):
+        Truncated(0.0, 1.0, 40.0, 41.0)
+
+
 def test_a_choice_takes_values_by_their_weights() -> None:
     choice = Choice(("a", True, 3), (1.0, 0.0, 3.0))
     assert [choice.quantile(share) for share in (0.01, 0.24, 0.26, 1.0 - 1e-16)] == ["a", "a", 3, 3]
+    assert choice.options == ("a", 3), "a grid has what is drawn"
 
 
 def test_correlated_draws_have_their_correlation() -> None:
@@ -138,6 +190,11 @@ def test_designs_have_their_cases(sampler: Any, cases: int | None, count: int, t
     assert all(-1.0 <= float(one[X]) <= 2.0 and 180.0 < float(one[MASS]) < 300.0 for one in drawn)
     if sampler == "lhs":  # one case in each tenth
         assert sorted(int((float(one[X]) + 1.0) / 0.3) for one in drawn) == list(range(10))
+    if sampler == "sobol" or "saltelli" in sampler:  # in the middles of cells: a corner is an infinite draw
+        assert set(found.design.ravel() * 2.0**30 % 1.0) == {0.5}
+    if "grid" in sampler:
+        assert [one[X] for one in drawn] == [-0.5, 0.5, 1.5] * 3
+        assert [one[MASS] for one in drawn[2:4]] == [drawn[0][MASS], 240.0]
     if sampler == "sobol":  # more cases leave those that are there
         more = samples(tmp_path / "more", sampler=sampler, cases=40, draws=TWO)
         assert [more.inputs(case) for case in range(count)] == drawn
@@ -157,20 +214,84 @@ def test_a_table_has_the_cases(tmp_path: Path) -> None:
 
 
 def test_what_is_frozen_needs_no_other_file_and_no_number_of_cases(tmp_path: Path) -> None:
-    (tmp_path / "mine.yaml").write_text("extends: smooth\nlaw: pid\n", encoding="utf-8")
-    file = written(tmp_path, scenarios={"mine": {"scenario": "mine.yaml", "values": {"seed": 2}}})
+    mesh = "robot: {clearance: {shapes: {base_link: [{mesh: {file: base.stl}}]}}}\n"
+    (tmp_path / "mine.yaml").write_text(f"extends: smooth\nlaw: pid\n{mesh}", encoding="utf-8")
+    (tmp_path / "base.stl").write_text("solid", encoding="utf-8")
+    file = written(tmp_path, scenarios={"mine": {"scenario": "mine.yaml", "values": SHORT}})
     frozen, number = freeze(file)
     (tmp_path / "mine.yaml").unlink()
     frozen.unpacked(tmp_path / "there", number)
     assert read_frozen(tmp_path / "there").digest == frozen.digest and number == 4
     again, none = freeze(tmp_path / "there" / "campaign.yaml")  # what a folder has goes on by itself
     assert again.digest == frozen.digest and none is None
-    (tmp_path / "mine.yaml").write_text("extends: smooth\nlaw: pid\n", encoding="utf-8")
-    same = freeze(
-        written(tmp_path, scenarios={"mine": {"scenario": "mine.yaml", "values": {"seed": 2}}}, cases=9)
-    )
-    other = freeze(written(tmp_path, scenarios={"mine": {"scenario": "mine.yaml", "values": {"seed": 3}}}))
+    (tmp_path / "mine.yaml").write_text(f"extends: smooth\nlaw: pid\n{mesh}", encoding="utf-8")
+    same = freeze(written(tmp_path, scenarios={"mine": {"scenario": "mine.yaml", "values": SHORT}}, cases=9))
+    other = freeze(written(tmp_path, scenarios={"mine": {"scenario": "mine.yaml", "values": LONG}}))
     assert same[0].digest == frozen.digest != other[0].digest
+    (tmp_path / "base.stl").write_text("another solid", encoding="utf-8")  # which stays where it is
+    assert freeze(file)[0].files["meshes.yaml"] != frozen.files["meshes.yaml"]
+
+
+def test_files_that_values_name_are_frozen_by_their_content(tmp_path: Path) -> None:
+    """Shipped ones too, which another version of the package may change; of these rows have the name."""
+    ours = as_yaml(read_conditions_content(Path("nominal")))
+    (tmp_path / "mine.yaml").write_text(ours, encoding="utf-8")
+    (tmp_path / "schedule.yaml").write_text("# as it was written\nphases: []\n", encoding="utf-8")
+    drawn = {"choice": {"values": ["nominal", "./mine.yaml"]}}
+    file = written(
+        tmp_path,
+        values={
+            "common": {"conditions": "./mine.yaml"},
+            "common.schedule": "schedule.yaml",
+            "common.robot": "",
+        },
+        scenarios={"a": {"scenario": "smooth", "values": {"common.conditions": "harsh"}}},
+        draws={"common.conditions": drawn},
+    )
+    frozen, number = freeze(file)
+    assert {name for name in frozen.files if not name.startswith("scenarios")} == {
+        *("campaign.yaml", "schedules/schedule.yaml"),
+        *(f"conditions/{name}.yaml" for name in ("nominal", "harsh", "mine")),
+    }
+    assert frozen.files["conditions/nominal.yaml"] == frozen.files["conditions/mine.yaml"] == ours
+    changed = ours.replace("rotor_inertia: 0.", "rotor_inertia: 1.")
+    (tmp_path / "mine.yaml").write_text(changed, encoding="utf-8")
+    assert freeze(file)[0].digest != frozen.digest
+    frozen.unpacked(tmp_path / "there", number)
+    assert read_frozen(tmp_path / "there").digest == frozen.digest
+    assert freeze(tmp_path / "there" / "campaign.yaml")[0].digest == frozen.digest
+    cases = Cases(frozen, number, tmp_path / "there")
+    values = [cases.values(Task(case, "a", "nmpc")) for case in range(4)]
+    assert {one["common.conditions"] for one in values} == {
+        str(tmp_path / "there" / "conditions" / name) for name in ("nominal.yaml", "mine.yaml")
+    }
+    assert values[0]["common.schedule"] == str(tmp_path / "there/schedules/schedule.yaml")
+    assert {cases.samples.inputs(case)["common.conditions"] for case in range(4)} == {
+        *("nominal", "conditions/mine.yaml")
+    }
+    (tmp_path / "there/conditions/nominal.yaml").unlink()  # as in folders of before
+    assert located({"common.conditions": "nominal"}, tmp_path / "there") == {"common.conditions": "nominal"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"values": {"common.conditions": "no.yaml"}}, "campaign.yaml:9: cannot read"),
+        (
+            {"values": {"common.conditions": "nominl"}},
+            "unknown conditions 'nominl' (did you mean 'nominal'?)",
+        ),
+        (
+            {"sampler": {"list": {"file": "t.csv"}}, "cases": None, "draws": None},
+            "common.conditions is 'x.yaml': a table names no files but shipped conditions, harsh, ideal,",
+        ),
+    ],
+)
+def test_a_file_that_cannot_be_frozen_is_told(changes: dict[str, Any], told: str, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("common.conditions\nnominal\nx.yaml\n", encoding="utf-8")
+    with pytest.raises(ConfigurationError) as error:
+        freeze(written(tmp_path, **changes))
+    assert told in str(error.value) and "campaign.yaml" in str(error.value)
 
 
 METRICS = {"a": 2.0, "b.c": -1.0, "none": None, "odd name": 0.5}
@@ -186,7 +307,12 @@ METRICS = {"a": 2.0, "b.c": -1.0, "none": None, "odd name": 0.5}
         ("'odd name' < 1", True),
         ("true and not false", True),
         ("none < 1", False),
-        ("not none < 1", True),
+        ("none != 1 or 1 != none", False),
+        ("not none < 1", False),
+        ("not (a < 1 or none > 1)", False),
+        ("not (a < 1 and none > 1)", True),
+        ("none > 1 or a == 2", True),
+        ("none > 1 and a == 2", False),
         ("not none", False),
         ("none", False),
         ("max(1, none) > 0", False),

@@ -1,6 +1,7 @@
 """Case of a campaign: one run as a pure function of campaign, case, scenario and law."""
 
 import platform
+import re
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -16,6 +17,7 @@ from sms_handover.campaign.cases.read_back import is_exact, is_same, read_back
 from sms_handover.campaign.definition.campaign_file import Campaign
 from sms_handover.campaign.definition.distributions import Value
 from sms_handover.campaign.definition.frozen import Frozen
+from sms_handover.campaign.definition.named_files import is_file_path, located
 from sms_handover.campaign.sampling.samples import Samples
 from sms_handover.campaign.sampling.streams import run_seed
 from sms_handover.errors import ConfigurationError, ControllerError, NoPlanError
@@ -28,6 +30,7 @@ from sms_handover.simulation.simulate import RunWithoutPlanError, run_of
 from sms_handover.types import Array
 
 _ONE_LINE = 300  # [characters] of a cause
+_ADDRESS = re.compile(r" ?\b(at )?0x[0-9a-fA-F]{6,}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +56,31 @@ class Cases:
         campaign = self.campaign
         seed = {"seed": run_seed(campaign.seed, task.case)}
         own = campaign.scenarios[task.scenario].values
-        return {**seed, **campaign.values, **own, **self.samples.inputs(task.case), "law": task.law}
+        given = located({**campaign.values, **own, **self.samples.inputs(task.case)}, self._folder)
+        return {**seed, **given, "law": task.law}
 
     def scenario(self, task: Task) -> Scenario:
         """Return the scenario of a run with its values; raises ConfigurationError."""
         source = self.campaign.scenarios[task.scenario].source
         return load_scenario(self._folder / source, self.values(task))
+
+    def read_inputs(self, loop: Loop, case: int, inputs: dict[str, Value]) -> None:
+        """Fill in the drawn values of a case as plant and model have them, files by the names in the draw.
+
+        Raises ConfigurationError on one that cannot be read back, RuntimeError on one that did not arrive.
+        """
+        drawn = self.samples.inputs(case)
+        for path, asked in located(drawn, self._folder).items():
+            found = read_back(loop, path)
+            inputs[path] = drawn[path] if is_file_path(path) and found == asked else found
+            if is_exact(loop, path) and not is_same(asked, found):
+                raise RuntimeError(f"{path} was drawn as {asked}, and is {found}")
+
+    def _in_one_line(self, cause: str) -> str:
+        """Return a cause without what depends on the process: our folder, and addresses in memory."""
+        for folder in (self._folder.resolve(), self._folder):
+            cause = cause.replace(f"{folder}/", "")
+        return " ".join(_ADDRESS.sub("", cause).split())[:_ONE_LINE]
 
     def run(self, task: Task) -> CaseResult:
         """Return what comes of a case; never raises because of it."""
@@ -78,7 +100,7 @@ class Cases:
         except Exception as error:
             status, cause = Status.ERROR, f"{type(error).__name__}: {error}"
         digest = run_digest(run) if run is not None else ""
-        row = Row(task, seed, inputs, status, " ".join(cause.split())[:_ONE_LINE], metrics, digest)
+        row = Row(task, seed, inputs, status, self._in_one_line(cause), metrics, digest)
         plans = plan_use(run) if run is not None else None
         spent = Beside(
             time.process_time() - cpu,
@@ -96,10 +118,7 @@ class Cases:
         scenario = self.scenario(task)
         campaign.success.require_known(dict.fromkeys(known_metrics(scenario)))
         loop = Loop(scenario)
-        for path, asked in self.samples.inputs(task.case).items():
-            inputs[path] = read_back(loop, path)
-            if is_exact(loop, path) and not is_same(asked, inputs[path]):
-                raise RuntimeError(f"{path} was drawn as {asked}, and is {inputs[path]}")
+        self.read_inputs(loop, task.case, inputs)
         most, done = campaign.limits.ticks, 0
 
         def is_beyond(ticks: Ticks | QuietPeriods) -> bool:

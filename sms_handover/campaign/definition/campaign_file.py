@@ -1,11 +1,10 @@
 """Campaign file: which scenarios run under which laws with which draws, and what is made of them."""
 
-import csv
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
+from reprlib import repr as shortened
 from types import MappingProxyType
 from typing import Any
 
@@ -17,7 +16,6 @@ from sms_handover.campaign.definition.distributions import (
     Normal,
     Truncated,
     Uniform,
-    Value,
     correlated,
 )
 from sms_handover.campaign.definition.fields import (
@@ -26,18 +24,18 @@ from sms_handover.campaign.definition.fields import (
     DATA,
     EXTENDABLE,
     LIST,
-    MORRIS,
+    MOST_CASES,
     NONE,
     RANDOM,
 )
+from sms_handover.campaign.definition.sampler import Sampler, cases_of, read_sampler
 from sms_handover.campaign.definition.success_expression import SuccessExpression, success_expression
+from sms_handover.campaign.definition.values import read_values, require_settable
 from sms_handover.configuration.sections import Section
-from sms_handover.configuration.yaml_reader import load_value, read_text
 from sms_handover.control.registry import law_names, require_law
 from sms_handover.errors import ConfigurationError
 
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
-_LARGEST_TABLE = 2**26  # [byte] of a CSV file of cases
 
 
 @dataclass(frozen=True)
@@ -46,15 +44,6 @@ class ScenarioChoice:
 
     source: str
     values: Mapping[str, object]
-
-
-@dataclass(frozen=True)
-class Sampler:
-    """How cases are spread: the kind, the numbers it takes, and the rows of a table."""
-
-    kind: str
-    numbers: Mapping[str, int]
-    rows: tuple[Mapping[str, Value], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -126,7 +115,7 @@ def read_campaign(path: Path, cases: int | None = None) -> Campaign:
     name = root.text("name")
     if not _NAME.fullmatch(name):
         raise root.error(f"name is {name!r}, must be 1 to 64 letters, digits, _ or -", "name")
-    sampler = _sampler(root, path.parent)
+    sampler = read_sampler(root, path.parent)
     if "cases" in root and sampler.kind not in COUNTED:
         raise root.error(f"sampler {sampler.kind} has its own number of cases: leave cases out", "cases")
     if cases is not None and sampler.kind not in EXTENDABLE:
@@ -138,6 +127,8 @@ def read_campaign(path: Path, cases: int | None = None) -> Campaign:
     draws = _draws(root)
     groups = _groups(root)
     _require_apart(root, draws, groups, sampler)
+    if sampler.kind not in COUNTED and (count := cases_of(sampler, list(draws.values()))) > MOST_CASES:
+        raise root.error(f"sampler {sampler.kind} has {count} cases, must be <= {MOST_CASES}", "sampler")
     with root.located("success"):
         success = success_expression(root.text("success") if "success" in root else "complete")
     return Campaign(
@@ -148,54 +139,16 @@ def read_campaign(path: Path, cases: int | None = None) -> Campaign:
         sampler=sampler,
         scenarios=MappingProxyType(_scenarios(root)),
         laws=_laws(root),
-        values=MappingProxyType(_values(root)),
+        values=MappingProxyType(read_values(root)),
         draws=MappingProxyType(draws),
         groups=groups,
         success=success,
         metrics=_texts(root, "metrics"),
         worst_by=root.text("worst_by") if "worst_by" in root else "grasp_error",
-        stop=_stop(root),
+        stop=_stop(root, sampler.kind),
         keep=_keep(root),
         limits=_limits(root),
     )
-
-
-def _sampler(root: Section, folder: Path) -> Sampler:
-    """Return how cases are spread."""
-    value = root.value("sampler") if "sampler" in root else RANDOM
-    if isinstance(value, str):
-        return Sampler(root.name("sampler", "sampler", COUNTED) if "sampler" in root else RANDOM, {})
-    section = root.section("sampler")
-    kind = section.one_of("sampler")
-    inner = section.section(kind)
-    if kind == LIST:
-        with inner.located("file"):
-            return Sampler(kind, {}, _table(folder / inner.text("file")))
-    numbers = {key: int(inner.number(key)) for key in inner.keys}
-    base, levels = numbers.get("base", 2), numbers.get("levels", 2)
-    if base & (base - 1):
-        raise inner.error(f"{inner.path('base')} is {base}, must be a power of two", "base")
-    if kind == MORRIS and levels % 2:
-        raise inner.error(f"{inner.path('levels')} is {levels}, must be even", "levels")
-    return Sampler(kind, MappingProxyType(numbers))
-
-
-def _table(path: Path) -> tuple[Mapping[str, Value], ...]:
-    """Return the rows of a CSV file, whose header has the dotted paths; raises ConfigurationError."""
-    try:
-        text = read_text(path, _LARGEST_TABLE)
-    except (OSError, ValueError) as error:
-        raise ConfigurationError(f"cannot read {path}: {error}") from error
-    header, *rows = [row for row in csv.reader(StringIO(text)) if row] or [[]]
-    if not rows or not all(header) or len(set(header)) < len(header):
-        raise ConfigurationError(f"{path} must have a header of different dotted paths and a row per case")
-    found = []
-    for number, row in enumerate(rows, start=2):
-        if len(row) != len(header):
-            raise ConfigurationError(f"{path}: row {number} has {len(row)} cells, must have {len(header)}")
-        values = [load_value(cell, f"{path}: row {number}: {cell}") for cell in row]
-        found.append(MappingProxyType(dict(zip(header, values, strict=True))))
-    return tuple(found)
 
 
 def _scenarios(root: Section) -> dict[str, ScenarioChoice]:
@@ -209,7 +162,7 @@ def _scenarios(root: Section) -> dict[str, ScenarioChoice]:
             found[name] = ScenarioChoice(section.text(name), MappingProxyType({}))
         else:
             inner = section.section(name)
-            found[name] = ScenarioChoice(inner.text("scenario"), MappingProxyType(_values(inner)))
+            found[name] = ScenarioChoice(inner.text("scenario"), MappingProxyType(read_values(inner)))
     if not found:
         raise root.error("scenarios is empty, must have at least one", "scenarios")
     return found
@@ -221,7 +174,8 @@ def _laws(root: Section) -> tuple[str, ...]:
     for law in laws:
         require_law(law, f"{root.where('laws')}: laws")
     if not laws or len(set(laws)) < len(laws):
-        raise root.error(f"laws must be one or more of {', '.join(law_names())}, each once", "laws")
+        known = ", ".join(law_names())
+        raise root.error(f"laws is {list(laws)}, must be one or more of {known}, each once", "laws")
     return laws
 
 
@@ -229,16 +183,8 @@ def _texts(root: Section, key: str) -> tuple[str, ...]:
     """Return the texts of a key, none if it is not given."""
     value = root.value(key) if key in root else []
     if not isinstance(value, list) or not all(isinstance(item, str) and item for item in value):
-        raise root.error(f"{root.path(key)} must be a list of texts", key)
+        raise root.error(f"{root.path(key)} is {shortened(value)}, must be a list of texts", key)
     return tuple(value)
-
-
-def _values(section: Section) -> dict[str, object]:
-    """Return the values of a section by dotted path."""
-    if "values" not in section:
-        return {}
-    values = section.section("values")
-    return {path: values.value(path) for path in values.keys}
 
 
 def _draws(root: Section) -> dict[str, Distribution]:
@@ -246,6 +192,9 @@ def _draws(root: Section) -> dict[str, Distribution]:
     if "draws" not in root:
         return {}
     section = root.section("draws")
+    for path in section.keys:
+        with section.located(path):
+            require_settable(path)
     return {path: _distribution(section.section(path), path) for path in section.keys}
 
 
@@ -270,7 +219,11 @@ def _choice(section: Section) -> Choice:
     """Return a choice of plain values."""
     values = section.value("values")
     if not isinstance(values, list) or not all(isinstance(item, bool | int | float | str) for item in values):
-        raise section.error(f"{section.path('values')} must be a list of numbers, texts or true and false")
+        raise section.error(
+            f"{section.path('values')} is {shortened(values)}, must be a list of numbers, texts or true and "
+            "false",
+            "values",
+        )
     weights = section.vector("weights", missing=(1.0,) * len(values))
     return Choice(tuple(values), weights)
 
@@ -282,6 +235,9 @@ def _groups(root: Section) -> tuple[Correlated, ...]:
     found = []
     for section in root.sections("correlated"):
         draws = section.section("draws")
+        for path in draws.keys:
+            with draws.located(path):
+                require_settable(path)
         each = {path: draws.section(path) for path in draws.keys}
         normals = {path: Normal(one.number("mean"), one.number("std")) for path, one in each.items()}
         with section.located("correlation"):
@@ -305,15 +261,22 @@ def _require_apart(
         raise root.error(f"sampler {sampler.kind} needs independent draws: leave correlated out", "sampler")
 
 
-def _stop(root: Section) -> StopRule | None:
-    """Return when to stop early."""
+def _stop(root: Section, kind: str) -> StopRule | None:
+    """Return when to stop early, which takes a sampler whose first cases are a sample of all."""
     if "stop" not in root:
         return None
+    if kind not in EXTENDABLE:
+        raise root.error(
+            f"stop is for the samplers {' and '.join(EXTENDABLE)}, not for {kind}, whose first cases are no "
+            "sample of all: leave stop out",
+            "stop",
+        )
     section = root.section("stop")
     numbers = section.vector("looks")
     looks = tuple(int(look) for look in numbers)
     if list(numbers) != sorted(set(looks)) or not looks:
-        raise section.error(f"{section.path('looks')} must be whole numbers that rise", "looks")
+        told = shortened([f"{number:g}" for number in numbers]).replace("'", "")
+        raise section.error(f"{section.path('looks')} is {told}, must be whole numbers that rise", "looks")
     return StopRule(section.number("half_width"), looks)
 
 
@@ -345,12 +308,3 @@ def _limits(root: Section) -> Limits:
         **{key: section.number(key) for key in ("wall_time", "memory") if key in section},
     }
     return Limits(**given)
-
-
-def csv_file_of(path: Path) -> Path | None:
-    """Return the table that a campaign file names, None if it names none."""
-    root = Section.read(path, spec=CAMPAIGN_FIELDS)
-    if "sampler" not in root or isinstance(root.value("sampler"), str):
-        return None
-    section = root.section("sampler")
-    return path.parent / section.section(LIST).text("file") if LIST in section else None

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import floor
+from math import erfc, floor, sqrt
+from reprlib import repr as shortened
 from statistics import NormalDist
 from typing import Protocol
 
@@ -30,14 +31,21 @@ class Distribution(Protocol):
         """Return it in words."""
 
 
+class _Range:
+    """A distribution that fills a range."""
+
+    @property
+    def options(self) -> tuple[Value, ...]:
+        """None: its values are not few."""
+        return ()
+
+
 @dataclass(frozen=True)
-class Normal:
+class Normal(_Range):
     """A normal distribution."""
 
     mean: float
     std: float
-
-    options: tuple[Value, ...] = ()
 
     def quantile(self, share: float) -> float:
         """Return mean + std z with the standard normal quantile z; the mean itself without a spread."""
@@ -48,7 +56,7 @@ class Normal:
 
 
 @dataclass(frozen=True)
-class Truncated:
+class Truncated(_Range):
     """A normal distribution of which only what is within bounds is drawn."""
 
     mean: float
@@ -56,43 +64,50 @@ class Truncated:
     low: float
     high: float
 
-    options: tuple[Value, ...] = ()
-
     def __post_init__(self) -> None:
         _require_order(self.low, self.high)
         if self.std == 0.0 and not self.low <= self.mean <= self.high:
             raise ConfigurationError(f"mean is {self.mean:g}, must be within [{self.low:g}, {self.high:g}]")
-        if self.std and not self._shares[0] < self._shares[1]:
+        if self.std and not self._shares[1] - self._shares[0] >= _LEAST_WITHIN:
             raise ConfigurationError(
-                f"bounds [{self.low:g}, {self.high:g}] are too far from the mean {self.mean:g}"
+                f"bounds are [{self.low:g}, {self.high:g}], within which a draw with mean {self.mean:g} and "
+                f"std {self.std:g} must be with a probability >= {_LEAST_WITHIN:g}: set them nearer to it"
             )
 
     @property
+    def _is_mirrored(self) -> bool:
+        """Whether both bounds are above the mean, where only the mirrored shares keep their digits."""
+        return self.low > self.mean
+
+    @property
     def _shares(self) -> tuple[float, float]:
-        """The shares of the whole distribution that lie below the bounds."""
-        low, high = (_STANDARD.cdf((bound - self.mean) / self.std) for bound in (self.low, self.high))
-        return low, high
+        """The shares of the whole distribution, mirrored where that is needed, that lie below the bounds."""
+        bounds = [(bound - self.mean) / self.std for bound in (self.low, self.high)]
+        if self.low <= self.mean <= self.high:
+            return _STANDARD.cdf(bounds[0]), _STANDARD.cdf(bounds[1])
+        low, high = (-bounds[1], -bounds[0]) if self._is_mirrored else bounds
+        return _tail(low), _tail(high)
 
     def quantile(self, share: float) -> float:
         """Return the quantile of the part within the bounds."""
         if self.std == 0.0:
             return self.mean
-        low, high = self._shares
-        within = min(max(low + share * (high - low), _LEAST), 1.0 - _LEAST)
-        return min(max(self.mean + self.std * _STANDARD.inv_cdf(within), self.low), self.high)
+        (low, high), mirrored = self._shares, self._is_mirrored
+        within = low + (1.0 - share if mirrored else share) * (high - low)
+        deviate = _STANDARD.inv_cdf(min(max(within, _LEAST_WITHIN), 1.0 - _LEAST))
+        value = self.mean + self.std * (-deviate if mirrored else deviate)
+        return min(max(value, self.low), self.high)
 
     def __str__(self) -> str:
         return f"normal, mean {self.mean:g}, std {self.std:g}, within [{self.low:g}, {self.high:g}]"
 
 
 @dataclass(frozen=True)
-class Uniform:
+class Uniform(_Range):
     """A uniform distribution."""
 
     low: float
     high: float
-
-    options: tuple[Value, ...] = ()
 
     def __post_init__(self) -> None:
         _require_order(self.low, self.high)
@@ -109,29 +124,32 @@ class Uniform:
 class Choice:
     """One of some values, by their weights."""
 
-    options: tuple[Value, ...]
+    values: tuple[Value, ...]
     weights: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        if not self.options:
-            raise ConfigurationError("a choice needs at least one value")
-        if len(self.weights) != len(self.options):
+        if not self.values:
+            raise ConfigurationError("a choice has [] as values, must have at least one")
+        if len(self.weights) != len(self.values):
             raise ConfigurationError(
-                f"a choice of {len(self.options)} values has {len(self.weights)} weights: give one for each"
+                f"a choice of {len(self.values)} values has {len(self.weights)} weights: give one for each"
             )
         if not sum(self.weights) > 0.0:
-            raise ConfigurationError("the weights of a choice must have a sum > 0")
+            raise ConfigurationError(f"the weights of a choice are {list(self.weights)}, must have a sum > 0")
+
+    @property
+    def options(self) -> tuple[Value, ...]:
+        """Those of its values that are ever drawn."""
+        return tuple(value for value, weight in zip(self.values, self.weights, strict=True) if weight)
 
     def quantile(self, share: float) -> Value:
         """Return the first value up to which the weights make more than a share of their sum."""
         left = share * sum(self.weights)
-        for value, weight in zip(self.options, self.weights, strict=True):
+        for value, weight in zip(self.values, self.weights, strict=True):
             left -= weight
             if left < 0.0:
                 return value
-        return next(
-            value for value, weight in zip(self.options[::-1], self.weights[::-1], strict=True) if weight
-        )
+        return self.options[-1]
 
     def __str__(self) -> str:
         return f"one of {', '.join(map(str, self.options))}"
@@ -176,22 +194,23 @@ class Correlated:
 
 
 _FEW = 1000  # [-] whole numbers of which a grid takes each
-_LEAST = 2.0**-53  # [-] a share nearer to 0 or 1 is that of an infinite quantile
+_LEAST = 2.0**-53  # [-] a share nearer to 1 is that of an infinite quantile
+_LEAST_WITHIN = 1e-300  # [-] share up to which quantiles of the lower tail have all their digits
 
 
 def correlated(normals: dict[str, Normal], matrix: object) -> Correlated:
     """Return draws of a correlation matrix; raises ConfigurationError unless it is one."""
     size = len(normals)
-    rows = matrix if isinstance(matrix, list) else []
+    rows, told = matrix if isinstance(matrix, list) else [], f"correlation is {shortened(matrix)}, must be"
     if len(rows) != size or not all(isinstance(row, list) and len(row) == size for row in rows):
-        raise ConfigurationError(f"correlation must be {size} lists of {size} numbers")
+        raise ConfigurationError(f"{told} {size} lists of {size} numbers")
     try:
         array = np.array(rows, dtype=np.float64)
         factor = np.linalg.cholesky(array)
     except (ValueError, TypeError, np.linalg.LinAlgError):
-        raise ConfigurationError("correlation must be a positive definite matrix of numbers") from None
+        raise ConfigurationError(f"{told} a positive definite matrix of numbers") from None
     if not (np.array_equal(array, array.T) and (np.diag(array) == 1.0).all()):
-        raise ConfigurationError("correlation must be symmetric with 1 on its diagonal")
+        raise ConfigurationError(f"{told} symmetric with 1 on its diagonal")
     return Correlated(normals, read_only(factor))
 
 
@@ -207,3 +226,8 @@ def _require_order(low: float, high: float) -> None:
     """Raise ConfigurationError unless bounds are in order."""
     if low > high:
         raise ConfigurationError(f"low is {low:g}, must be <= high, which is {high:g}")
+
+
+def _tail(deviate: float) -> float:
+    """Return the share of the standard normal distribution below a deviate <= 0, with all its digits."""
+    return erfc(-deviate / sqrt(2.0)) / 2.0

@@ -79,7 +79,7 @@ _SAMPLER = EitherSpec(
     ),
 )
 _STOP = MappingSpec(
-    "stop early, looked at only after fixed numbers of cases",
+    "stop early, looked at only after fixed numbers of cases; for the samplers random and sobol",
     {
         "half_width": ValueSpec(
             "of Wilson's 95 % interval of every law's success, from which it is enough",

@@ -1,4 +1,4 @@
-"""Frozen campaign: its file with every scenario and table that it names, which nothing outside changes."""
+"""Frozen campaign: its file with every file that it names, which nothing outside changes."""
 
 import hashlib
 import json
@@ -6,18 +6,30 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from sms_handover.campaign.definition.campaign_file import Campaign, csv_file_of, read_campaign
+from sms_handover.campaign.definition.campaign_file import Campaign, read_campaign
+from sms_handover.campaign.definition.distributions import Choice, Value
 from sms_handover.campaign.definition.fields import EXTENDABLE, LIST
+from sms_handover.campaign.definition.named_files import (
+    FOLDERS,
+    is_file_path,
+    keep_cell,
+    kept,
+    kept_draw,
+    mesh_digests,
+)
+from sms_handover.campaign.definition.sampler import csv_file_of
 from sms_handover.configuration.documents import as_yaml
 from sms_handover.configuration.package_files import config_file
 from sms_handover.configuration.scenario_file import scenario_names
+from sms_handover.configuration.sections import Section
 from sms_handover.configuration.yaml_reader import read_yaml
 from sms_handover.errors import ConfigurationError, UnknownNameError
 from sms_handover.simulation.scenario_yaml import scenario_yaml
 
 CAMPAIGN_FILE = "campaign.yaml"
-_TABLE, _SCENARIOS = "cases.csv", "scenarios"
+_TABLE, _SCENARIOS, _MESHES = "cases.csv", "scenarios", "meshes.yaml"
 _SUFFIX = ".yaml"
 
 
@@ -51,17 +63,21 @@ class Frozen:
         return read_campaign(folder / CAMPAIGN_FILE, cases)
 
 
+def campaign_names() -> tuple[str, ...]:
+    """Return the names of the shipped campaigns."""
+    return tuple(sorted(path.stem for path in config_file("campaigns").glob(f"*{_SUFFIX}")))
+
+
 def campaign_path(source: str) -> Path:
     """Return the file of a shipped campaign, or of one given by its path; raises UnknownNameError."""
-    shipped = {path.stem: path for path in config_file("campaigns").glob(f"*{_SUFFIX}")}
-    if source in shipped:
-        return shipped[source]
+    if source in campaign_names():
+        return config_file(f"campaigns/{source}{_SUFFIX}")
     path = Path(source)
     if path.is_file():
         return path
     if path.suffix == _SUFFIX:
         raise ConfigurationError(f"there is no campaign file {path}")
-    raise UnknownNameError("campaign", source, sorted(shipped))
+    raise UnknownNameError("campaign", source, campaign_names())
 
 
 def freeze(path: Path) -> tuple[Frozen, int | None]:
@@ -76,6 +92,10 @@ def freeze(path: Path) -> tuple[Frozen, int | None]:
         content.pop("cases", None)
     files: dict[str, str] = {}
     scenarios: dict[str, object] = {}
+    root = Section.read(path)
+    _keep_draws(root, path.parent, campaign, content, files)
+    if campaign.values:
+        content["values"] = _kept_values(root, campaign.values, path.parent, files)
     for name, chosen in campaign.scenarios.items():
         source = chosen.source
         if source not in scenario_names():
@@ -85,19 +105,57 @@ def freeze(path: Path) -> tuple[Frozen, int | None]:
             files[file] = scenario_yaml(source)
         except ConfigurationError as error:
             raise ConfigurationError(f"{path}: scenario {name!r}: {error}") from error
-        scenarios[name] = {"scenario": file, "values": dict(chosen.values)} if chosen.values else file
+        scenarios[name] = file
+        if chosen.values:
+            values = _kept_values(root.section("scenarios").section(name), chosen.values, path.parent, files)
+            scenarios[name] = {"scenario": file, "values": values}
     content["scenarios"] = scenarios
     table = csv_file_of(path)
     if table is not None:
         files[_TABLE] = table.read_text(encoding="utf-8")
         content["sampler"] = {LIST: {"file": _TABLE}}
+    with root.located():
+        digests = mesh_digests(files)
+    if digests:
+        files[_MESHES] = as_yaml(digests)
     files[CAMPAIGN_FILE] = as_yaml(content)
     return Frozen(files), campaign.cases if extendable else None
 
 
+def _keep_draws(
+    root: Section, folder: Path, campaign: Campaign, content: dict[str, Any], files: dict[str, str]
+) -> None:
+    """Keep the files that drawn values and cells of a table name; put their new names into the content."""
+    for path, one in campaign.draws.items():
+        if is_file_path(path) and isinstance(one, Choice):
+            with root.section("draws").located(path):
+                names = [kept_draw(path, value, folder, files) for value in one.values]
+            content["draws"][path]["choice"]["values"] = names
+    with root.located("sampler"):
+        for path, value in _file_cells(campaign):
+            keep_cell(path, value, files)
+
+
+def _file_cells(campaign: Campaign) -> set[tuple[str, Value]]:
+    """Return path and value of the cells of a table that name files, each once."""
+    return {(path, row[path]) for row in campaign.sampler.rows for path in row if is_file_path(path)}
+
+
+def _kept_values(
+    section: Section, values: Mapping[str, object], folder: Path, files: dict[str, str]
+) -> dict[str, object]:
+    """Return the values of a section with the new names of the files that they name, which are kept."""
+    found, inner = {}, section.section("values")
+    for path, value in values.items():
+        with inner.located(path if path in inner else path.partition(".")[0]):
+            found[path] = kept(path, value, folder, files)
+    return found
+
+
 def read_frozen(folder: Path) -> Frozen:
     """Return the campaign that was frozen below a folder; raises ConfigurationError."""
-    names = [CAMPAIGN_FILE, _TABLE, *(f"{_SCENARIOS}/{p.name}" for p in (folder / _SCENARIOS).glob("*"))]
+    inner = [path for name in (_SCENARIOS, *FOLDERS) for path in (folder / name).glob(f"*{_SUFFIX}")]
+    names = [CAMPAIGN_FILE, _TABLE, _MESHES, *(path.relative_to(folder).as_posix() for path in inner)]
     try:
         files = {
             name: (folder / name).read_text(encoding="utf-8") for name in names if (folder / name).is_file()

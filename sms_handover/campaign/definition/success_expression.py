@@ -2,12 +2,13 @@
 
 ``complete and carry.arm_a.final_error < 0.005`` compares figures in SI units. There are ``and``, ``or``,
 ``not``, comparisons, ``+ - * /``, ``abs``, ``min``, ``max``, numbers, ``true`` and ``false``, and metrics by
-name; one that is no chain of identifiers stands in quotes.
+name; one that is no chain of identifiers stands in quotes. What is not defined, NaN, stays so by Kleene's
+three-valued logic: in comparisons and ``not``, and in ``and`` and ``or`` unless the other side decides them.
 """
 
 import ast
 import operator
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import nan
 from types import MappingProxyType
@@ -19,12 +20,12 @@ _LONGEST = 1000  # [characters]
 
 def _least(*values: float) -> float:
     """Return the least value, NaN if one is not defined."""
-    return nan if any(value != value for value in values) else min(values)
+    return _defined(values, min(values))
 
 
 def _greatest(*values: float) -> float:
     """Return the largest value, NaN if one is not defined."""
-    return nan if any(value != value for value in values) else max(values)
+    return _defined(values, max(values))
 
 
 _WORDS = {"true": True, "false": False, "True": True, "False": False}
@@ -80,7 +81,7 @@ class Applied:
         """Return its value for some metrics, NaN where that is not defined."""
         try:
             return self.operation(*(node.of(metrics) for node in self.nodes))
-        except ZeroDivisionError:
+        except (ZeroDivisionError, OverflowError):
             return nan
 
 
@@ -100,7 +101,7 @@ class SuccessExpression:
         return tuple(dict.fromkeys(_names(self.tree)))
 
     def holds(self, metrics: Metrics) -> bool:
-        """Return whether it is true; a comparison with a metric that is not defined is false."""
+        """Return whether it is true; one that is not defined, as a metric of it is not, does not hold."""
         value = self.tree.of(metrics)
         return value == value and bool(value)
 
@@ -145,7 +146,7 @@ def _node(node: ast.AST) -> Node:
     if isinstance(node, ast.Compare) and all(type(one) in _COMPARED for one in node.ops):
         terms = [_node(term) for term in (node.left, *node.comparators)]
         pairs = zip(node.ops, terms[:-1], terms[1:], strict=True)
-        links = tuple(Applied(_COMPARED[type(one)], (left, right)) for one, left, right in pairs)
+        links = tuple(Applied(_compared(_COMPARED[type(one)]), (left, right)) for one, left, right in pairs)
         return links[0] if len(links) == 1 else Applied(_all, links)
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _CALLED:
         few = 1 if node.func.id == "abs" else 2
@@ -166,22 +167,30 @@ def _dotted(node: ast.AST) -> str:
     raise ConfigurationError(f"{ast.unparse(node)!r} is not the name of a metric")
 
 
-def _truth(value: float | bool) -> bool:
-    """Return whether a value counts as true; one that is not defined does not."""
-    return value == value and bool(value)
+def _all(*values: float | bool) -> float | bool:
+    """Return whether all are true: false if one is, else not defined if one is not."""
+    return False if any(value == 0 for value in values) else _defined(values, True)
 
 
-def _all(*values: float | bool) -> bool:
-    return all(map(_truth, values))
+def _any(*values: float | bool) -> float | bool:
+    """Return whether one is true: true if one is, else not defined if one is not."""
+    is_true = any(value == value and bool(value) for value in values)
+    return True if is_true else _defined(values, False)
 
 
-def _any(*values: float | bool) -> bool:
-    return any(map(_truth, values))
+def _not(value: float | bool) -> float | bool:
+    """Return the contrary; that of what is not defined is not defined either."""
+    return _defined([value], not value)
 
 
-def _not(value: float | bool) -> bool:
-    """Return the contrary; what is not defined is neither true nor its contrary."""
-    return value == value and not value
+def _compared(operation: _Operation) -> _Operation:
+    """Return a comparison that is not defined where one of its sides is not."""
+    return lambda left, right: _defined([left, right], operation(left, right))
+
+
+def _defined(values: Iterable[float | bool], result: float | bool) -> float | bool:
+    """Return a result, NaN if one of the values that it is of is not defined."""
+    return nan if any(value != value for value in values) else result
 
 
 def _names(node: Node) -> Iterator[str]:

@@ -7,20 +7,18 @@ from io import BytesIO
 from pathlib import Path
 
 from sms_handover.analysis.layout import Row, Section, layout
-from sms_handover.analysis.records import WALL_TIMES
 from sms_handover.campaign.cases.case import CaseResult, Cases
-from sms_handover.campaign.cases.case_metrics import known_metrics
 from sms_handover.campaign.cases.case_row import Row as CaseRow
 from sms_handover.campaign.cases.case_row import Status, Task
+from sms_handover.campaign.cases.first_cases import require_runnable
 from sms_handover.campaign.cases.retained import trajectory
 from sms_handover.campaign.definition.campaign_file import Campaign, Keep
 from sms_handover.campaign.definition.distributions import range_in_words
 from sms_handover.campaign.definition.fields import ALL, BAG, NONE, SOBOL
-from sms_handover.campaign.definition.frozen import Frozen, freeze
-from sms_handover.errors import ConfigurationError, UnknownNameError
+from sms_handover.campaign.definition.frozen import freeze
+from sms_handover.errors import ConfigurationError
 from sms_handover.run_data import RunData
 from sms_handover.simulation.save import write_arrays
-from sms_handover.simulation.scenario import load_scenario
 
 _S_PER_H = 3600.0  # [s/h]
 _MB = 1e6  # [byte]
@@ -75,7 +73,7 @@ def plan_in_words(path: Path) -> str:
     be run: a value that no scenario has, or that cannot be read back, an unknown metric.
     """
     frozen, number = freeze(path)
-    require_metrics(frozen, path)
+    require_runnable(frozen, number, path)
     cost, broken = _Cost(), list[str]()
     with tempfile.TemporaryDirectory(prefix="sms_handover_check_") as folder:
         cases = Cases(frozen, number, Path(folder))
@@ -114,25 +112,6 @@ def _draws(campaign: Campaign) -> Iterator[Row]:
             numbers = [row[path] for row in campaign.sampler.rows]
             span = [value for value in numbers if isinstance(value, int | float)]
             yield Row(path, ("of a table", f"{min(span):.6g} to {max(span):.6g}" if span else "texts"))
-
-
-def require_metrics(frozen: Frozen, path: Path) -> None:
-    """Raise UnknownNameError unless every scenario has all metrics that the campaign of a file names."""
-    with tempfile.TemporaryDirectory(prefix="sms_handover_check_") as folder:
-        campaign = frozen.unpacked(Path(folder))
-        for chosen in campaign.scenarios.values():
-            values = {**campaign.values, **chosen.values}
-            known = dict.fromkeys(known_metrics(load_scenario(Path(folder) / chosen.source, values)))
-            for metric in (*campaign.success.names, *campaign.metrics, campaign.worst_by):
-                if metric in WALL_TIMES:
-                    raise ConfigurationError(
-                        f"{path}: metric {metric!r} is of wall time, which differs from run to run: take one "
-                        "of simulated time; the page has the solve times of laws that plan"
-                    )
-            campaign.success.require_known(known)
-            for metric in (*campaign.metrics, campaign.worst_by):
-                if metric not in known:
-                    raise UnknownNameError("metric", metric, known, str(path), "sms-handover list metrics")
 
 
 def _require_run(row: CaseRow, path: Path) -> None:

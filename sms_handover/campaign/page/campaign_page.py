@@ -1,9 +1,10 @@
 """Page of a campaign: one HTML document that needs no network, as that of runs is."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from os.path import relpath
 from pathlib import Path
+from shlex import quote as shell_quote
 from urllib.parse import quote
 
 from sms_handover import __version__
@@ -15,9 +16,12 @@ from sms_handover.campaign.definition.campaign_file import Campaign
 from sms_handover.campaign.page.campaign_plots import campaign_plots
 from sms_handover.campaign.record.campaign_folder import CampaignFolder
 from sms_handover.campaign.statistics.case_columns import Group, columns_of
+from sms_handover.campaign.statistics.notes import PERCENTILES, note_on_sampler, note_on_tests
+from sms_handover.campaign.statistics.paired_tests import paired_tests
 from sms_handover.campaign.statistics.stop_rule import stopped_at
 from sms_handover.campaign.statistics.tables import (
     TEST_HEAD,
+    TESTED,
     outcome_sections,
     paired_section,
     sensitivity_sections,
@@ -63,8 +67,9 @@ def campaign_page(folder: CampaignFolder, place: Path | None = None) -> str:
     columns = columns_of(entries)
     plots = campaign_plots(campaign, columns)
     scripts = (plotly_script(), "\n".join(web_file(name) for name in _SCRIPTS))
-    causes = failures_by_cause(entries).most_common(_MOST_CAUSES)
-    paired, stop = paired_section(columns), stopped_at(campaign, folder.cases, entries)
+    causes = failures_by_cause(entries).most_common()
+    tests, stop = paired_tests(columns, TESTED), stopped_at(campaign, folder.cases, entries)
+    paired = paired_section(tests)
     return render(
         "campaign.html.j2",
         version=__version__,
@@ -80,7 +85,10 @@ def campaign_page(folder: CampaignFolder, place: Path | None = None) -> str:
         stopped_at=stop,
         runs=[Headed(style) for style in run_styles(campaign.laws, campaign.laws)],
         sections=outcome_sections(campaign, columns),
-        causes=[(*cause, times) for cause, times in causes],
+        interval_notes=[note for note in (PERCENTILES, note_on_sampler(campaign.sampler.kind)) if note],
+        tests_note=note_on_tests(tests),
+        causes=[(*cause, times) for cause, times in causes[:_MOST_CAUSES]],
+        further=_further(causes[_MOST_CAUSES:], folder),
         worst=[*_worst(folder, worst_of(entries, campaign.worst_by, _count(campaign)), place or folder.path)],
         worst_by=campaign.worst_by,
         tables=[*([(TEST_HEAD, paired)] if paired else []), *sensitivity_sections(campaign, columns)],
@@ -91,6 +99,14 @@ def campaign_page(folder: CampaignFolder, place: Path | None = None) -> str:
         manifest=folder.manifest,
         metrics=USUAL,
     )
+
+
+def _further(causes: Sequence[tuple[object, int]], folder: CampaignFolder) -> str:
+    """Return how many causes are not listed, of how many cases, and where they are; '' if all are listed."""
+    if not causes:
+        return ""
+    command = f"sms-handover campaign status {shell_quote(str(folder.path))} --failed"
+    return f"{len(causes)} more causes, of {sum(times for _, times in causes)} runs: {command}"
 
 
 def _count(campaign: Campaign) -> int:

@@ -72,7 +72,8 @@ def campaign_plots(campaign: Campaign, columns: Mapping[Group, CaseColumns]) -> 
             found.append(_convergence(scenario, laws))
             found.append(_distribution(scenario, laws, campaign.worst_by))
             found += [_trade(scenario, laws, *trade) for trade in _TRADES]
-            found += _map(campaign, scenario, laws)
+            for colour, (law, one) in enumerate(laws):
+                found += _map(campaign, scenario, law, one, colour)
     return tuple(found)
 
 
@@ -130,10 +131,9 @@ def _trade(scenario: str, laws: Sequence[tuple[str, CaseColumns]], x: str, y: st
 
 
 def _map(
-    campaign: Campaign, scenario: str, laws: Sequence[tuple[str, CaseColumns]]
+    campaign: Campaign, scenario: str, law: str, one: CaseColumns, colour: int
 ) -> tuple[CampaignPlot, ...]:
-    """Return successes and failures over the two drawn values that matter most."""
-    law, one = laws[0]
+    """Return successes and failures of a law over the two drawn values that matter most under it."""
     if len(one.inputs) < 2:
         return ()
     found = sensitivities(campaign, one, campaign.worst_by)
@@ -141,9 +141,9 @@ def _map(
     x, y = sorted(one.inputs, key=lambda path: size.get(path, 0.0))[:2]
     keep = _thinned(len(one.case))
     full = one.succeeded[keep].astype(float)
-    trace = Trace(POINTS, law, 0, one.inputs[x][keep], one.inputs[y][keep], full=full)
-    title = f"{scenario}: cases over two draws, what is no success hollow"
-    return (CampaignPlot(f"map-{scenario}", title, x, y, (trace,)),)
+    trace = Trace(POINTS, law, colour, one.inputs[x][keep], one.inputs[y][keep], full=full)
+    title = f"{scenario}: cases under {law} over two draws, what is no success hollow"
+    return (CampaignPlot(f"map-{law}-{scenario}", title, x, y, (trace,)),)
 
 
 def _thinned(count: int) -> np.ndarray:

@@ -6,7 +6,8 @@ from functools import cached_property
 from sms_handover.campaign.definition.campaign_file import Campaign
 from sms_handover.campaign.definition.distributions import Value
 from sms_handover.campaign.definition.fields import COUNTED, GRID, LIST, RANDOM
-from sms_handover.campaign.sampling.designs import cases_of, design, grid
+from sms_handover.campaign.definition.sampler import cases_of
+from sms_handover.campaign.sampling.designs import combination, design, grid
 from sms_handover.campaign.sampling.streams import design_seed, share_of
 from sms_handover.errors import ConfigurationError
 from sms_handover.types import Array
@@ -22,11 +23,8 @@ class Samples:
     @property
     def count(self) -> int:
         """The number of cases; raises ConfigurationError where it is not given."""
-        kind = self._sampler.kind
-        if kind == LIST:
-            return len(self._sampler.rows)
-        if kind not in COUNTED:
-            return cases_of(kind, dict(self._sampler.numbers), list(self._campaign.draws.values()))
+        if self._sampler.kind not in COUNTED:
+            return cases_of(self._sampler, list(self._campaign.draws.values()))
         if self._campaign.cases is None:
             raise ConfigurationError(f"campaign {self._campaign.name!r} has no number of cases: give --cases")
         return self._campaign.cases
@@ -37,7 +35,7 @@ class Samples:
         if kind == LIST:
             return dict(self._sampler.rows[case])
         if kind == GRID:
-            return dict(zip(campaign.draws, self._combinations[case], strict=True))
+            return dict(zip(campaign.draws, combination(self._columns, case), strict=True))
         shares = self.shares(case)
         values: dict[str, Value] = {path: one.quantile(shares[path]) for path, one in campaign.draws.items()}
         for group in campaign.groups:
@@ -59,6 +57,5 @@ class Samples:
         return design(sampler.kind, dict(sampler.numbers), cases, len(self._campaign.paths), seed)
 
     @cached_property
-    def _combinations(self) -> list[tuple[Value, ...]]:
-        draws = list(self._campaign.draws.values())
-        return grid(draws, self._sampler.numbers["levels"])  # type: ignore[return-value]
+    def _columns(self) -> list[tuple[Value, ...]]:
+        return grid(list(self._campaign.draws.values()), self._sampler.numbers["levels"])

@@ -2,15 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict
+from textwrap import fill
 from typing import Any
 
 import numpy as np
 
-from sms_handover.analysis.layout import Section, layout
+from sms_handover.analysis.layout import WIDTH, Section, layout
 from sms_handover.campaign.definition.campaign_file import Campaign
 from sms_handover.campaign.statistics.case_columns import CaseColumns, Group
+from sms_handover.campaign.statistics.notes import PERCENTILES, note_on_sampler, note_on_tests
 from sms_handover.campaign.statistics.paired_tests import paired_tests
-from sms_handover.campaign.statistics.percentiles import percentile
+from sms_handover.campaign.statistics.percentiles import SHARES, percentile
 from sms_handover.campaign.statistics.proportion import proportion
 from sms_handover.campaign.statistics.tables import (
     KEY_METRICS,
@@ -20,14 +22,15 @@ from sms_handover.campaign.statistics.tables import (
     paired_section,
 )
 
-_SHARES = (0.05, 0.5, 0.95)
-
 
 def campaign_text(campaign: Campaign, columns: Mapping[Group, CaseColumns]) -> str:
     """Return the tables of a campaign, with a column per law; raises MissingDependencyError."""
+    tests = paired_tests(columns, TESTED)
     lines = layout(campaign.laws, outcome_sections(campaign, columns))
-    paired: Section | None = paired_section(columns)
+    paired: Section | None = paired_section(tests)
     lines += layout(TEST_HEAD, [paired]) if paired else []
+    notes = (PERCENTILES, note_on_sampler(campaign.sampler.kind), note_on_tests(tests))
+    lines += ["", *(fill(note, WIDTH) for note in notes if note)]
     return "\n".join(lines[1:]) + "\n"
 
 
@@ -41,7 +44,7 @@ def campaign_values(campaign: Campaign, columns: Mapping[Group, CaseColumns]) ->
                 "cases": int((~np.isnan(one.metrics[name])).sum()),
                 **{
                     f"{share:g}": list(map(_plain, percentile(one.metrics[name], share)[:3]))
-                    for share in _SHARES
+                    for share in SHARES
                 },
             }
             for name in (*KEY_METRICS, *campaign.metrics)

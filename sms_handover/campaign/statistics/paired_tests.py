@@ -66,7 +66,10 @@ def _success(scenario: str, one: str, other: str, a: CaseColumns, b: CaseColumns
 
 
 def _metric(scenario: str, one: str, other: str, a: CaseColumns, b: CaseColumns, metric: str) -> PairedTest:
-    """Return Wilcoxon's signed-rank test of a metric under two laws."""
+    """Return Wilcoxon's signed-rank test of a metric under two laws, as he has it without pairs that agree.
+
+    Left to SciPy, such pairs would make the test an approximation, however few they are.
+    """
     rows, others = a.common(b)
     missing = np.full(0, nan)
     first, second = a.metrics.get(metric, missing), b.metrics.get(metric, missing)
@@ -74,9 +77,8 @@ def _metric(scenario: str, one: str, other: str, a: CaseColumns, b: CaseColumns,
         return PairedTest(scenario, one, other, metric, 0, nan, nan)
     differences = first[rows] - second[others]
     differences = differences[~np.isnan(differences)]
-    p = nan
-    if np.any(differences != 0.0):
-        p = float(needed("scipy.stats", "scipy").wilcoxon(differences).pvalue)
+    apart = differences[differences != 0.0]
+    p = float(needed("scipy.stats", "scipy").wilcoxon(apart).pvalue) if apart.size else nan
     median = float(np.median(differences)) if differences.size else nan
     return PairedTest(scenario, one, other, metric, differences.size, median, p)
 

@@ -10,10 +10,10 @@ from sms_handover.campaign.cases.case_metrics import USUAL
 from sms_handover.campaign.definition.campaign_file import Campaign
 from sms_handover.campaign.statistics.case_columns import CaseColumns, Group
 from sms_handover.campaign.statistics.holm import holm
-from sms_handover.campaign.statistics.paired_tests import SUCCESS, PairedTest, paired_tests
+from sms_handover.campaign.statistics.paired_tests import SUCCESS, PairedTest
 from sms_handover.campaign.statistics.percentiles import percentile
 from sms_handover.campaign.statistics.proportion import proportion
-from sms_handover.campaign.statistics.sensitivity import CORRELATION, Sensitivity, sensitivities
+from sms_handover.campaign.statistics.sensitivity import CORRELATION, DESIGNED, Sensitivity, sensitivities
 
 KEY_METRICS = (
     *("grasp_error", "grasp_angle", "grasp_speed", "clearance", "base_turn", "base_shift"),
@@ -91,9 +91,8 @@ def _percentile(one: CaseColumns | None, metric: str, share: float) -> str:
     return number(found.value) + interval
 
 
-def paired_section(columns: Mapping[Group, CaseColumns]) -> Section | None:
-    """Return the paired tests of the laws, None where there is one law only."""
-    tests = paired_tests(columns, TESTED)
+def paired_section(tests: Sequence[PairedTest]) -> Section | None:
+    """Return the paired tests of the laws, None where there are none, as of one law only."""
     return Section("Paired tests of the laws", tuple(map(_test, tests))) if tests else None
 
 
@@ -109,6 +108,7 @@ def _test(test: PairedTest) -> Row:
 
 SENSITIVITY_HEADS: Mapping[str, tuple[str, ...]] = {
     CORRELATION: ("Spearman's rho", "p", "p, Holm"),
+    DESIGNED: ("Spearman's rho",),
     "morris": ("mu*", "95 % +-", "sigma"),
     "sobol": ("first order", "95 % +-", "total", "95 % +-"),
 }
@@ -137,6 +137,7 @@ def _sensitivity(one: Sensitivity, adjusted: float) -> Row:
     """Return the sensitivity to a drawn value as a row."""
     cells: Sequence[float] = {
         CORRELATION: (one.first, one.second, adjusted),
+        DESIGNED: (one.first,),
         "morris": (one.first, one.first_half, one.second),
         "sobol": (one.first, one.first_half, one.second, one.second_half),
     }[one.kind]

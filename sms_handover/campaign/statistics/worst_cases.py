@@ -33,10 +33,13 @@ def worst_of(entries: Iterable[Entry], metric: str, count: int) -> dict[Group, l
     return {group: [row for _, _, row in sorted(heap, reverse=True)] for group, heap in found.items()}
 
 
-def failures_by_cause(entries: Iterable[Entry]) -> Counter[tuple[str, str, str]]:
-    """Return how often a cause ended a case without success, by law, status and cause without its numbers."""
+def failures_by_cause(entries: Iterable[Entry]) -> Counter[tuple[str, str, str, str]]:
+    """Return how often a cause ended a case without success.
+
+    By scenario, law, status, and cause without its numbers.
+    """
     return Counter(
-        (entry.row.task.law, entry.row.status.value, cause_of(entry.row))
+        (*entry.row.task[1:], entry.row.status.value, cause_of(entry.row))
         for entry in entries
         if not entry.row.succeeded
     )

@@ -6,7 +6,9 @@ from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from importlib import import_module
 from pathlib import Path
 
-from sms_handover.analysis.equality import run_digest
+import numpy as np
+
+from sms_handover.analysis.equality import before, run_digest
 from sms_handover.bag.run.reader import read_run
 from sms_handover.campaign.cases.case import Cases, in_words, inputs_in_words
 from sms_handover.campaign.cases.case_row import Row, Task
@@ -14,6 +16,7 @@ from sms_handover.campaign.record.campaign_folder import CampaignFolder
 from sms_handover.cli.exit_codes import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_LOSS, EXIT_OK
 from sms_handover.errors import ConfigurationError, GraphError, UnknownNameError
 from sms_handover.launcher.run_folder import bag_of
+from sms_handover.run_data import RunData
 from sms_handover.simulation.save import save_run
 
 
@@ -110,7 +113,7 @@ def _recorded(options: Namespace, cases: Cases, task: Task, row: Row | None, scr
         if row is None or not row.cause or row.cause not in " ".join(str(error).split()):
             raise
         print(f"it ends as its row says: {row.cause}")
-        code = EXIT_OK
+        code = _told_of_rest(row, options.output)
     else:
         if ended in (EXIT_LOSS, EXIT_INTERRUPTED):  # any other is of the mission, as in its row
             return ended
@@ -121,6 +124,20 @@ def _recorded(options: Namespace, cases: Cases, task: Task, row: Row | None, scr
         view.add_parser(parser)
         view.command(parser.parse_args([str(options.output)]))
     return code
+
+
+def _told_of_rest(row: Row, output: Path) -> int:
+    """Tell whether a recording that ends without a plan is equal to its row; return the exit code."""
+    if not row.run_digest:
+        print("its row has no run to compare with: there was no plan from the first period on")
+        return EXIT_OK
+    return _told(row, run_digest(commanded(read_run(bag_of(output)))) == row.run_digest)
+
+
+def commanded(run: RunData) -> RunData:
+    """Return what there is of a run before its law gives up: the states after that have no command."""
+    without = np.isnan(run.joint_command).all(axis=1)
+    return before(run, int(run.tick_ns[without.argmax()])) if without.any() else run
 
 
 def _told(row: Row | None, equal: bool) -> int:

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import monotonic
 
+from sms_handover.campaign.cases.first_cases import require_runnable
 from sms_handover.campaign.definition.fields import BAG, MOST_CASES
 from sms_handover.campaign.definition.frozen import campaign_path, freeze
 from sms_handover.campaign.engine.choice import workers_for
-from sms_handover.campaign.engine.plan import require_metrics
 from sms_handover.campaign.engine.run import Tally, run_campaign
 from sms_handover.campaign.engine.scheduler_url import require_safe
 from sms_handover.campaign.engine.workers import Workers
@@ -85,7 +85,6 @@ def command(options: Namespace) -> int:
     campaign, shard = frozen.campaign(cases), shard_of(options.shard) if options.shard else Shard()
     if options.shard and campaign.stop:
         raise ConfigurationError("a shard knows nothing of the others: leave stop out, or --shard")
-    require_metrics(frozen, path)
     part = f".shard_{shard.number}_of_{shard.of}" if options.shard else ""
     folder = options.output or Path("runs") / f"{campaign.name}{part}"
     known = read_manifest(folder).cases or 0 if (folder / MANIFEST).exists() else 0
@@ -94,6 +93,7 @@ def command(options: Namespace) -> int:
             f"--cases is {options.cases}, must be >= {known}, which {folder} was made for: cases are only "
             "added; choose another folder with --output"
         )
+    require_runnable(frozen, cases or known or None, path)
     with open_campaign(folder, frozen, cases, shard) as opened:
         try:
             with Progress() as progress:

@@ -62,10 +62,8 @@ def command(options: Namespace) -> int:
     one_scenario, listed = len(campaign.scenarios) == 1, list[Row]()
     if options.failed:
         causes = failures_by_cause(entries).most_common()
-        print(
-            "\n"
-            + columns([("law", "status", "times", "cause"), *((a, b, str(n), c) for (a, b, c), n in causes)])
-        )
+        heads = ("scenario", "law", "status", "times", "cause")
+        print("\n" + columns([heads, *((*who, str(times), cause) for (*who, cause), times in causes)]))
         listed = list(failed(entries))
     elif options.worst:
         listed = [
