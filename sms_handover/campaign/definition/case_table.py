@@ -1,6 +1,7 @@
 """Table of cases: a CSV file, its header dotted paths, a row per case, checked when it is read."""
 
 import csv
+import re
 from collections.abc import Iterator, Mapping
 from io import StringIO
 from math import isfinite
@@ -14,6 +15,7 @@ from sms_handover.configuration.yaml_reader import load_value, read_text
 from sms_handover.errors import ConfigurationError
 
 _LARGEST = 2**26  # [byte] of a file
+_PLAIN = re.compile(r"-?[0-9]+\.[0-9]+([eE][-+]?[0-9]+)?")  # as most cells are; YAML is much slower
 _BYTE_ORDER_MARK = "\ufeff"  # with which spreadsheets begin a file
 
 
@@ -65,12 +67,13 @@ def _case(header: list[str], cells: list[str], place: str) -> Mapping[str, Value
 def _value(column: str, cell: str, place: str) -> Value:
     """Return the value of a cell; raises ConfigurationError on one that no case can have."""
     what = f"{place}: {column}"
-    if not cell.strip():
+    plain = cell.strip()
+    if not plain:
         raise ConfigurationError(f"{what} is empty, must be a value")
-    value = load_value(cell, f"{what}:={cell}")
+    value = float(plain) if _PLAIN.fullmatch(plain) else load_value(cell, f"{what}:={cell}")
     if not isinstance(value, bool | int | float | str):
         raise ConfigurationError(f"{what} is {shortened(cell)}, must be a number, a text, true or false")
     if isinstance(value, float) and not isfinite(value):
-        raise ConfigurationError(f"{what} is {cell.strip()}, must be finite")
+        raise ConfigurationError(f"{what} is {plain}, must be finite")
     require_allowed(column, value, what)
     return value
