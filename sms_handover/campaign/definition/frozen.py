@@ -156,7 +156,14 @@ def read_frozen(folder: Path) -> Frozen:
     """Return the campaign that was frozen below a folder, beside anything; raises ConfigurationError."""
     if not (folder / CAMPAIGN_FILE).is_file():
         raise ConfigurationError(f"{folder} is no campaign folder: it has no {CAMPAIGN_FILE}")
-    campaign = read_campaign(folder / CAMPAIGN_FILE)
+    try:
+        campaign = read_campaign(folder / CAMPAIGN_FILE)
+    except UnknownNameError:  # as of a law that is not installed here
+        raise
+    except ConfigurationError as error:
+        raise ConfigurationError(
+            f"{folder}: the frozen campaign was changed since it began, or is of another version: {error}"
+        ) from error
     names = [CAMPAIGN_FILE, *(one.source for one in campaign.scenarios.values())]
     for name in names:
         if not (folder / name).is_file():
