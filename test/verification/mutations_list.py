@@ -1008,7 +1008,7 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "a corrupted row believed",
         "campaign/record/journal",
-        'if values["check"] != _check(row.text, measured):',
+        'if values["check"] != _check(row.text, measured, *named):',
         "if False:",
         "campaign_record",
     ),
