@@ -16,6 +16,7 @@ from sms_handover.campaign.cases.case_row import Beside, Row, Status, Task
 from sms_handover.campaign.definition.frozen import Frozen, freeze
 from sms_handover.campaign.record.campaign_folder import CampaignFolder, merge, open_campaign
 from sms_handover.campaign.record.journal import JOURNAL, Entry, JournalFaults, JournalWriter, entries_of
+from sms_handover.campaign.record.kept_cases import keep_worst
 from sms_handover.campaign.record.manifest import Shard
 from sms_handover.campaign.record.outputs import write_outputs
 from sms_handover.cli.main import main
@@ -146,6 +147,36 @@ def test_a_manifest_that_cannot_be_is_one_line(tmp_path: Path, capsys: pytest.Ca
     path.write_text(path.read_text().replace('"cases": null', '"cases": 5'))
     with pytest.raises(ConfigurationError, match="cases is 5, of sampler grid must be null: it has its own"):
         assert CampaignFolder(path.parent).campaign
+
+
+def test_what_stands_in_the_way_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A file where a folder must be, or a folder where a file must be."""
+    frozen, out, file = begun(tmp_path / "out"), tmp_path / "out", tmp_path / "plain"
+    file.touch()
+    (tmp_path / "half" / JOURNAL).mkdir(parents=True)
+    for target, code, told in (
+        (file, 2, f"{file} exists: merge into a new folder"),
+        (file / "x", 1, f"{file / 'x'} cannot be written: {file} is no folder; once it can, the same"),
+        (tmp_path / "half", 1, f"{tmp_path / 'half' / JOURNAL} cannot be written: Is a directory; once"),
+    ):
+        assert main(["campaign", "merge", str(out), "-o", str(target)]) == code
+        (error,) = capsys.readouterr().err.splitlines()
+        assert told in error and "[Errno" not in error
+    (out / "broken.jsonl").mkdir()
+    with (out / JOURNAL).open("ab") as stream:
+        stream.write(b"{}\n")
+    with pytest.raises(SmsHandoverError, match=r"broken.jsonl cannot be written: Is a directory"):
+        open_campaign(out, frozen, 6, WHOLE)
+    (out / JOURNAL).unlink()
+    (out / JOURNAL).mkdir()
+    for words in (["campaign", "status"], ["compare"], ["campaign", "rerun"]):
+        assert main([*words, str(out), *(["0"] if words[-1] == "rerun" else [])]) == 2
+        assert f"{out / JOURNAL} cannot be read: Is a directory" in capsys.readouterr().err
+    bags = written(tmp_path / "bags", cases=1, keep={"worst": 1, "worst_as": "bag"})
+    run_here(bags, tmp_path / "kept", program=STUB)
+    (tmp_path / "kept" / "bags").touch()
+    told = f"nmpc cannot be written: {tmp_path / 'kept' / 'bags'} is no folder; once it can"
+    assert told in list(keep_worst(CampaignFolder(tmp_path / "kept"), lambda *_: None))[-1].text
 
 
 def test_a_corrupted_line_is_named_and_done_again(tmp_path: Path) -> None:

@@ -112,7 +112,7 @@ class JournalWriter:
                     f"{path} is written to by another run of the campaign; wait for it, or end it first"
                 ) from None
             if isinstance(error, OSError):
-                raise unwritable(path, error) from error
+                raise unwritable(Path(error.filename or path), error) from error
             raise
 
     def _mend(self) -> None:
