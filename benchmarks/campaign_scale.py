@@ -6,13 +6,15 @@ figure is beyond its bound; ``--largest 1000 --seconds 0.2 --print`` is a quick 
 
 import json
 import logging
+import os
 import resource
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 from argparse import ArgumentParser
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
@@ -43,13 +45,13 @@ WORKERS = (1, 2, 4, 8, 16, 32, 64)
 _PROCESSES = 2  # of workers; of more workers each is a thread of them, with a process of cases of its own
 _CASE_S = 3.0  # [s] that a stub sleeps for a case
 _PER_WORKER = 8  # [-] cases for each worker
-_SATURATION = (
-    "distributed.scheduler.worker-saturation"  # [-] tasks that a thread is given at a time, rounded up
-)
+_SATURATION = "distributed.scheduler.worker-saturation"
+_ONE_EACH, _DASK_HAS = 1.0, 1.1  # [-] chunks of each thread that a worker has at a time
 _MOST_OVERHEAD_S = 0.020  # [s] of a case of 3 s, with a worker for each process
 _LEAST_EFFICIENCY = 0.95  # [-] then
 _MOST_GROWTH = 1.10  # [-] of the memory of a driver, from 1e3 to 1e5 cases
-_ONE_EACH, _DASK_HAS = 1.0, 1.1
+_MOST_LEAVING_S = 5.0  # [s] from Ctrl-C to the end of the driver
+_LOOK_S = 0.02  # [s] between two looks at a journal
 _GB, _MB, _MS = 1e9, 1e6, 1e3
 _H = 3600.0  # [s]
 _TASKS = (300.0, 700.0)  # [1/s] that the scheduler of Dask takes
@@ -58,6 +60,15 @@ _FILE = """\
 name: scale
 seed: 1
 scenarios: {smooth: smooth}
+laws: [nmpc]
+"""
+_INTERRUPTED = """\
+name: interrupted
+seed: 1
+cases: 100
+scenarios:
+  first: {scenario: smooth, values: {common.duration: 0.04}}
+  long: smooth
 laws: [nmpc]
 """
 
@@ -197,9 +208,34 @@ def growth(drivers: Sequence[Driver]) -> float:
     return drivers[-1].running / next(one for one in drivers if one.cases >= CASES[1]).running
 
 
-def beyond(drivers: Sequence[Driver], paces: Sequence[Pace], seconds: float) -> list[str]:
+def leaving(jobs: int) -> float:
+    """Return the wall time in s from Ctrl-C, as of a terminal, to the end of a driver with long cases."""
+    with tempfile.TemporaryDirectory() as scratch:
+        file, out = Path(scratch) / "interrupted.yaml", Path(scratch) / "out"
+        file.write_text(_INTERRUPTED, encoding="utf-8")
+        words = [sys.executable, "-m", "sms_handover.cli.main", "campaign", "run", str(file)]
+        with subprocess.Popen(
+            [*words, "-o", str(out), "-j", str(jobs)], stderr=subprocess.DEVNULL, start_new_session=True
+        ) as child:
+            while not ((out / JOURNAL).exists() and (out / JOURNAL).read_bytes()):
+                if child.poll() is not None:
+                    raise SystemExit(f"a campaign to interrupt ended with {child.returncode}")
+                time.sleep(_LOOK_S)
+            os.killpg(child.pid, signal.SIGINT)
+            begin = time.perf_counter()
+            child.wait()
+            return time.perf_counter() - begin
+
+
+def beyond(
+    drivers: Sequence[Driver], paces: Sequence[Pace], left: Mapping[int, float], seconds: float
+) -> list[str]:
     """Return each figure that is beyond its bound, in words; bounds are of the full sizes only."""
-    found = []
+    found = [
+        f"Ctrl-C with -j {jobs}: {took:.1f} s, at most {_MOST_LEAVING_S:g} s"
+        for jobs, took in left.items()
+        if took > _MOST_LEAVING_S
+    ]
     if drivers[-1].cases >= CASES[-1] and growth(drivers) > _MOST_GROWTH:
         sizes = f"from {CASES[1]:,} to {drivers[-1].cases:,} cases"
         found.append(f"memory of a driver {sizes}: factor {growth(drivers):.2f}, at most {_MOST_GROWTH:.2f}")
@@ -216,7 +252,13 @@ def beyond(drivers: Sequence[Driver], paces: Sequence[Pace], seconds: float) -> 
     return found
 
 
-def page(drivers: Sequence[Driver], alone: Driver, paces: Sequence[Pace], seconds: float) -> str:
+def page(
+    drivers: Sequence[Driver],
+    alone: Driver,
+    paces: Sequence[Pace],
+    left: Mapping[int, float],
+    seconds: float,
+) -> str:
     """Return the text of the page."""
     rows = [
         (f"{one.cases:,}", *(f"{number:.0f}" for number in one[1:5]), *(f"{size:.0f}" for size in one[5:]))
@@ -298,6 +340,13 @@ another worker is idle, and which Dask moves between smaller workers only. That 
 a campaign, here shared by {_PER_WORKER} rounds. Workers of `-j` have one thread each; a scheduler of yours
 whose workers have many is best started with `DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION={_ONE_EACH}`.
 
+## Ctrl-C
+
+Wall time from Ctrl-C to the end of `campaign run`, in the middle of cases of 60 s with ticks in Python; the
+bound is {_MOST_LEAVING_S:g} s.
+
+{table(["Workers (-j)", "Wall time [s]"], [(str(jobs), f"{took:.1f}") for jobs, took in left.items()])}
+
 ## On paper, beyond what was measured
 
 Linear in the last two rows of the driver's table; cases of {seconds:g} s.
@@ -345,12 +394,13 @@ def main() -> None:
     for workers in (workers for workers in WORKERS if workers <= options.workers):
         paces.append(pace(workers, options.seconds))
         print(paces[-1], file=sys.stderr, flush=True)
-    text = page(drivers, alone, paces, options.seconds)
+    left = {jobs: leaving(jobs) for jobs in (1, _PROCESSES)}
+    text = page(drivers, alone, paces, left, options.seconds)
     if options.print:
         print(text)
     else:
         PAGE.write_text(text, encoding="utf-8")
-    if found := beyond(drivers, paces, options.seconds):
+    if found := beyond(drivers, paces, left, options.seconds):
         raise SystemExit(f"BEYOND ITS BOUND: {'; '.join(found)}")
 
 

@@ -87,14 +87,17 @@ def test_a_figure_beyond_its_bound_is_named(
     drivers: list[campaign_scale.Driver], paces: list[campaign_scale.Pace], seconds: float, said: list[str]
 ) -> None:
     """Bounds are of the full sizes: cases of 3 s with up to two workers, and 1e5 cases of a driver."""
-    found = "; ".join(campaign_scale.beyond(drivers, paces, seconds))
+    found = "; ".join(campaign_scale.beyond(drivers, paces, {1: 0.8, 2: 4.9}, seconds))
     assert all(words in found for words in said) and bool(found) == bool(said)
+    late = campaign_scale.beyond(SIZES, PACES, {1: 0.8, 2: 5.1}, 3.0)
+    assert late == ["Ctrl-C with -j 2: 5.1 s, at most 5 s"]
 
 
 def test_the_page_of_the_scale_has_figures_and_bounds() -> None:
-    text = campaign_scale.page(SIZES, driver(1000, 129.0), [*PACES, MANY], 3.0)
+    text = campaign_scale.page(SIZES, driver(1000, 129.0), [*PACES, MANY], {1: 0.8, 2: 1.6}, 3.0)
     assert "| 2 | 4 | 0.999 | - |" in text and "| 64 | 500 | 0.857 | 400 |" in text
     assert "factor\nof 1.00; the bound is 1.10" in text and "may take 20 ms" in text
+    assert "| 2 | 1.6 |" in text and "bound is 5 s" in text
     assert "| 1e7 | 8,333 | 12.5 |" in text, "1e7 rows of 1250 bytes"
 
 
