@@ -17,8 +17,10 @@ from sms_handover.analysis.summary import summary
 from sms_handover.analysis.table import figure_sections, render
 from sms_handover.campaign.record.campaign_folder import CampaignFolder
 from sms_handover.campaign.record.cases_table import TABLE
+from sms_handover.campaign.record.journal import JOURNAL, JournalFaults
 from sms_handover.campaign.statistics.campaign_text import campaign_text, campaign_values
 from sms_handover.campaign.statistics.case_columns import columns_of
+from sms_handover.campaign.statistics.extent import extent_of
 from sms_handover.campaign.statistics.tables import outcome_sections
 from sms_handover.cli.recorded_runs import campaign_among, read_all
 from sms_handover.cli.text_files import write_text
@@ -79,15 +81,19 @@ def command(options: Namespace) -> int:
 
 def _compare_laws(folder: CampaignFolder, wanted: Mapping[str, Path]) -> int:
     """Print the laws of a campaign side by side; return the exit code."""
-    campaign, columns = folder.campaign, columns_of(folder.entries())
     if "csv" in wanted:
         raise ConfigurationError(f"--csv is for runs: the cases of {folder.path} are in its {TABLE}")
+    faults = JournalFaults()
+    campaign, entries = folder.campaign, list(folder.entries(faults))
+    for fault in faults.in_words(folder.path / JOURNAL):
+        print(fault, file=sys.stderr)
+    columns, extent = columns_of(entries), extent_of(folder, entries)
     texts: Mapping[str, Callable[[], str]] = {
-        "json": lambda: json.dumps(campaign_values(campaign, columns), indent=2) + "\n",
+        "json": lambda: json.dumps(campaign_values(campaign, columns, extent), indent=2) + "\n",
         "latex": lambda: latex_table(campaign.laws, outcome_sections(campaign, columns)),
     }
     if _STANDARD_OUTPUT not in wanted.values():
-        print(campaign_text(campaign, columns))
+        print(campaign_text(campaign, columns, extent))
     for name, path in wanted.items():
         if path == _STANDARD_OUTPUT:
             sys.stdout.write(texts[name]())

@@ -137,6 +137,28 @@ def test_shards_and_more_cases_leave_the_rows(tmp_path: Path) -> None:
     assert CampaignFolder(tmp_path / "merged").cases == 12
 
 
+def test_what_is_missing_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a shard without rows, of one that was ended, and of one whose line is corrupted."""
+    frozen, number = freeze(written(tmp_path, cases=6))
+    out = tmp_path / "shard"
+    for cases, told in (((), "No case has a row yet."), ((0, 2), "None of 2 rows is a failure.")):
+        with open_campaign(out, frozen, number, Shard(1, 2)) as opened:
+            opened.add(*(next(Confused(0, 1).run([Task(case, "smooth", "nmpc")]))[0] for case in cases))
+        assert main(["campaign", "status", str(out), "--failed"]) == 3
+        assert f"{len(cases)} of 3 rows, shard 1/2" in (said := capsys.readouterr().out)
+        assert said.endswith(f"\n{told}\n") and "cause" not in said
+        assert main(["campaign", "status", str(out), "--worst", "1"]) == 3
+        assert capsys.readouterr().out.endswith("\nNo case has grasp_error.\n")
+        page = campaign_page(CampaignFolder(out))
+        assert told in page and "Every case is a success" not in page
+        assert "No case has grasp_error." in page and "There is nothing to test" in page
+    (out / JOURNAL).write_bytes((out / JOURNAL).read_bytes().replace(b"succeeded", b"died", 1))
+    assert main(["compare", str(out)]) == 0
+    compared = capsys.readouterr()
+    assert compared.out.startswith("campaign tiny: 1 of 3 rows, shard 1/2\n")
+    assert f"{out / JOURNAL}, line 1 is corrupted and left out" in compared.err
+
+
 def test_it_stops_at_a_look_whatever_the_order(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     stop = {"half_width": 0.28, "looks": [4, 8, 12]}
     file = written(tmp_path, cases=40, stop=stop)
@@ -146,11 +168,19 @@ def test_it_stops_at_a_look_whatever_the_order(tmp_path: Path, capsys: pytest.Ca
     assert main(["campaign", "status", str(tmp_path / "out")]) == 0
     said = capsys.readouterr().out
     assert "8 of 8 rows" in said and "stopped after 8 of 40 cases: every interval is narrow enough" in said
+    assert "Stopping early makes an interval too narrow" in said and "It stopped after 8." in said
+    assert main(["compare", str(tmp_path / "out"), "--json", str(tmp_path / "json")]) == 0
+    compared = capsys.readouterr().out
+    assert compared.startswith(said[: said.index("enough")]) and "It stopped after 8." in compared
+    figures = json.loads((tmp_path / "json").read_text())
+    told = {"rows": 8, "runs": 8, "shard": "1/1", "stopped_at": 8, "sampler": "random"}
+    assert told.items() <= figures.items()
     page = campaign_page(CampaignFolder(tmp_path / "out"))
     assert "It stopped after 8." in page and "8 of 8 runs." in page
     run_here(written(tmp_path / "all", cases=3, stop=stop), tmp_path / "few", program=STUB)
     assert main(["campaign", "status", str(tmp_path / "few")]) == 0
-    assert "stopped" not in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "stopped after" not in said and "It has not stopped early." in said
 
 
 def test_drivers_share_a_scheduler(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Statistics of campaigns against known answers."""
 
+import shlex
 from collections.abc import Sequence
 from math import nan, pi, sin
 from pathlib import Path
@@ -24,7 +25,7 @@ from sms_handover.campaign.statistics.percentiles import least_cases, percentile
 from sms_handover.campaign.statistics.proportion import proportion
 from sms_handover.campaign.statistics.sensitivity import CORRELATION, DESIGNED, sensitivities
 from sms_handover.campaign.statistics.tables import outcome_sections, sensitivity_sections
-from sms_handover.campaign.statistics.worst_cases import worst_of
+from sms_handover.campaign.statistics.worst_cases import rerun_command, worst_of
 
 from .campaigns import written
 
@@ -42,6 +43,9 @@ def test_wilson_is_that_of_statsmodels_and_covers() -> None:
         held = (ours[:, :1] <= shares) & (shares <= ours[:, 1:])
         chances = binom.pmf(np.arange(trials + 1)[:, np.newaxis], trials, shares)
         assert 0.94 < float((held * chances).sum(axis=0).mean()) < 0.96
+    for one in (proportion(k, trials) for trials in range(1, 60) for k in range(trials + 1)):
+        assert one.low <= one.share <= one.high, "in spite of rounding"
+        assert (one.low == 0.0, one.high == 1.0) == (one.successes == 0, one.successes == one.trials)
     assert tuple(proportion(0, 0)) == (0, 0, 0.0, 1.0) and str(proportion(0, 0)) == "none yet"
 
 
@@ -176,6 +180,29 @@ def test_percentiles_have_no_interval_of_too_few_cases_and_a_narrow_one_of_many(
     alone = percentile(np.array([2.0, 2.0, nan]), 0.5)
     assert (alone.value, alone.known) == (2.0, 2) and np.isnan(alone.low)
     assert percentile(np.zeros(6), 0.5) == (0.0, 0.0, 0.0, 6), "as good as of values that differ"
+
+
+def test_of_what_no_case_has_there_is_no_table_and_no_plot(tmp_path: Path) -> None:
+    """As where every case failed; one case has no sensitivity, two laws without metrics have no p value."""
+    campaign = read_campaign(written(tmp_path, laws=["nmpc", "pid"]))
+    failed = {("smooth", law): columns([nan] * 3, [False] * 3, x=np.arange(3.0)) for law in campaign.laws}
+    (section,) = outcome_sections(campaign, failed)
+    labels = {row.label: row.cells for row in section.rows}
+    assert labels["grasp_error [m]"] == ("of 0 cases",) * 2 and "  median" not in labels
+    assert labels["success, 95 % interval"] == ("0.0 % [0.0, 56.1]",) * 2
+    assert [plot.key for plot in campaign_plots(campaign, failed)] == ["convergence-smooth"]
+    tests = paired_tests(failed, ["grasp_error"])
+    assert np.isnan([test.p for test in tests]).all() and note_on_tests(tests) == ""
+    one = {("smooth", "nmpc"): columns([1.0], x=np.array([2.0]))}
+    assert sensitivity_sections(campaign, failed) == sensitivity_sections(campaign, one) == ()
+    (section,) = outcome_sections(campaign, {})
+    assert [row.label for row in section.rows][-1] == "numeric failures" and not campaign_plots(campaign, {})
+
+
+def test_the_command_of_a_case_is_one_for_a_shell() -> None:
+    command = rerun_command("-my runs/a", Task(3, "s", "my law"), one_scenario=False)
+    words = ["sms-handover", "campaign", "rerun", "./-my runs/a", "3", "--law", "my law", "--scenario", "s"]
+    assert shlex.split(command) == words
 
 
 def test_the_pareto_front_is_what_nothing_is_better_than() -> None:

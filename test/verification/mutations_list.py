@@ -1008,9 +1008,30 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "a corrupted row believed",
         "campaign/record/journal",
-        'if values["check"] != _check(row.text, measured):',
+        'if values["check"] != _check(row.text, measured, *named):',
         "if False:",
         "campaign_record",
+    ),
+    _core(
+        "rows of another campaign taken for rows of this one",
+        "campaign/record/journal",
+        "if its_campaign != campaign[:_DIGITS]:",
+        "if False:",
+        "campaign_record",
+    ),
+    _core(
+        "a row of a law that the campaign does not have counted",
+        "campaign/record/campaign_folder",
+        "if not self._has(task):",
+        "if False:",
+        "campaign_record",
+    ),
+    _core(
+        "Wilson's bounds outside the share by rounding",
+        "campaign/statistics/proportion",
+        "low = 0.0 if successes == 0 else min(low, share)",
+        "low = max(0.0, low)",
+        "campaign_statistics",
     ),
     _core(
         "half a line left behind on a full disk",

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from os.path import relpath
 from pathlib import Path
-from shlex import quote as shell_quote
 from urllib.parse import quote
 
 from sms_handover import __version__
@@ -16,9 +15,10 @@ from sms_handover.campaign.definition.campaign_file import Campaign
 from sms_handover.campaign.page.campaign_plots import campaign_plots
 from sms_handover.campaign.record.campaign_folder import CampaignFolder
 from sms_handover.campaign.statistics.case_columns import Group, columns_of
-from sms_handover.campaign.statistics.notes import PERCENTILES, note_on_sampler, note_on_tests
+from sms_handover.campaign.statistics.extent import extent_of
+from sms_handover.campaign.statistics.notes import PERCENTILES, note_on_sampler, note_on_stop, note_on_tests
 from sms_handover.campaign.statistics.paired_tests import paired_tests
-from sms_handover.campaign.statistics.stop_rule import stopped_at
+from sms_handover.campaign.statistics.sensitivity import FEWEST
 from sms_handover.campaign.statistics.tables import (
     TEST_HEAD,
     TESTED,
@@ -26,7 +26,7 @@ from sms_handover.campaign.statistics.tables import (
     paired_section,
     sensitivity_sections,
 )
-from sms_handover.campaign.statistics.worst_cases import failures_by_cause, rerun_command, worst_of
+from sms_handover.campaign.statistics.worst_cases import failures_by_cause, for_shell, rerun_command, worst_of
 from sms_handover.report.engine import plotly_script, render, web_file
 from sms_handover.report.security import content_security_policy
 from sms_handover.report.styles import RunStyle, run_styles
@@ -68,7 +68,7 @@ def campaign_page(folder: CampaignFolder, place: Path | None = None) -> str:
     plots = campaign_plots(campaign, columns)
     scripts = (plotly_script(), "\n".join(web_file(name) for name in _SCRIPTS))
     causes = failures_by_cause(entries).most_common()
-    tests, stop = paired_tests(columns, TESTED), stopped_at(campaign, folder.cases, entries)
+    tests, extent = paired_tests(columns, TESTED), extent_of(folder, entries)
     paired = paired_section(tests)
     return render(
         "campaign.html.j2",
@@ -79,10 +79,8 @@ def campaign_page(folder: CampaignFolder, place: Path | None = None) -> str:
         name=campaign.name,
         description=campaign.description,
         success=campaign.success.text,
-        rows=len(entries),
-        total=folder.runs(stop),
-        stop=campaign.stop,
-        stopped_at=stop,
+        extent=extent,
+        stop_note=note_on_stop(campaign.stop, extent.stopped_at),
         runs=[Headed(style) for style in run_styles(campaign.laws, campaign.laws)],
         sections=outcome_sections(campaign, columns),
         interval_notes=[note for note in (PERCENTILES, note_on_sampler(campaign.sampler.kind)) if note],
@@ -91,6 +89,7 @@ def campaign_page(folder: CampaignFolder, place: Path | None = None) -> str:
         further=_further(causes[_MOST_CAUSES:], folder),
         worst=[*_worst(folder, worst_of(entries, campaign.worst_by, _count(campaign)), place or folder.path)],
         worst_by=campaign.worst_by,
+        fewest=FEWEST,
         tables=[*([(TEST_HEAD, paired)] if paired else []), *sensitivity_sections(campaign, columns)],
         plots=plots,
         data={"plots": [plot.data for plot in plots]},
@@ -105,7 +104,7 @@ def _further(causes: Sequence[tuple[object, int]], folder: CampaignFolder) -> st
     """Return how many causes are not listed, of how many cases, and where they are; '' if all are listed."""
     if not causes:
         return ""
-    command = f"sms-handover campaign status {shell_quote(str(folder.path))} --failed"
+    command = f"sms-handover campaign status {for_shell(str(folder.path))} --failed"
     return f"{len(causes)} more causes, of {sum(times for _, times in causes)} runs: {command}"
 
 

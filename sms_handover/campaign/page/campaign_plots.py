@@ -64,7 +64,7 @@ class CampaignPlot:
 
 
 def campaign_plots(campaign: Campaign, columns: Mapping[Group, CaseColumns]) -> tuple[CampaignPlot, ...]:
-    """Return the plots of each scenario."""
+    """Return the plots of each scenario, but those of which no case has the metrics."""
     found: list[CampaignPlot] = []
     for scenario in campaign.scenarios:
         laws = [(law, columns[scenario, law]) for law in campaign.laws if (scenario, law) in columns]
@@ -74,7 +74,7 @@ def campaign_plots(campaign: Campaign, columns: Mapping[Group, CaseColumns]) -> 
             found += [_trade(scenario, laws, *trade) for trade in _TRADES]
             for colour, (law, one) in enumerate(laws):
                 found += _map(campaign, scenario, law, one, colour)
-    return tuple(found)
+    return tuple(plot for plot in found if plot.traces)
 
 
 def _convergence(scenario: str, laws: Sequence[tuple[str, CaseColumns]]) -> CampaignPlot:
@@ -108,10 +108,11 @@ def _distribution(scenario: str, laws: Sequence[tuple[str, CaseColumns]], metric
 
 
 def _range(values: Array) -> tuple[float, float]:
-    """Return the range of a histogram, as wide as NumPy has it of equal values where they hardly differ."""
+    """Return the range of a histogram; of values that hardly differ it is as wide as they are large."""
     low, high = float(values.min()), float(values.max())
-    is_one = high - low <= _SAME * max(abs(low), abs(high))
-    return (low - 0.5, high + 0.5) if is_one else (low, high)
+    size = max(abs(low), abs(high))
+    half = (size or 1.0) / 2.0
+    return (low - half, high + half) if high - low <= _SAME * size else (low, high)
 
 
 def _trade(scenario: str, laws: Sequence[tuple[str, CaseColumns]], x: str, y: str) -> CampaignPlot:
@@ -120,6 +121,8 @@ def _trade(scenario: str, laws: Sequence[tuple[str, CaseColumns]], x: str, y: st
     for colour, (law, one) in enumerate(laws):
         if x in one.metrics and y in one.metrics:
             costs = np.column_stack([one.metrics[x], one.metrics[y]])
+            if np.isnan(costs).any(axis=1).all():
+                continue
             front = pareto_front(costs)
             keep = _thinned(len(costs)) | front
             flags = (one.succeeded[keep].astype(float), front[keep].astype(float))

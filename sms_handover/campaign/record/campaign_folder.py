@@ -13,6 +13,7 @@ from sms_handover.campaign.cases.case_process import Done
 from sms_handover.campaign.cases.case_row import Task
 from sms_handover.campaign.cases.retained import TRAJECTORIES, file_of
 from sms_handover.campaign.definition.campaign_file import Campaign
+from sms_handover.campaign.definition.fields import EXTENDABLE, MOST_CASES
 from sms_handover.campaign.definition.frozen import Frozen, read_frozen
 from sms_handover.campaign.record.beginning import is_beginning, write_frozen
 from sms_handover.campaign.record.durable_file import make_folder, unwritable, write_durably
@@ -47,8 +48,17 @@ class CampaignFolder:
 
     @cached_property
     def campaign(self) -> Campaign:
-        """The campaign with as many cases as were asked for at last."""
-        return self.frozen.campaign(self.manifest.cases)
+        """The campaign with as many cases as were asked for at last; raises ConfigurationError."""
+        campaign, cases = self.frozen.campaign(), self.manifest.cases
+        is_extendable = campaign.sampler.kind in EXTENDABLE
+        if is_extendable == (cases is None):
+            own = "null: it has its own number"
+            allowed = f"a whole number from 1 to {MOST_CASES}" if is_extendable else own
+            raise ConfigurationError(
+                f"{self.path / MANIFEST}: cases is {'null' if cases is None else cases}, of sampler "
+                f"{campaign.sampler.kind} must be {allowed}"
+            )
+        return replace(campaign, cases=cases) if is_extendable else campaign
 
     @property
     def cases(self) -> int:
@@ -61,15 +71,29 @@ class CampaignFolder:
         return len(range(shard.number - 1, stopped_at or self.cases, shard.of)) * self.campaign.runs_per_case
 
     def entries(self, faults: JournalFaults | None = None) -> Iterator[Entry]:
-        """Yield what the journal has, each run once; raises ConfigurationError on two rows that differ."""
-        seen: dict[Task, str] = {}
-        for entry in entries_of(self.path / JOURNAL, JournalFaults() if faults is None else faults):
+        """Yield what the journal has, each run once.
+
+        Raises ConfigurationError on two rows that differ, and on one that is not of this campaign or part.
+        """
+        seen, collected = dict[Task, str](), JournalFaults() if faults is None else faults
+        for entry in entries_of(self.path / JOURNAL, self.manifest.digest, collected):
             task, digest = entry.row.task, entry.row.digest
+            if not self._has(task):
+                shard = self.manifest.shard
+                raise ConfigurationError(
+                    f"{self.path / JOURNAL} has a row of {task}, which is not of this campaign, shard {shard}"
+                )
             if task not in seen:
                 seen[task] = digest
                 yield entry
             elif seen[task] != digest:
                 raise ConfigurationError(f"{self.path}: two rows of {task} differ")
+
+    def _has(self, task: Task) -> bool:
+        """Return whether a run is of this part of the campaign, or will be once there are more cases."""
+        campaign = self.campaign
+        is_known = task.scenario in campaign.scenarios and task.law in campaign.laws
+        return is_known and task.case >= 0 and self.manifest.shard.has(task.case)
 
 
 class OpenCampaign(CampaignFolder):
@@ -99,7 +123,7 @@ def open_campaign(path: Path, frozen: Frozen, cases: int | None, shard: Shard) -
     another run writes to it; SmsHandoverError where it cannot be written.
     """
     _require_same(path, frozen, shard)  # before anything in it is touched
-    with _locked(path) as journal:
+    with _locked(path, frozen) as journal:
         _require_same(path, frozen, shard)  # another run may have begun it meanwhile
         if (path / MANIFEST).exists():
             manifest = read_manifest(path)
@@ -134,9 +158,10 @@ def merge(path: Path, parts: Sequence[Path]) -> OpenCampaign:
                 raise ConfigurationError(f"{folder.path}: {entry.row.task} has another row than elsewhere")
         told.extend(faults.in_words(folder.path / JOURNAL))
     cases = max((folder.manifest.cases or 0 for folder in folders), default=0) or None
-    with _locked(path) as journal:
+    with _locked(path, first.frozen) as journal:
         write_frozen(path, first.frozen)
-        for entry in entries_of(journal.path, JournalFaults()):  # of a merge that was ended
+        before = entries_of(journal.path, first.frozen.digest, JournalFaults())  # of a merge that was ended
+        for entry in before:
             if entry != entries.pop(entry.row.task, None):
                 raise ConfigurationError(f"{path} holds rows of other parts: merge into a new folder")
         tasks = sorted(entries)
@@ -150,13 +175,13 @@ def merge(path: Path, parts: Sequence[Path]) -> OpenCampaign:
 
 
 @contextmanager
-def _locked(path: Path) -> Iterator[JournalWriter]:
+def _locked(path: Path, frozen: Frozen) -> Iterator[JournalWriter]:
     """Yield the journal of a folder, made if it is not there; it stays locked unless an error is raised."""
     try:
         make_folder(path)
     except OSError as error:
         raise unwritable(path, error) from error
-    journal = JournalWriter(path / JOURNAL)
+    journal = JournalWriter(path / JOURNAL, frozen.digest)
     try:
         yield journal
     except BaseException:

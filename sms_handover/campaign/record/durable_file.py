@@ -3,7 +3,7 @@
 import os
 from collections.abc import Mapping
 from contextlib import suppress
-from errno import EDQUOT, ENOSPC
+from errno import EDQUOT, ENOSPC, ENOTDIR
 from pathlib import Path
 
 from sms_handover.errors import SmsHandoverError
@@ -41,6 +41,8 @@ def unfinished_name(path: Path) -> Path:
 def make_folder(path: Path) -> None:
     """Make a folder with its parents unless it is there, and their names durable; raises OSError."""
     if not path.is_dir():
+        if path.exists():
+            raise NotADirectoryError(ENOTDIR, f"{path} is no folder")
         make_folder(path.parent)
         path.mkdir(exist_ok=True)
         sync_folder(path.parent)

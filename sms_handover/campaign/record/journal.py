@@ -1,7 +1,8 @@
 """Journal of a campaign: a line of JSON per finished case, on disk before the next one counts.
 
-A line has the row, what was measured beside it, and a check sum of both. A last line without its end is of a
-writer that was killed and is cut off; a line that is broken otherwise is named, put aside, and done again.
+A line has the row, what was measured beside it, the digest of its campaign, and a check sum of all. A last
+line without its end is of a writer that was killed and is cut off; a line that is broken otherwise is named,
+put aside, and done again. A sound line of another campaign is an error.
 """
 
 import fcntl
@@ -24,7 +25,7 @@ from sms_handover.errors import ConfigurationError
 
 JOURNAL = "journal.jsonl"
 _BROKEN = "broken.jsonl"
-_CHECK = 16  # hexadecimal digits
+_DIGITS = 16  # hexadecimal ones, of a check sum and of what names a campaign
 _NO_ENTRY = (ValueError, KeyError, TypeError, ArithmeticError, RecursionError)  # of a line that is broken
 
 
@@ -58,34 +59,47 @@ class JournalFaults:
         return (*said, torn) if self.torn else (*said,)
 
 
-def entries_of(path: Path, faults: JournalFaults) -> Iterator[Entry]:
-    """Yield the sound lines of a journal, none if there is no file; collect its faults.
+def entries_of(path: Path, campaign: str, faults: JournalFaults) -> Iterator[Entry]:
+    """Yield the sound lines of the journal of a campaign, given by its digest; collect the faults.
 
-    Raises OSError where it cannot be read.
+    There are none if there is no file. Raises ConfigurationError where it cannot be read, and on a sound line
+    of another campaign, or of before lines named theirs.
     """
     if not path.exists():
         return
-    with path.open("rb") as stream:
+    try:
+        stream = path.open("rb")
+    except OSError as error:
+        raise ConfigurationError(f"{path} cannot be read: {error.strerror}") from error
+    with stream:
         for number, line in enumerate(stream, start=1):
             if not line.endswith(b"\n"):
                 faults.torn = len(line)
                 return
             try:
-                yield _entry(line)
+                entry, its_campaign = _entry(line)
             except _NO_ENTRY:
                 faults.broken[number] = line
+                continue
+            if its_campaign != campaign[:_DIGITS]:
+                whose = f"campaign {its_campaign}" if its_campaign else "an earlier edition, which named none"
+                raise ConfigurationError(
+                    f"{path}, line {number} is of {whose}, not of campaign {campaign[:_DIGITS]}, which is in "
+                    "this folder: put its own journal back, or choose another folder"
+                )
+            yield entry
 
 
 class JournalWriter:
     """Appends to a journal that nobody else writes to."""
 
-    def __init__(self, path: Path) -> None:
-        """Lock the journal and mend it.
+    def __init__(self, path: Path, campaign: str) -> None:
+        """Lock the journal of a campaign, given by its digest, and mend it.
 
-        Raises ConfigurationError while somebody else writes to it, SmsHandoverError where it cannot be
-        written.
+        Raises ConfigurationError while somebody else writes to it or if it is of another campaign,
+        SmsHandoverError where it cannot be written.
         """
-        self.path = path
+        self.path, self._campaign = path, campaign
         self.faults = JournalFaults()
         self._descriptors: list[int] = []
         try:
@@ -98,12 +112,12 @@ class JournalWriter:
                     f"{path} is written to by another run of the campaign; wait for it, or end it first"
                 ) from None
             if isinstance(error, OSError):
-                raise unwritable(path, error) from error
+                raise unwritable(Path(error.filename or path), error) from error
             raise
 
     def _mend(self) -> None:
         """Cut off a torn last line, and put broken lines aside; the journal is whole at any time."""
-        for _ in entries_of(self.path, self.faults):
+        for _ in entries_of(self.path, self._campaign, self.faults):
             pass
         if self.faults.torn:
             os.ftruncate(self._descriptor, os.fstat(self._descriptor).st_size - self.faults.torn)
@@ -134,7 +148,7 @@ class JournalWriter:
 
     def add(self, *entries: Entry) -> None:
         """Append lines and wait until they are on disk; raises SmsHandoverError where they cannot be."""
-        self._write(b"".join(_line(*entry) for entry in entries))
+        self._write(b"".join(_line(*entry, self._campaign) for entry in entries))
 
     def _write(self, data: bytes) -> None:
         """Write bytes whole or not at all."""
@@ -160,22 +174,24 @@ def _lines(path: Path) -> list[bytes]:
         return list(stream)
 
 
-def _line(row: Row, beside: Beside) -> bytes:
-    """Return a line of a journal."""
-    measured = json.dumps(asdict(beside), sort_keys=True)
-    return f'{{"row":{row.text},"beside":{measured},"check":"{_check(row.text, measured)}"}}\n'.encode()
+def _line(row: Row, beside: Beside, campaign: str) -> bytes:
+    """Return a line of the journal of a campaign."""
+    measured, name = json.dumps(asdict(beside), sort_keys=True), campaign[:_DIGITS]
+    check = _check(row.text, measured, name)
+    return f'{{"row":{row.text},"beside":{measured},"campaign":"{name}","check":"{check}"}}\n'.encode()
 
 
-def _entry(line: bytes) -> Entry:
-    """Return what a line says; raises one of _NO_ENTRY if it is broken."""
+def _entry(line: bytes) -> tuple[Entry, str]:
+    """Return what a line says and its campaign, '' where it names none; raises one of _NO_ENTRY if broken."""
     values = json.loads(line)
     row, beside = row_of(values["row"]), Beside(**values["beside"])
     measured = json.dumps(asdict(beside), sort_keys=True)
-    if values["check"] != _check(row.text, measured):
+    named = (str(values["campaign"]),) if "campaign" in values else ()
+    if values["check"] != _check(row.text, measured, *named):
         raise ValueError("its check sum does not fit")
-    return Entry(row, beside)
+    return Entry(row, beside), "".join(named)
 
 
 def _check(*texts: str) -> str:
     """Return the check sum of texts."""
-    return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:_CHECK]
+    return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:_DIGITS]

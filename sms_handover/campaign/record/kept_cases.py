@@ -11,7 +11,13 @@ from sms_handover.campaign.cases.case_row import Row, Task
 from sms_handover.campaign.cases.retained import worst_path
 from sms_handover.campaign.definition.fields import BAG
 from sms_handover.campaign.record.campaign_folder import CampaignFolder
-from sms_handover.campaign.record.durable_file import sync_folder, unfinished_name, write_durably
+from sms_handover.campaign.record.durable_file import (
+    make_folder,
+    sync_folder,
+    unfinished_name,
+    unwritable,
+    write_durably,
+)
 from sms_handover.campaign.record.output import Output
 from sms_handover.campaign.statistics.worst_cases import rerun_command, worst_of
 from sms_handover.errors import SmsHandoverError
@@ -52,27 +58,30 @@ def keep_worst(folder: CampaignFolder, record: Record | None) -> Iterator[Output
             try:
                 path = _keep(folder, cases, row, record if keep.worst_as == BAG else None)
                 yield Output(f"{path}: equal to its row, bit for bit {place}")
-            except (SmsHandoverError, OSError) as error:
+            except SmsHandoverError as error:
                 one_scenario = len(folder.campaign.scenarios) == 1
                 command = rerun_command(str(folder.path), row.task, one_scenario=one_scenario)
                 yield Output(f"{row.task} is not kept: {error} {place}; {command}", is_lacking=True)
 
 
 def _keep(folder: CampaignFolder, cases: Cases, row: Row, record: Record | None) -> Path:
-    """Keep a case, recorded if that is given; return where. Raises SmsHandoverError or OSError."""
+    """Keep a case, recorded if that is given; return where. Raises SmsHandoverError."""
     path = worst_path(folder.path, folder.campaign.keep, row.task)
     if record is None:
         write_durably({path: _arrays(cases, row)})
         return path
     unfinished = unfinished_name(path)
-    _remove(unfinished)  # of a session that was killed
-    path.parent.mkdir(exist_ok=True)
     try:
-        record(folder, row.task, unfinished)
-        unfinished.replace(path)
-        sync_folder(path.parent)
-    finally:
-        _remove(unfinished)
+        make_folder(path.parent)
+        _remove(unfinished)  # of a session that was killed
+        try:
+            record(folder, row.task, unfinished)
+            unfinished.replace(path)
+            sync_folder(path.parent)
+        finally:
+            _remove(unfinished)
+    except OSError as error:
+        raise unwritable(path, error) from error
     return path
 
 

@@ -2,17 +2,25 @@
 
 import json
 import platform
+import re
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
+from reprlib import repr as shortened
+from typing import Any
 
 from sms_handover.bag.provenance import package_version, provenance
+from sms_handover.campaign.definition.fields import MOST_CASES
 from sms_handover.campaign.record.durable_file import write_durably
-from sms_handover.errors import ConfigurationError
+from sms_handover.configuration.field_specification import ValueSpec
+from sms_handover.errors import ConfigurationError, UnknownNameError
 
 MANIFEST = "manifest.json"
 _PACKAGES = ("distributed", "SALib", "scipy", "statsmodels", "pyarrow", "casadi")
 _OWN = ("start", "host")  # of a session, in which sessions may differ
+_DIGEST = re.compile(r"[0-9a-f]{64}")
+_CASES = ValueSpec("number of cases", minimum=1, maximum=MOST_CASES, kind=int)
+_TEXT = ValueSpec("text", kind=str)
 
 
 @dataclass(frozen=True)
@@ -88,12 +96,57 @@ def read_manifest(folder: Path) -> Manifest:
     path = folder / MANIFEST
     try:
         values = json.loads(path.read_text(encoding="utf-8"))
-        shard, sessions = Shard(**values.pop("shard")), tuple(map(dict, values.pop("sessions")))
-        return Manifest(**values, shard=shard, sessions=sessions)
     except FileNotFoundError:
         raise ConfigurationError(f"{folder} is no campaign folder: it has no {MANIFEST}") from None
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except OSError as error:
+        raise ConfigurationError(f"{path} cannot be read: {error.strerror}") from error
+    except (ValueError, RecursionError) as error:
         raise ConfigurationError(f"{path} cannot be read: {error}") from error
+    try:
+        return _manifest_of(values)
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{path}: {error}") from error
+
+
+def _manifest_of(values: object) -> Manifest:
+    """Return the manifest that JSON values say; raises ConfigurationError."""
+    top = _mapping(values, "manifest", [field.name for field in fields(Manifest)])
+    shard = _mapping(top["shard"], "shard", [field.name for field in fields(Shard)])
+    of = ValueSpec("number of parts", minimum=1, kind=int).check(shard["of"], "shard.of")
+    number = ValueSpec("part", minimum=1, maximum=of, kind=int).check(shard["number"], "shard.number")
+    if not isinstance(top["digest"], str) or not _DIGEST.fullmatch(top["digest"]):
+        raise ConfigurationError(f"digest is {shortened(top['digest'])}, must be 64 hexadecimal digits")
+    if not isinstance(top["sessions"], list):
+        raise ConfigurationError(f"sessions is {shortened(top['sessions'])}, must be a list")
+    return Manifest(
+        top["digest"],
+        _TEXT.check(top["name"], "name"),
+        None if top["cases"] is None else _CASES.check(top["cases"], "cases"),
+        Shard(number, of),
+        tuple(_session_of(one, f"sessions[{place}]") for place, one in enumerate(top["sessions"])),
+    )
+
+
+def _session_of(value: object, what: str) -> dict[str, str]:
+    """Return a session, whatever it has beside its own; raises ConfigurationError."""
+    texts = _mapping(value, what, _OWN, others=True)
+    return {key: _TEXT.check(text, f"{what}.{key}") for key, text in texts.items()}
+
+
+def _mapping(value: object, what: str, keys: Sequence[str], *, others: bool = False) -> dict[str, Any]:
+    """Return a mapping that has some keys, and no ``others`` unless they are allowed.
+
+    Raises ConfigurationError.
+    """
+    if not isinstance(value, dict):
+        raise ConfigurationError(f"{what} is {shortened(value)}, must be a mapping")
+    for key in value:
+        if key not in keys and not others:
+            raise UnknownNameError("key", key, keys, what)
+    for key in keys:
+        if key not in value:
+            raise ConfigurationError(f"{what} has no key {key!r}, must have {', '.join(keys)}")
+    return value
 
 
 def all_sessions(manifests: Sequence[Manifest]) -> tuple[dict[str, str], ...]:

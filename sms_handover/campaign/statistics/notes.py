@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from math import ceil, log2
 
+from sms_handover.campaign.definition.campaign_file import StopRule
 from sms_handover.campaign.definition.fields import GRID, LHS, LIST, MORRIS, SALTELLI, SOBOL
 from sms_handover.campaign.statistics.paired_tests import PairedTest
 from sms_handover.campaign.statistics.percentiles import least_cases
@@ -32,6 +33,18 @@ _SAMPLERS = {
 def note_on_sampler(kind: str) -> str:
     """Return what intervals and p values mean for the cases of a sampler, '' of independent draws."""
     return _SAMPLERS.get(kind, "").format(kind)
+
+
+def note_on_stop(rule: StopRule | None, stopped_at: int) -> str:
+    """Return what intervals mean where a campaign may stop early, '' where it may not."""
+    if rule is None:
+        return ""
+    looks = ", ".join(map(str, rule.looks))
+    return (
+        f"Stopping early makes an interval too narrow: it was looked at only after {looks} cases, to stop at "
+        f"a half width of {rule.half_width:g}. "
+        + (f"It stopped after {stopped_at}." if stopped_at else "It has not stopped early.")
+    )
 
 
 def note_on_tests(tests: Sequence[PairedTest]) -> str:

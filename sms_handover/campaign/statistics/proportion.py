@@ -31,11 +31,16 @@ class Proportion(NamedTuple):
 
 
 def proportion(successes: int, trials: int) -> Proportion:
-    """Return a proportion: its interval is about (p + z^2/2n) / (1 + z^2/n), [0, 1] without a trial."""
+    """Return a proportion: its interval is about (p + z^2/2n) / (1 + z^2/n), [0, 1] without a trial.
+
+    It holds the share in spite of rounding; its bound is 0 of no success, and 1 of successes only.
+    """
     if trials == 0:
         return Proportion(successes, trials, 0.0, 1.0)
     share, spread = successes / trials, _Z**2 / trials
     centre = share + spread / 2.0
     half = _Z * sqrt(share * (1.0 - share) / trials + spread / (4.0 * trials))
     low, high = ((centre + sign * half) / (1.0 + spread) for sign in (-1.0, 1.0))
-    return Proportion(successes, trials, max(0.0, low), min(1.0, high))
+    low = 0.0 if successes == 0 else min(low, share)
+    high = 1.0 if successes == trials else max(high, share)
+    return Proportion(successes, trials, low, high)

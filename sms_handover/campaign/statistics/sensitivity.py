@@ -13,7 +13,7 @@ from sms_handover.campaign.statistics.case_columns import CaseColumns
 
 CORRELATION = "correlation"
 DESIGNED = "correlation of a design"
-_FEWEST = 8  # [-] cases for a rank correlation
+FEWEST = 8  # [-] cases for a rank correlation
 _SEED = 0  # of the resampling that gives the intervals
 
 
@@ -57,7 +57,7 @@ def sensitivities(campaign: Campaign, columns: CaseColumns, metric: str) -> tupl
 def _correlation(kind: str, path: str, drawn: np.ndarray, values: np.ndarray) -> Sensitivity:
     """Return Spearman's rank correlation of a drawn value and a metric, with its p value if it has one."""
     known = ~(np.isnan(drawn) | np.isnan(values))
-    if known.sum() < _FEWEST or np.ptp(drawn[known]) == 0.0 or np.ptp(values[known]) == 0.0:
+    if known.sum() < FEWEST or np.ptp(drawn[known]) == 0.0 or np.ptp(values[known]) == 0.0:
         return Sensitivity(path, kind, nan, nan, nan, nan)
     found = needed("scipy.stats", "scipy").spearmanr(drawn[known], values[known])
     p = float(found.pvalue) if kind == CORRELATION else nan

@@ -1,6 +1,7 @@
 """Tables of a campaign with a column per law: success, percentiles, costs; and what tells laws apart."""
 
 from collections.abc import Mapping, Sequence
+from itertools import repeat
 from math import nan
 
 import numpy as np
@@ -38,12 +39,15 @@ def _scenario(campaign: Campaign, name: str, columns: Mapping[Group, CaseColumns
         Row("mission failures", tuple(map(_mission, found))),
         Row("numeric failures", tuple(map(_numeric, found))),
     ]
+    if all(one is None for one in found):
+        return Section(f"Scenario {name}", tuple(rows))
     further = [metric for metric in campaign.metrics if metric not in KEY_METRICS]
     for metric in (*KEY_METRICS, *further):
         unit = f" [{USUAL[metric][0]}]" if metric in USUAL else ""
         rows.append(Row(f"{metric}{unit}", _known(found, metric)))
-        for share, words in _SHARES:
-            rows.append(Row(f"  {words}", tuple(_percentile(one, metric, share) for one in found)))
+        if any(map(_count_known, found, repeat(metric))):
+            for share, words in _SHARES:
+                rows.append(Row(f"  {words}", tuple(_percentile(one, metric, share) for one in found)))
     rows.append(Row("CPU time of a case, mean [s]", tuple(map(_cpu, found))))
     if any(one is not None and not np.isnan(one.solve).all() for one in found):
         rows.append(Row("solve time of a plan, median [ms]", tuple(map(_solve, found))))
@@ -54,10 +58,15 @@ def _known(found: Sequence[CaseColumns | None], metric: str) -> tuple[str, ...]:
     """Return how many cases have a metric, '' of those that all have; nothing if every law has it in all."""
     cells = []
     for one in found:
-        known = 0 if one is None or metric not in one.metrics else int((~np.isnan(one.metrics[metric])).sum())
+        known = _count_known(one, metric)
         every = 0 if one is None else len(one.case)
         cells.append(f"of {known} cases" if known < every else "")
     return tuple(cells) if any(cells) else ()
+
+
+def _count_known(one: CaseColumns | None, metric: str) -> int:
+    """Return how many cases of a law have a metric."""
+    return 0 if one is None or metric not in one.metrics else int((~np.isnan(one.metrics[metric])).sum())
 
 
 def _success(one: CaseColumns | None) -> str:
@@ -119,16 +128,16 @@ def sensitivity_sections(
 ) -> tuple[tuple[tuple[str, ...], Section], ...]:
     """Return head and rows of the sensitivity of the worst-case metric, by scenario and law.
 
-    p values of correlations are adjusted over all of them.
+    p values of correlations are adjusted over all of them. What has too few cases for any is left out.
     """
     made = {group: sensitivities(campaign, one, campaign.worst_by) for group, one in columns.items()}
     every = [(group, one) for group, rows in made.items() for one in rows]
     adjusted = iter(holm([one.second if one.kind == CORRELATION else nan for _, one in every]))
     found = []
     for (scenario, law), rows in made.items():
-        if rows:
+        lines = tuple(_sensitivity(one, next(adjusted)) for one in rows)
+        if any(one.first == one.first for one in rows):
             title = f"{campaign.worst_by} in {scenario} under {law}, by {rows[0].kind}"
-            lines = tuple(_sensitivity(one, next(adjusted)) for one in rows)
             found.append((SENSITIVITY_HEADS[rows[0].kind], Section(title, lines)))
     return tuple(found)
 

@@ -51,9 +51,14 @@ def cause_of(row: Row) -> str:
 
 
 def rerun_command(folder: str, task: Task, *, one_scenario: bool) -> str:
-    """Return the command that runs a case again."""
-    scenario = "" if one_scenario else f" --scenario {task.scenario}"
-    return f"sms-handover campaign rerun {quote(folder)} {task.case} --law {task.law}{scenario}"
+    """Return the command that runs a case again, for a shell."""
+    scenario = "" if one_scenario else f" --scenario {quote(task.scenario)}"
+    return f"sms-handover campaign rerun {for_shell(folder)} {task.case} --law {quote(task.law)}{scenario}"
+
+
+def for_shell(path: str) -> str:
+    """Return a path as a word of a command for a shell, never taken for an option."""
+    return quote(f"./{path}" if path.startswith("-") else path)
 
 
 def failed(entries: Iterable[Entry]) -> Iterator[Row]:

@@ -3,11 +3,11 @@
 import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from shlex import quote
 
 from sms_handover.campaign.definition.frozen import CAMPAIGN_FILE
 from sms_handover.campaign.record.campaign_folder import merge
-from sms_handover.campaign.statistics.stop_rule import stopped_at
+from sms_handover.campaign.statistics.extent import extent_of
+from sms_handover.campaign.statistics.worst_cases import for_shell
 from sms_handover.cli.campaign.outputs import tell_outputs
 from sms_handover.cli.exit_codes import EXIT_INTERRUPTED, EXIT_LOSS, EXIT_OK
 
@@ -31,14 +31,13 @@ def command(options: Namespace) -> int:
     with merge(options.output, options.folders) as merged:
         for fault in merged.faults:
             print(fault, file=sys.stderr)
-        entries = list(merged.entries())
-        there, total = len(entries), merged.runs(stopped_at(merged.campaign, merged.cases, entries))
-        print(f"{there} of {total} rows", flush=True)
+        extent = extent_of(merged, list(merged.entries()))
+        print(f"{extent.rows} of {extent.runs} rows", flush=True)
         try:
             is_whole = tell_outputs(options.output)
         except KeyboardInterrupt:
-            file = quote(str(options.output / CAMPAIGN_FILE))
-            goes_on = f"'sms-handover campaign run {file} -o {quote(str(options.output))}' goes on"
+            file, folder = (for_shell(str(path)) for path in (options.output / CAMPAIGN_FILE, options.output))
+            goes_on = f"'sms-handover campaign run {file} -o {folder}' goes on"
             print(f"interrupted: all rows are in {options.output}; {goes_on}", file=sys.stderr)
             return EXIT_INTERRUPTED
-    return EXIT_OK if there >= total and is_whole else EXIT_LOSS
+    return EXIT_OK if extent.is_whole and is_whole else EXIT_LOSS

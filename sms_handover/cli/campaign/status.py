@@ -3,14 +3,17 @@
 import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from textwrap import fill
 
+from sms_handover.analysis.layout import WIDTH
 from sms_handover.campaign.cases.case import in_words, inputs_in_words
 from sms_handover.campaign.cases.case_row import Row
 from sms_handover.campaign.cases.retained import worst_path
 from sms_handover.campaign.record.campaign_folder import CampaignFolder
 from sms_handover.campaign.record.journal import JOURNAL, JournalFaults
+from sms_handover.campaign.statistics.extent import extent_of
+from sms_handover.campaign.statistics.notes import note_on_stop
 from sms_handover.campaign.statistics.proportion import proportion
-from sms_handover.campaign.statistics.stop_rule import stopped_at
 from sms_handover.campaign.statistics.worst_cases import failed, failures_by_cause, rerun_command, worst_of
 from sms_handover.cli.columns import columns
 from sms_handover.cli.exit_codes import EXIT_LOSS, EXIT_OK
@@ -46,10 +49,8 @@ def command(options: Namespace) -> int:
     entries = list(folder.entries(faults))
     for fault in faults.in_words(folder.path / JOURNAL):
         print(fault, file=sys.stderr)
-    stop = stopped_at(campaign, folder.cases, entries)
-    total = folder.runs(stop)
-    print(f"campaign {campaign.name}: {len(entries)} of {total} rows, shard {folder.manifest.shard}")
-    print(f"stopped after {stop} of {folder.cases} cases: every interval is narrow enough\n" if stop else "")
+    extent = extent_of(folder, entries)
+    print("\n".join(extent.in_words), end="\n\n")
     head = ("scenario", "law", "rows", "success", "numeric failures")
     table = []
     for scenario in campaign.scenarios:
@@ -59,16 +60,22 @@ def command(options: Namespace) -> int:
             numeric = sum(row.numeric_failure for row in rows)
             table.append((scenario, law, str(len(rows)), str(successes), str(numeric)))
     print(columns([head, *table]))
+    note = note_on_stop(campaign.stop, extent.stopped_at)
+    if note:
+        print("\n" + fill(note, WIDTH))
     one_scenario, listed = len(campaign.scenarios) == 1, list[Row]()
     if options.failed:
         causes = failures_by_cause(entries).most_common()
         heads = ("scenario", "law", "status", "times", "cause")
-        print("\n" + columns([heads, *((*who, str(times), cause) for (*who, cause), times in causes)]))
+        told = columns([heads, *((*who, str(times), cause) for (*who, cause), times in causes)])
+        print(f"\n{told if causes else extent.without_failure}")
         listed = list(failed(entries))
     elif options.worst:
         listed = [
             row for rows in worst_of(entries, campaign.worst_by, options.worst).values() for row in rows
         ]
+        if not listed:
+            print(f"\nNo case has {campaign.worst_by}.")
     for row in listed if options.worst else listed[:_MOST]:
         print(f"\n{in_words(row, campaign.worst_by)}\n  {inputs_in_words(row.inputs)}")
         print(f"  {rerun_command(str(folder.path), row.task, one_scenario=one_scenario)}")
@@ -77,4 +84,4 @@ def command(options: Namespace) -> int:
             print(f"  kept whole: {kept}")
     if options.failed and len(listed) > _MOST:
         print(f"\nand {len(listed) - _MOST} more")
-    return EXIT_OK if len(entries) >= total else EXIT_LOSS
+    return EXIT_OK if extent.is_whole else EXIT_LOSS
