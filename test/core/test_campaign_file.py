@@ -256,7 +256,7 @@ def test_designs_have_their_cases(sampler: Any, cases: int | None, count: int, t
 
 
 def test_a_table_has_the_cases(tmp_path: Path) -> None:
-    text = f"\ufeff{MASS}, law_of\r230, "a, b"\r250.5,true\r"  # as spreadsheets write it
+    text = f'\ufeff{MASS}, law_of\r230, "a, b"\r250.5,true\r'  # as spreadsheets write it
     (tmp_path / "points.csv").write_text(text, encoding="utf-8")
     file = written(tmp_path, sampler={"list": {"file": "points.csv"}}, cases=None, draws=None)
     found = Samples(read_campaign(file))

@@ -80,8 +80,8 @@ class Cases:
             inputs[path] = drawn[path] if is_file_path(path) and found == asked else found
             if is_exact(loop, path) and not is_same(asked, found):
                 raise _OverriddenDrawError(
-                    f"{path} was drawn as {asked}, and is {found}: a draw, a value or 'truth' of the scenario "
-                    "sets it too"
+                    f"{path} was drawn as {asked}, and is {found}: a draw, a value or 'truth' of the "
+                    "scenario sets it too"
                 )
 
     def _in_one_line(self, cause: str) -> str:
