@@ -994,8 +994,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "half a bag of an interrupted case left behind",
         "campaign/record/kept_cases",
-        "    finally:\n        _remove(unfinished)",
-        "    finally:\n        pass",
+        "        finally:\n            _remove(unfinished)",
+        "        finally:\n            pass",
         "campaign_commands",
     ),
     _core(
