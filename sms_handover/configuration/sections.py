@@ -89,6 +89,8 @@ class Section:
         try:
             yield
         except self._kind as error:
+            if str(error).startswith((f"{self._file}:", f"{self.where(key)}:")):
+                raise
             raise self.error(str(error), key) from error
 
     def only(self, required: Sequence[str], optional: Sequence[str] = ()) -> None:

@@ -3,14 +3,15 @@
 import re
 from collections.abc import Iterator, Sequence
 from collections.abc import Mapping as AnyMapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import reduce
-from typing import Any
+from typing import Any, get_args
 
 from sms_handover.configuration.conditions_fields import CONDITIONS_FIELDS
 from sms_handover.configuration.field_specification import (
     EitherSpec,
+    ListSpec,
     MappingSpec,
     NamedSpec,
     Spec,
@@ -20,7 +21,7 @@ from sms_handover.configuration.parameters import specs_of
 from sms_handover.configuration.robot_fields import ROBOT_FIELDS
 from sms_handover.configuration.schedule_fields import SCHEDULE_FIELDS
 from sms_handover.configuration.values import CONDITIONS, DEPUTY, ROBOT, SCHEDULE, path_of
-from sms_handover.errors import UnknownNameError
+from sms_handover.errors import ConfigurationError, UnknownNameError
 
 _NAME = re.compile(r"[^.\[\]]+")
 FIELDS: dict[str, MappingSpec] = {
@@ -82,6 +83,31 @@ def _corrected(spec: Spec, steps: Sequence[str]) -> list[str] | None:
         step = nearest[0]
     below = _corrected(spec.fields[step] if isinstance(spec, MappingSpec) else spec.each, rest)
     return None if below is None else [step, *below]
+
+
+def spec_of(path: str) -> Spec | None:
+    """Return the specification of a value of a document by its path, None where there is none."""
+    try:
+        _, document, steps = path_of(f"{path}:=")
+    except ConfigurationError:
+        return None
+    spec: Spec | None = FIELDS[document]
+    for step in steps:
+        spec = _inner(spec, step)
+    return spec
+
+
+def _inner(spec: Spec | None, step: str) -> Spec | None:
+    """Return the specification of a key or an entry, None where there is none."""
+    if isinstance(spec, EitherSpec):
+        spec = spec.other
+    if isinstance(spec, MappingSpec):
+        return spec.fields.get(step)
+    if isinstance(spec, NamedSpec | ListSpec):
+        return spec.each
+    if isinstance(spec, ValueSpec) and (kinds := get_args(spec.kind)) and step.isdecimal():
+        return replace(spec, kind=kinds[0], size=None)
+    return None
 
 
 def parameter_paths(node: str, cls: type[object], values: AnyMapping[str, object]) -> tuple[ValuePath, ...]:

@@ -1,6 +1,7 @@
 """Cases of a campaign: their rows, what is read back, and how a case ends that ends badly."""
 
 import json
+import re
 import subprocess
 from dataclasses import replace
 from pathlib import Path
@@ -152,7 +153,7 @@ def test_a_draw_that_does_not_arrive_is_an_error(tmp_path: Path, monkeypatch: py
     scenario = load_scenario("smooth", {"common.duration": 0.04})
     monkeypatch.setattr(cases, "scenario", lambda task: scenario)
     row = cases.run(TASK).row
-    assert row.status is Status.ERROR and f"{MASS} was drawn as" in row.cause
+    assert row.status is Status.ERROR and row.cause.startswith(f"{MASS} was drawn as")
 
 
 def test_a_draw_that_no_scenario_can_have_is_a_row(tmp_path: Path) -> None:
@@ -164,8 +165,13 @@ def test_a_draw_that_no_scenario_can_have_is_a_row(tmp_path: Path) -> None:
 def test_a_mission_failure_is_no_numeric_failure(tmp_path: Path) -> None:
     row = cases_of(tmp_path, success="complete", worst_by="approach.arm_a.final_error").run(TASK).row
     assert (row.status, row.numeric_failure, row.mission_failure) == (Status.MISSION_FAILED, False, True)
-    assert row.cause.startswith("ended at 0.04 s") and row.run_digest
+    assert row.cause == "not complete: ended at 0.04 s, the task ends at 60 s" and row.run_digest
     assert "approach.arm_a.final_error" in row.metrics, "or no case could be the worst"
+    cases = cases_of(tmp_path / "other", success="base_turn < 0")  # which says nothing of the end
+    alike = [cases.run(TASK._replace(case=case)) for case in range(2)]
+    assert re.fullmatch(r"not base_turn < 0 \(base_turn is [\d.e-]+\)", alike[0].row.cause)
+    counted = failures_by_cause(Entry(one.row, one.beside) for one in alike)
+    assert counted == {("smooth", "nmpc", "mission failed", "not base_turn < # (base_turn is #)"): 2}
 
 
 def test_a_run_without_a_plan_is_a_failed_mission_with_its_cause(
@@ -235,7 +241,7 @@ def test_bad_cases_end_as_rows_with_their_causes(tmp_path: Path, monkeypatch: py
         Status.DIED,
         "its process ended by signal SIGKILL: case 2 dies",
     )
-    assert (rows[3].status, rows[3].cause) == (Status.LIMIT, "more than 100 MB of memory")
+    assert (rows[3].status, rows[3].cause) == (Status.LIMIT, "more than 100 MB of memory (limits.memory)")
     assert [rows[case].run_digest for case in range(5)] == ["00", "", "", "", "00"]
     assert not list((tmp_path / "scratch").iterdir()), "whoever was killed left nothing behind"
 

@@ -8,6 +8,7 @@ import signal
 import sys
 import time
 from argparse import ArgumentParser
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -24,11 +25,13 @@ from sms_handover.analysis.equality import before, compare_runs
 from sms_handover.campaign.cases.case_row import Task
 from sms_handover.campaign.definition.campaign_file import read_campaign
 from sms_handover.campaign.definition.frozen import campaign_path
+from sms_handover.campaign.engine.run import Tally
 from sms_handover.campaign.record.campaign_folder import CampaignFolder
 from sms_handover.campaign.record.kept_cases import keep_worst
 from sms_handover.campaign.record.manifest import Shard
 from sms_handover.cli.campaign import rerun
 from sms_handover.cli.campaign.outputs import record_case
+from sms_handover.cli.campaign.run import _words
 from sms_handover.cli.main import main
 from sms_handover.errors import GraphError, SmsHandoverError
 from sms_handover.simulation.scenario import load_scenario
@@ -307,6 +310,11 @@ def test_a_recording_that_fails_says_so_with_its_last_line(
         (["campaign", "run", "FILE", "-j", "0"], "--jobs is 0, must be from 1 to 1024"),
         (["campaign", "run", "FILE", "--cases", "0"], "--cases is 0, must be from 1 to"),
         (["campaign", "run", "FILE", "-o", "OUT", "--cases", "1"], "--cases is 1, must be >= 2, which OUT"),
+        (["campaign", "run", "FILE", "-o", "FILE"], "no folder: choose another"),
+        (
+            ["campaign", "run", "FILE", "-o", "/proc/x"],
+            "/proc cannot be written to: No such file or directory",
+        ),
         (["campaign", "status", "OUT", "--worst", "-1"], "--worst is -1, must be >= 0"),
         (["campaign", "run", "FILE", "--shard", "4/3"], "shard '4/3' must be NUMBER/OF"),
         (["campaign", "run", "FILE", "--trust-network"], "--trust-network is for --scheduler"),
@@ -347,9 +355,15 @@ def test_check_tells_draws_and_cost(tmp_path: Path, capsys: pytest.CaptureFixtur
 @pytest.mark.parametrize(
     ("verb", "changes", "told"),
     [
-        ("check", {"success": "grasp_eror < 1"}, "unknown metric 'grasp_eror' (did you mean 'grasp_error'?)"),
+        (
+            "check",
+            {"success": "grasp_eror < 1"},
+            "campaign.yaml:15: success: unknown metric 'grasp_eror' (did you mean 'grasp_error'?): known are "
+            "those of 'sms-handover list metrics'",
+        ),
+        ("check", {"cases": None}, "campaign.yaml:1: cases is missing: give the number of cases by this key"),
         ("check", {"metrics": ["approach.arm_c.final_error"]}, "unknown metric 'approach.arm_c.final_error'"),
-        ("run", {"worst_by": "grasp_eror"}, "unknown metric 'grasp_eror'"),
+        ("run", {"worst_by": "grasp_eror"}, "campaign.yaml:16: worst_by: unknown metric 'grasp_eror'"),
         ("check", {"draws": {"robot.base.mas": UNIFORM}}, "unknown path 'robot.base.mas'"),
         ("run", {"draws": {"schedule.phases.carry.on_miss": ABORT}}, "cannot be drawn"),
         ("run", {"draws": {"robot.base.mass": UNIFORM}}, "case 0 of smooth under nmpc: robot.base.mass:=-"),
@@ -370,6 +384,14 @@ def test_a_campaign_that_no_case_could_have_does_not_begin(
     more = [] if verb == "check" else ["-o", str(out)]
     assert main([*words, str(written(tmp_path, **changes)), *more]) == 2
     assert told in capsys.readouterr().err.splitlines()[-1] and not out.exists()
+
+
+def test_progress_names_scenarios_where_there_are_several() -> None:
+    def words(*groups: tuple[str, str]) -> str:
+        return _words(Tally(8, groups, rows=Counter(groups), successes=Counter()), "")[1]
+
+    assert words(("a", "pid"), ("b", "pid")).split("; ")[1].startswith("b pid 0.0 %")
+    assert words(("a", "pid"), ("a", "nmpc")).split("; ")[1].startswith("nmpc 0.0 %")
 
 
 def test_the_shipped_campaign_is_one() -> None:

@@ -20,7 +20,7 @@ from sms_handover.campaign.definition.frozen import Frozen
 from sms_handover.campaign.definition.named_files import is_file_path, located
 from sms_handover.campaign.sampling.samples import Samples
 from sms_handover.campaign.sampling.streams import run_seed
-from sms_handover.errors import ConfigurationError, ControllerError, NoPlanError
+from sms_handover.errors import ConfigurationError, ControllerError, NoPlanError, SmsHandoverError
 from sms_handover.run_data import RunData
 from sms_handover.simulation.loop import Loop
 from sms_handover.simulation.observed_ticks import Ticks
@@ -30,7 +30,12 @@ from sms_handover.simulation.simulate import RunWithoutPlanError, run_of
 from sms_handover.types import Array
 
 _ONE_LINE = 300  # [characters] of a cause
+_COMPLETE = "complete"  # the metric for which a run must lack nothing
 _ADDRESS = re.compile(r" ?\b(at )?0x[0-9a-fA-F]{6,}")
+
+
+class _OverriddenDrawError(SmsHandoverError):
+    """A drawn value is not what plant or model have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,14 +72,16 @@ class Cases:
     def read_inputs(self, loop: Loop, case: int, inputs: dict[str, Value]) -> None:
         """Fill in the drawn values of a case as plant and model have them, files by the names in the draw.
 
-        Raises ConfigurationError on one that cannot be read back, RuntimeError on one that did not arrive.
+        Raises ConfigurationError on one that cannot be read back, SmsHandoverError on one that is not there.
         """
         drawn = self.samples.inputs(case)
         for path, asked in located(drawn, self._folder).items():
             found = read_back(loop, path)
             inputs[path] = drawn[path] if is_file_path(path) and found == asked else found
             if is_exact(loop, path) and not is_same(asked, found):
-                raise RuntimeError(f"{path} was drawn as {asked}, and is {found}")
+                raise _OverriddenDrawError(
+                    f"{path} was drawn as {asked}, and is {found}: another draw or value sets the same"
+                )
 
     def _in_one_line(self, cause: str) -> str:
         """Return a cause without what depends on the process: our folder, and addresses in memory."""
@@ -97,6 +104,8 @@ class Cases:
             status, cause = Status.NUMERIC_FAILURE, f"{type(error).__name__}: {error}"
         except MemoryError:
             status, cause = Status.LIMIT, "out of memory"
+        except _OverriddenDrawError as error:
+            status, cause = Status.ERROR, str(error)
         except Exception as error:
             status, cause = Status.ERROR, f"{type(error).__name__}: {error}"
         digest = run_digest(run) if run is not None else ""
@@ -141,7 +150,10 @@ class Cases:
         metrics.update(found)
         if campaign.success.holds(metrics):
             return Status.SUCCEEDED, "", run
-        return Status.MISSION_FAILED, lacking[0] if lacking else f"not {campaign.success.text}", run
+        cause = campaign.success.why_not(metrics)
+        if lacking and (_COMPLETE in campaign.success.names or metrics["grasps_missed"]):
+            cause = f"{cause}: {lacking[0]}"
+        return Status.MISSION_FAILED, cause, run
 
 
 def _is_finite(run: RunData) -> bool:

@@ -156,7 +156,7 @@ class CaseProcess:
                 return None, Status.LIMIT, f"more than {limit_s:g} s of wall time"
             elif takes_more(child.pid, self._limits.memory):
                 self._kill()
-                return None, Status.LIMIT, f"more than {self._limits.memory:g} MB of memory"
+                return None, Status.LIMIT, f"more than {self._limits.memory:g} MB of memory (limits.memory)"
         line, _, self._pending = self._pending.partition(b"\n")
         answer: dict[str, object] = json.loads(line)
         return answer, Status.SUCCEEDED, ""

@@ -1,8 +1,9 @@
 """Campaign file: which scenarios run under which laws with which draws, and what is made of them."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from reprlib import repr as shortened
 from types import MappingProxyType
@@ -30,12 +31,15 @@ from sms_handover.campaign.definition.fields import (
 )
 from sms_handover.campaign.definition.sampler import Sampler, cases_of, read_sampler
 from sms_handover.campaign.definition.success_expression import SuccessExpression, success_expression
-from sms_handover.campaign.definition.values import read_values, require_settable
+from sms_handover.campaign.definition.value_targets import paths_of, set_twice
+from sms_handover.campaign.definition.values import read_values, require_allowed, require_settable
 from sms_handover.configuration.sections import Section
 from sms_handover.control.registry import law_names, require_law
 from sms_handover.errors import ConfigurationError
 
-_NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,63}")
+_NAME_IN_WORDS = "must be 1 to 64 letters, digits, _ or -, not beginning with -"
+_LAW = re.compile(r"\w[\w.-]*")  # one that can be part of a file name and an argument of a command
 
 
 @dataclass(frozen=True)
@@ -114,7 +118,7 @@ def read_campaign(path: Path, cases: int | None = None) -> Campaign:
     root = Section.read(path, spec=CAMPAIGN_FIELDS)
     name = root.text("name")
     if not _NAME.fullmatch(name):
-        raise root.error(f"name is {name!r}, must be 1 to 64 letters, digits, _ or -", "name")
+        raise root.error(f"name is {name!r}, {_NAME_IN_WORDS}", "name")
     sampler = read_sampler(root, path.parent)
     if "cases" in root and sampler.kind not in COUNTED:
         raise root.error(f"sampler {sampler.kind} has its own number of cases: leave cases out", "cases")
@@ -129,6 +133,9 @@ def read_campaign(path: Path, cases: int | None = None) -> Campaign:
     _require_apart(root, draws, groups, sampler)
     if sampler.kind not in COUNTED and (count := cases_of(sampler, list(draws.values()))) > MOST_CASES:
         raise root.error(f"sampler {sampler.kind} has {count} cases, must be <= {MOST_CASES}", "sampler")
+    scenarios, laws, values = _scenarios(root), _laws(root), read_values(root)
+    _require_different(root, scenarios, laws)
+    _require_once(root, sampler, values, scenarios)
     with root.located("success"):
         success = success_expression(root.text("success") if "success" in root else "complete")
     return Campaign(
@@ -137,9 +144,9 @@ def read_campaign(path: Path, cases: int | None = None) -> Campaign:
         seed=int(root.number("seed")),
         cases=cases,
         sampler=sampler,
-        scenarios=MappingProxyType(_scenarios(root)),
-        laws=_laws(root),
-        values=MappingProxyType(read_values(root)),
+        scenarios=MappingProxyType(scenarios),
+        laws=laws,
+        values=MappingProxyType(values),
         draws=MappingProxyType(draws),
         groups=groups,
         success=success,
@@ -157,7 +164,7 @@ def _scenarios(root: Section) -> dict[str, ScenarioChoice]:
     found = {}
     for name in section.keys:
         if not _NAME.fullmatch(name):
-            raise section.error(f"scenario name {name!r} must be 1 to 64 letters, digits, _ or -", name)
+            raise section.error(f"scenario name {name!r} {_NAME_IN_WORDS}", name)
         if isinstance(section.value(name), str):
             found[name] = ScenarioChoice(section.text(name), MappingProxyType({}))
         else:
@@ -172,11 +179,30 @@ def _laws(root: Section) -> tuple[str, ...]:
     """Return the control laws, each once."""
     laws = _texts(root, "laws")
     for law in laws:
+        if not _LAW.fullmatch(law):
+            raise root.error(
+                f"law {law!r} cannot be in a campaign, which names files by it: its name must be letters, "
+                "digits, _, . or -, beginning with a letter, a digit or _",
+                "laws",
+            )
         require_law(law, f"{root.where('laws')}: laws")
     if not laws or len(set(laws)) < len(laws):
         known = ", ".join(law_names())
         raise root.error(f"laws is {list(laws)}, must be one or more of {known}, each once", "laws")
     return laws
+
+
+def _require_different(root: Section, scenarios: Iterable[str], laws: Sequence[str]) -> None:
+    """Reject scenarios and laws whose names, joined as those of files are, are the same."""
+    seen: dict[str, tuple[str, str]] = {}
+    for pair in product(scenarios, laws):
+        other = seen.setdefault("_".join(pair), pair)
+        if other != pair:
+            raise root.error(
+                f"scenario {pair[0]!r} with law {pair[1]!r} would have the files of scenario {other[0]!r} "
+                f"with law {other[1]!r}: rename a scenario",
+                "scenarios",
+            )
 
 
 def _texts(root: Section, key: str) -> tuple[str, ...]:
@@ -212,10 +238,10 @@ def _distribution(section: Section, path: str) -> Distribution:
             return Uniform(inner.number("low"), inner.number("high"))
         if kind == "integers":
             return Integers(int(inner.number("low")), int(inner.number("high")))
-        return _choice(inner)
+        return _choice(inner, path)
 
 
-def _choice(section: Section) -> Choice:
+def _choice(section: Section, path: str) -> Choice:
     """Return a choice of plain values."""
     values = section.value("values")
     if not isinstance(values, list) or not all(isinstance(item, bool | int | float | str) for item in values):
@@ -224,6 +250,9 @@ def _choice(section: Section) -> Choice:
             "false",
             "values",
         )
+    for value in values:
+        with section.located("values"):
+            require_allowed(path, value)
     weights = section.vector("weights", missing=(1.0,) * len(values))
     return Choice(tuple(values), weights)
 
@@ -248,17 +277,34 @@ def _groups(root: Section) -> tuple[Correlated, ...]:
 def _require_apart(
     root: Section, draws: Mapping[str, Any], groups: tuple[Correlated, ...], sampler: Sampler
 ) -> None:
-    """Reject a path that is drawn twice, and draws beside a table that has the values already."""
-    grouped = [path for group in groups for path in group.normals]
-    for path in grouped:
-        if path in draws or grouped.count(path) > 1:
-            raise root.error(f"{path} is drawn twice", "correlated")
+    """Reject draws beside a table that has the values already, and those that a sampler cannot take."""
     if sampler.kind == LIST and (draws or groups):
         raise root.error("sampler list has all values in its file: leave draws and correlated out", "sampler")
     if sampler.kind not in (RANDOM, LIST) and not (draws or groups):
         raise root.error(f"sampler {sampler.kind} needs draws", "sampler")
     if sampler.kind not in (RANDOM, *COUNTED, LIST) and groups:
         raise root.error(f"sampler {sampler.kind} needs independent draws: leave correlated out", "sampler")
+
+
+def _require_once(
+    root: Section, sampler: Sampler, values: Mapping[str, object], scenarios: Mapping[str, ScenarioChoice]
+) -> None:
+    """Reject a drawn value that another draw, or one of the values, sets too."""
+    drawn: list[tuple[str, str]] = []  # path and place
+    if "draws" in root:
+        drawn += [(path, root.section("draws").where(path)) for path in root.section("draws").keys]
+    if "correlated" in root:
+        for section in root.sections("correlated"):
+            drawn += [(path, section.section("draws").where(path)) for path in section.section("draws").keys]
+    if sampler.rows:
+        drawn += [(path, f"{root.where('sampler')}: column {path}") for path in sampler.rows[0]]
+    fixed = [
+        path for given in (values, *(one.values for one in scenarios.values())) for path in paths_of(given)
+    ]
+    for path, other in set_twice([path for path, _ in drawn], fixed):
+        place = [place for one, place in drawn if one == path][-1]
+        by = "among values" if other in fixed else "drawn"
+        raise ConfigurationError(f"{place}: {path} is set twice: {other} is {by} too; leave one out")
 
 
 def _stop(root: Section, kind: str) -> StopRule | None:

@@ -19,6 +19,7 @@ MORRIS_LEVELS = 4  # [-] by default, as its authors have it
 NONE, FAILURES, ALL = "none", "failures", "all"
 DATA, BAG = "data", "bag"
 MOST_CASES = 100_000_000
+_MOST_LEVELS = 100_000  # of a grid, each of which is computed beforehand
 _LARGEST = 2**53  # from which on not every whole number is a double
 
 _NUMBER = {kind: ValueSpec(kind) for kind in ("mean", "low", "high")}
@@ -58,14 +59,18 @@ _SAMPLER = EitherSpec(
         "a design, which has its own number of cases",
         optional={
             GRID: MappingSpec(
-                "all combinations", {"levels": ValueSpec("quantiles of each draw", minimum=1, kind=int)}
+                "all combinations",
+                {"levels": ValueSpec("quantiles of each draw", minimum=1, maximum=_MOST_LEVELS, kind=int)},
             ),
             MORRIS: MappingSpec(
                 "elementary effects [Morris1991]",
-                {"trajectories": ValueSpec("number of trajectories", minimum=2, kind=int)},
+                {"trajectories": ValueSpec("number of trajectories", minimum=2, maximum=10_000, kind=int)},
                 {
                     "levels": ValueSpec(
-                        f"levels of each draw, even; by default {MORRIS_LEVELS}", minimum=2, kind=int
+                        f"levels of each draw, even; by default {MORRIS_LEVELS}",
+                        minimum=2,
+                        maximum=100,
+                        kind=int,
                     )
                 },
             ),

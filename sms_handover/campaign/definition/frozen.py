@@ -12,11 +12,11 @@ from sms_handover.campaign.definition.campaign_file import Campaign, read_campai
 from sms_handover.campaign.definition.distributions import Choice, Value
 from sms_handover.campaign.definition.fields import EXTENDABLE, LIST
 from sms_handover.campaign.definition.named_files import (
-    FOLDERS,
     is_file_path,
     keep_cell,
     kept,
     kept_draw,
+    kept_name,
     mesh_digests,
 )
 from sms_handover.campaign.definition.sampler import csv_file_of
@@ -153,15 +153,27 @@ def _kept_values(
 
 
 def read_frozen(folder: Path) -> Frozen:
-    """Return the campaign that was frozen below a folder; raises ConfigurationError."""
-    inner = [path for name in (_SCENARIOS, *FOLDERS) for path in (folder / name).glob(f"*{_SUFFIX}")]
-    names = [CAMPAIGN_FILE, _TABLE, _MESHES, *(path.relative_to(folder).as_posix() for path in inner)]
+    """Return the campaign that was frozen below a folder, beside anything; raises ConfigurationError."""
+    if not (folder / CAMPAIGN_FILE).is_file():
+        raise ConfigurationError(f"{folder} is no campaign folder: it has no {CAMPAIGN_FILE}")
+    campaign = read_campaign(folder / CAMPAIGN_FILE)
+    names = [CAMPAIGN_FILE, *(one.source for one in campaign.scenarios.values())]
+    for name in names:
+        if not (folder / name).is_file():
+            raise ConfigurationError(f"{folder}: its {CAMPAIGN_FILE} names {name}, which is not there")
+    names += [name for name in (_TABLE, _MESHES, *_named(campaign)) if (folder / name).is_file()]
     try:
-        files = {
-            name: (folder / name).read_text(encoding="utf-8") for name in names if (folder / name).is_file()
-        }
+        return Frozen({name: (folder / name).read_text(encoding="utf-8") for name in names})
     except (OSError, ValueError) as error:
         raise ConfigurationError(f"{folder} cannot be read as a campaign: {error}") from error
-    if CAMPAIGN_FILE not in files:
-        raise ConfigurationError(f"{folder} is no campaign folder: it has no {CAMPAIGN_FILE}")
-    return Frozen(files)
+
+
+def _named(campaign: Campaign) -> set[str]:
+    """Return the names of the files that a frozen campaign has for its values, drawn ones and cells."""
+    values = [campaign.values, *(one.values for one in campaign.scenarios.values())]
+    given = [
+        *(item for each in values for item in each.items()),
+        *((p, value) for p, one in campaign.draws.items() if isinstance(one, Choice) for value in one.values),
+        *_file_cells(campaign),
+    ]
+    return {kept_name(path, value) for path, value in given if is_file_path(path) and isinstance(value, str)}

@@ -17,7 +17,6 @@ _CONDITIONS = "common.conditions"
 _FOLDERS: Mapping[str, str] = MappingProxyType(
     {_CONDITIONS: "conditions", "common.robot": "robots", "common.schedule": "schedules"}
 )
-FOLDERS = tuple(_FOLDERS.values())  # of a frozen campaign, in which they are
 _SUFFIX, _MESH = ".yaml", "mesh"
 
 
@@ -66,10 +65,15 @@ def located(values: Mapping[str, object], folder: Path) -> dict[str, object]:
     found = dict(values)
     for path, value in values.items():
         if is_file_path(path) and isinstance(value, str) and value:
-            name = value if value.endswith(_SUFFIX) else f"{_FOLDERS[path]}/{value}{_SUFFIX}"
-            if (folder / name).is_file():
-                found[path] = str(folder / name)
+            file = folder / kept_name(path, value)
+            if file.is_file():
+                found[path] = str(file)
     return found
+
+
+def kept_name(path: str, value: str) -> str:
+    """Return the name, within a frozen campaign, of the file that one of its values stands for."""
+    return value if value.endswith(_SUFFIX) else f"{_FOLDERS[path]}/{value}{_SUFFIX}"
 
 
 def mesh_digests(files: Mapping[str, str]) -> dict[str, str]:

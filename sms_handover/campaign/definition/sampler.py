@@ -1,13 +1,12 @@
-"""Sampler of a campaign: how its cases are spread, how many they are, and the table that may have them."""
+"""Sampler of a campaign: how its cases are spread, and how many they are."""
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from io import StringIO
 from math import prod
 from pathlib import Path
 from types import MappingProxyType
 
+from sms_handover.campaign.definition.case_table import read_table
 from sms_handover.campaign.definition.distributions import Distribution, Value
 from sms_handover.campaign.definition.fields import (
     CAMPAIGN_FIELDS,
@@ -17,12 +16,7 @@ from sms_handover.campaign.definition.fields import (
     MORRIS,
     RANDOM,
 )
-from sms_handover.campaign.definition.values import require_settable
 from sms_handover.configuration.sections import Section
-from sms_handover.configuration.yaml_reader import load_value, read_text
-from sms_handover.errors import ConfigurationError
-
-_LARGEST_TABLE = 2**26  # [byte] of a CSV file of cases
 
 
 @dataclass(frozen=True)
@@ -44,7 +38,7 @@ def read_sampler(root: Section, folder: Path) -> Sampler:
     inner = section.section(kind)
     if kind == LIST:
         with inner.located("file"):
-            return Sampler(kind, {}, _table(folder / inner.text("file")))
+            return Sampler(kind, {}, read_table(folder / inner.text("file")))
     numbers = {key: int(inner.number(key)) for key in inner.keys}
     base, levels = numbers.get("base", 2), numbers.get("levels", 2)
     if base & (base - 1):
@@ -52,26 +46,6 @@ def read_sampler(root: Section, folder: Path) -> Sampler:
     if kind == MORRIS and levels % 2:
         raise inner.error(f"{inner.path('levels')} is {levels}, must be even", "levels")
     return Sampler(kind, MappingProxyType(numbers))
-
-
-def _table(path: Path) -> tuple[Mapping[str, Value], ...]:
-    """Return the rows of a CSV file, whose header has the dotted paths; raises ConfigurationError."""
-    try:
-        text = read_text(path, _LARGEST_TABLE)
-    except (OSError, ValueError) as error:
-        raise ConfigurationError(f"cannot read {path}: {error}") from error
-    header, *rows = [row for row in csv.reader(StringIO(text)) if row] or [[]]
-    if not rows or not all(header) or len(set(header)) < len(header):
-        raise ConfigurationError(f"{path} must have a header of different dotted paths and a row per case")
-    found = []
-    for column in header:
-        require_settable(column, f"{path}: column {column}")
-    for number, row in enumerate(rows, start=2):
-        if len(row) != len(header):
-            raise ConfigurationError(f"{path}: row {number} has {len(row)} cells, must have {len(header)}")
-        values = [load_value(cell, f"{path}: row {number}: {cell}") for cell in row]
-        found.append(MappingProxyType(dict(zip(header, values, strict=True))))
-    return tuple(found)
 
 
 def cases_of(sampler: Sampler, draws: Sequence[Distribution]) -> int:

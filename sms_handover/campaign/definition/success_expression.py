@@ -10,12 +10,14 @@ import ast
 import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from math import nan
+from math import isfinite, nan
 from types import MappingProxyType
 
 from sms_handover.errors import ConfigurationError, UnknownNameError
 
 _LONGEST = 1000  # [characters]
+_LONGEST_TOLD = 120  # [characters] of it, or of a part, in a message
+_MOST_TOLD = 4  # metrics of it
 
 
 def _least(*values: float) -> float:
@@ -89,11 +91,29 @@ Node = Constant | Metric | Applied
 
 
 @dataclass(frozen=True)
+class Part:
+    """A piece of an expression that all of it needs to be true, as it was written."""
+
+    text: str
+    node: Node
+
+    def in_words(self, metrics: Metrics) -> str:
+        """Return that it does not hold, with the values of its metrics, as ``not a < 1 (a is 1.2)``."""
+        told = _short(self.text)
+        names = dict.fromkeys(_names(self.node))
+        if isinstance(self.node, Metric) and self.node.of(metrics) == 0:  # its value says nothing more
+            names = {}
+        values = ", ".join(f"{name} is {_told(metrics[name])}" for name in list(names)[:_MOST_TOLD])
+        return f"not {told} ({values})" if values else f"not {told}"
+
+
+@dataclass(frozen=True)
 class SuccessExpression:
-    """An expression as it was written, and its tree."""
+    """An expression as it was written, its tree, and the operands of an ``and`` that it may be of."""
 
     text: str
     tree: Node
+    parts: tuple[Part, ...]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -105,11 +125,23 @@ class SuccessExpression:
         value = self.tree.of(metrics)
         return value == value and bool(value)
 
+    def why_not(self, metrics: Metrics) -> str:
+        """Return the first part that is false, or else not defined, with the values of its metrics.
+
+        It is the whole expression where that is no ``and``.
+        """
+        values = [part.node.of(metrics) for part in self.parts]
+        false = [part for part, value in zip(self.parts, values, strict=True) if value == 0]
+        undefined = [part for part, value in zip(self.parts, values, strict=True) if value != value]
+        return (false or undefined or list(self.parts))[0].in_words(metrics)
+
     def require_known(self, known: Mapping[str, object]) -> None:
         """Raise UnknownNameError unless all its metrics are known."""
         for name in self.names:
             if name not in known:
-                raise UnknownNameError("metric", name, known, f"success {self.text!r}", "sms-handover check")
+                raise UnknownNameError(
+                    "metric", name, known, f"success {self.text!r}", "sms-handover list metrics"
+                )
 
 
 def success_expression(text: str) -> SuccessExpression:
@@ -117,18 +149,24 @@ def success_expression(text: str) -> SuccessExpression:
     if len(text) > _LONGEST:
         raise ConfigurationError(f"success has {len(text)} characters, must be <= {_LONGEST}")
     try:
-        tree = _node(ast.parse(text, mode="eval").body)
+        body = ast.parse(text, mode="eval").body
+        tree = _node(body)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        told = f"success {_short(text)!r}"
         if isinstance(error, ConfigurationError):
-            raise ConfigurationError(f"success {text!r}: {error}") from None
-        raise ConfigurationError(f"success {text!r} is not an expression over metrics") from None
-    return SuccessExpression(text, tree)
+            raise ConfigurationError(f"{told}: {error}") from None
+        raise ConfigurationError(f"{told} is not an expression over metrics") from None
+    if isinstance(body, ast.BoolOp) and isinstance(body.op, ast.And):
+        parts = tuple(Part(ast.get_source_segment(text, one) or text, _node(one)) for one in body.values)
+    else:
+        parts = (Part(text, tree),)
+    return SuccessExpression(text, tree, parts)
 
 
 def _node(node: ast.AST) -> Node:
     """Return the tree of a piece of syntax; raises ConfigurationError on what is not allowed."""
     if isinstance(node, ast.Constant) and isinstance(node.value, bool | int | float):
-        return Constant(node.value)
+        return _constant(node.value)
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         return Metric(node.value)
     if isinstance(node, ast.Name | ast.Attribute):
@@ -142,7 +180,10 @@ def _node(node: ast.AST) -> Node:
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
         return Applied(operator.neg, (_node(node.operand),))
     if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
-        return Applied(_BINARY[type(node.op)], (_node(node.left), _node(node.right)))
+        left, right = _node(node.left), _node(node.right)
+        if isinstance(node.op, ast.Div) and not any(_names(right)) and not right.of({}):
+            raise ConfigurationError(f"{ast.unparse(node)!r} divides by zero")
+        return Applied(_BINARY[type(node.op)], (left, right))
     if isinstance(node, ast.Compare) and all(type(one) in _COMPARED for one in node.ops):
         terms = [_node(term) for term in (node.left, *node.comparators)]
         pairs = zip(node.ops, terms[:-1], terms[1:], strict=True)
@@ -156,6 +197,27 @@ def _node(node: ast.AST) -> Node:
             )
         return Applied(_CALLED[node.func.id], tuple(map(_node, node.args)))
     raise ConfigurationError(f"{ast.unparse(node)!r} is not allowed: see docs/campaigns.md for what is")
+
+
+def _constant(value: float | bool) -> Constant:
+    """Return a number; raises ConfigurationError on one that no float can be."""
+    try:
+        is_finite = isfinite(value)
+    except OverflowError:  # a whole number of more than 308 digits
+        is_finite = False
+    if not is_finite:
+        raise ConfigurationError("a number in it is larger than any that can be computed with, 1.8e308")
+    return Constant(value)
+
+
+def _short(text: str) -> str:
+    """Return a text, of a long one its beginning."""
+    return text if len(text) <= _LONGEST_TOLD else f"{text[:_LONGEST_TOLD]}..."
+
+
+def _told(value: float | None) -> str:
+    """Return the value of a metric in words."""
+    return "not defined" if value is None else f"{value:.4g}"
 
 
 def _dotted(node: ast.AST) -> str:

@@ -26,7 +26,9 @@ class Samples:
         if self._sampler.kind not in COUNTED:
             return cases_of(self._sampler, list(self._campaign.draws.values()))
         if self._campaign.cases is None:
-            raise ConfigurationError(f"campaign {self._campaign.name!r} has no number of cases: give --cases")
+            raise ConfigurationError(
+                f"campaign {self._campaign.name!r} has no number of cases: give the key 'cases'"
+            )
         return self._campaign.cases
 
     def inputs(self, case: int) -> dict[str, Value]:

@@ -3,7 +3,9 @@
 import sys
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Callable, Iterator
+from errno import EDQUOT, ENOSPC
 from pathlib import Path
+from tempfile import TemporaryFile
 from time import monotonic
 
 from sms_handover.campaign.cases.first_cases import require_runnable
@@ -87,6 +89,7 @@ def command(options: Namespace) -> int:
         raise ConfigurationError("a shard knows nothing of the others: leave stop out, or --shard")
     part = f".shard_{shard.number}_of_{shard.of}" if options.shard else ""
     folder = options.output or Path("runs") / f"{campaign.name}{part}"
+    _require_writable(folder)
     known = read_manifest(folder).cases or 0 if (folder / MANIFEST).exists() else 0
     if options.cases is not None and options.cases < known:
         raise ConfigurationError(
@@ -112,6 +115,24 @@ def command(options: Namespace) -> int:
             print(f"interrupted: the same command goes on; what is there is in {folder}", file=sys.stderr)
             return EXIT_INTERRUPTED
     return EXIT_OK if is_whole else EXIT_LOSS
+
+
+def _require_writable(folder: Path) -> None:
+    """Raise ConfigurationError where no folder can be made, or written to, before any case is tried."""
+    place = folder
+    try:
+        while not place.exists():
+            place = place.parent
+        if not place.is_dir():
+            raise ConfigurationError(f"--output is {folder}, but {place} is no folder: choose another")
+        with TemporaryFile(dir=place):  # which never has a name
+            pass
+    except OSError as error:
+        if error.errno in (ENOSPC, EDQUOT):  # the same command goes on once there is room, and says so
+            return
+        raise ConfigurationError(
+            f"--output is {folder}, but {place} cannot be written to: {error.strerror}; choose another"
+        ) from error
 
 
 def _notices(opened: OpenCampaign) -> Iterator[str]:
@@ -147,7 +168,11 @@ class _Shown:
 
 def _words(tally: Tally, pace: str) -> tuple[str, str]:
     """Return how far a campaign is as text, and its successes as details."""
-    successes = "; ".join(f"{law} {tally.proportion((scenario, law))}" for scenario, law in tally.groups)
+    several = len({scenario for scenario, _ in tally.groups}) > 1
+    successes = "; ".join(
+        f"{f'{scenario} ' if several else ''}{law} {tally.proportion((scenario, law))}"
+        for scenario, law in tally.groups
+    )
     return f"{tally.done} of {tally.total}", f"{pace}{successes}"
 
 
