@@ -1017,14 +1017,14 @@ BREAKS: tuple[Break, ...] = (
         "campaign/record/journal",
         "if its_campaign != campaign[:_DIGITS]:",
         "if False:",
-        "campaign_record",
+        "campaign_folder",
     ),
     _core(
         "a row of a law that the campaign does not have counted",
         "campaign/record/campaign_folder",
         "if not self._has(task):",
         "if False:",
-        "campaign_record",
+        "campaign_folder",
     ),
     _core(
         "Wilson's bounds outside the share by rounding",
