@@ -8,9 +8,9 @@ from typing import Any
 
 import yaml
 
-from sms_handover.campaign.cases.case_process import CASE_PROGRAM
-from sms_handover.campaign.cases.case_row import Row, Task
-from sms_handover.campaign.definition.frozen import freeze
+from sms_handover.campaign.cases.case_process import CASE_PROGRAM, Done
+from sms_handover.campaign.cases.case_row import Beside, Row, Status, Task
+from sms_handover.campaign.definition.frozen import Frozen, freeze
 from sms_handover.campaign.engine.run import Tally, run_campaign
 from sms_handover.campaign.engine.workers import SerialWorkers
 from sms_handover.campaign.record.campaign_folder import CampaignFolder, open_campaign
@@ -68,3 +68,17 @@ def digests_of(folder: Path) -> dict[Task, str]:
 def command(*words: str, **options: Any) -> "subprocess.Popen[str]":
     """Start a verb of the command line as a process of its own."""
     return subprocess.Popen([sys.executable, "-m", "sms_handover.cli.main", *words], text=True, **options)
+
+
+def made_up(case: int, trajectory: bytes = b"") -> Done:
+    """Return a finished case that nobody ran."""
+    row = Row(Task(case, "smooth", "nmpc"), case, {"x": 0.1 * case}, Status.SUCCEEDED, "", {"y": 1e-3}, "00")
+    return Done(row, Beside(0.0, 0.1, "nowhere"), trajectory)
+
+
+def begun(path: Path, cases: Sequence[int] = range(6), shard: Shard = WHOLE) -> Frozen:
+    """Make a folder of a campaign of six cases with rows of some; return the campaign."""
+    frozen, number = freeze(written(path.parent / "file", cases=6))
+    with open_campaign(path, frozen, number, shard) as opened:
+        opened.add(*map(made_up, cases))
+    return frozen

@@ -186,6 +186,8 @@ def test_of_what_no_case_has_there_is_no_table_and_no_plot(tmp_path: Path) -> No
     """As where every case failed; one case has no sensitivity, two laws without metrics have no p value."""
     campaign = read_campaign(written(tmp_path, laws=["nmpc", "pid"]))
     failed = {("smooth", law): columns([nan] * 3, [False] * 3, x=np.arange(3.0)) for law in campaign.laws}
+    for law in failed.values():
+        law.metrics["base_turn"] = np.full(3, nan)  # type: ignore[index]
     (section,) = outcome_sections(campaign, failed)
     labels = {row.label: row.cells for row in section.rows}
     assert labels["grasp_error [m]"] == ("of 0 cases",) * 2 and "  median" not in labels

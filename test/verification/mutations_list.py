@@ -994,8 +994,8 @@ BREAKS: tuple[Break, ...] = (
     _core(
         "half a bag of an interrupted case left behind",
         "campaign/record/kept_cases",
-        "    finally:\n        _remove(unfinished)",
-        "    finally:\n        pass",
+        "        finally:\n            _remove(unfinished)",
+        "        finally:\n            pass",
         "campaign_commands",
     ),
     _core(
@@ -1017,14 +1017,14 @@ BREAKS: tuple[Break, ...] = (
         "campaign/record/journal",
         "if its_campaign != campaign[:_DIGITS]:",
         "if False:",
-        "campaign_record",
+        "campaign_folder",
     ),
     _core(
         "a row of a law that the campaign does not have counted",
         "campaign/record/campaign_folder",
         "if not self._has(task):",
         "if False:",
-        "campaign_record",
+        "campaign_folder",
     ),
     _core(
         "Wilson's bounds outside the share by rounding",
