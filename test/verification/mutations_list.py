@@ -1087,7 +1087,7 @@ BREAKS: tuple[Break, ...] = (
         "campaign/definition/success_expression",
         "Applied(_compared(_COMPARED[type(one)]), (left, right))",
         "Applied(_COMPARED[type(one)], (left, right))",
-        "campaign_file",
+        "success_expression",
     ),
     _core(
         "shipped conditions that a draw names not kept with the campaign",
@@ -1192,7 +1192,7 @@ BREAKS: tuple[Break, ...] = (
         "campaign/definition/success_expression",
         "return _defined([value], not value)",
         "return not value or value != value",
-        "campaign_file",
+        "success_expression",
     ),
     _core(
         "a draw for all that one for the plant alone undoes",
