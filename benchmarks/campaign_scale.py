@@ -335,10 +335,10 @@ to {_PROCESSES} workers a case may take {_MS * _MOST_OVERHEAD_S:.0f} ms beyond i
 {table(["Workers", "Overhead per case [ms]", "Efficiency", "Overhead, Dask's defaults [ms]"], added)}
 
 Threads are measured with `{_SATURATION}` at {_ONE_EACH}, one chunk a thread, and at
-the {_DASK_HAS} that Dask has: rounded up, a worker of 8 threads then gets a ninth, which waits there while
-another worker is idle, and which Dask moves between smaller workers only. That is one case at the end of
-a campaign, here shared by {_PER_WORKER} rounds. Workers of `-j` have one thread each; a scheduler of yours
-whose workers have many is best started with `DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION={_ONE_EACH}`.
+the {_DASK_HAS} that Dask has: rounded up, a worker then gets a chunk more than it has threads, which may wait
+there while another worker is idle. In some runs that costs a case at the end of a campaign, shared here by
+{_PER_WORKER} rounds, in others nothing. Workers of `-j` have one thread each; a scheduler of yours whose workers
+have many is best started with `DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION={_ONE_EACH}`.
 
 ## Ctrl-C
 
