@@ -337,8 +337,8 @@ to {_PROCESSES} workers a case may take {_MS * _MOST_OVERHEAD_S:.0f} ms beyond i
 Threads are measured with `{_SATURATION}` at {_ONE_EACH}, one chunk a thread, and at
 the {_DASK_HAS} that Dask has: rounded up, a worker then gets a chunk more than it has threads, which may wait
 there while another worker is idle. In some runs that costs a case at the end of a campaign, shared here by
-{_PER_WORKER} rounds, in others nothing. Workers of `-j` have one thread each; a scheduler of yours whose workers
-have many is best started with `DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION={_ONE_EACH}`.
+{_PER_WORKER} rounds, in others nothing. Workers of `-j` have one thread each; a scheduler of yours whose
+workers have many is best started with `DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION={_ONE_EACH}`.
 
 ## Ctrl-C
 
