@@ -127,7 +127,8 @@ PID overshoots them by tenths of a metre, and an arm that came straight at the d
 Robot, gains, tick and the three phases of 20 s are those of `paper`.
 
 Possible means: targets in reach, the task completed under both laws with every grasp made, no two bodies that
-touch at any reference period, joints within their limits of position and rate. Most candidates are not:
+touch at any reference period, joints within their limits of position and rate. The claim of completion asks
+for more: that B ends settled on its final pose, where PID may still ring. Most candidates are not possible:
 {simulated} were simulated for these {number}; one that fails is drawn anew in the phase in which it failed.
 Where they failed most often:
 
