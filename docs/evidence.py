@@ -74,6 +74,7 @@ def page(folder: CampaignFolder) -> str:
     )
     head = ["Scenario", "Law", "Success", *(_FIGURES[metric][0] for metric in _LISTED)]
     laws, seconds = ", ".join(campaign.laws), campaign.values["common.duration"]
+    too_few = f"{note}\n\n" if (note := note_on_tests(made)) else ""
     return f"""\
 # Ranking of the control laws
 
@@ -111,9 +112,7 @@ laws that plan have. {PERCENTILES}
 McNemar's exact test of successes and Wilcoxon's signed-rank test of the grasp error, by which laws are
 ranked; p adjusted by Holm over all of these. Of the other figures there are intervals.
 
-{note_on_tests(made)}
-
-{table(["Scenario", "Laws", "What", "Cases", "Difference", "p", "p, Holm"], tests)}
+{too_few}{table(["Scenario", "Laws", "What", "Cases", "Difference", "p", "p, Holm"], tests)}
 
 {failures}
 ## What this is not
