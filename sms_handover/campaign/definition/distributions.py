@@ -31,7 +31,7 @@ class Distribution(Protocol):
         """Return it in words."""
 
 
-class _Range:
+class Continuous:
     """A distribution that fills a range."""
 
     @property
@@ -41,7 +41,7 @@ class _Range:
 
 
 @dataclass(frozen=True)
-class Normal(_Range):
+class Normal(Continuous):
     """A normal distribution."""
 
     mean: float
@@ -56,7 +56,7 @@ class Normal(_Range):
 
 
 @dataclass(frozen=True)
-class Truncated(_Range):
+class Truncated(Continuous):
     """A normal distribution of which only what is within bounds is drawn."""
 
     mean: float
@@ -103,7 +103,7 @@ class Truncated(_Range):
 
 
 @dataclass(frozen=True)
-class Uniform(_Range):
+class Uniform(Continuous):
     """A uniform distribution."""
 
     low: float
