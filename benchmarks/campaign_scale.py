@@ -6,9 +6,7 @@ figure is beyond its bound; ``--largest 1000 --seconds 0.2 --print`` is a quick 
 
 import json
 import logging
-import os
 import resource
-import signal
 import subprocess
 import sys
 import tempfile
@@ -23,6 +21,7 @@ from typing import NamedTuple
 import dask
 import distributed
 
+from benchmarks.campaign_interrupt import leaving
 from benchmarks.campaign_stub import row_text
 from benchmarks.machine import load_average, machine
 from benchmarks.results import ROOT
@@ -51,7 +50,6 @@ _MOST_OVERHEAD_S = 0.020  # [s] of a case of 3 s, with a worker for each process
 _LEAST_EFFICIENCY = 0.95  # [-] then
 _MOST_GROWTH = 1.10  # [-] of the memory of a driver, from 1e3 to 1e5 cases
 _MOST_LEAVING_S = 5.0  # [s] from Ctrl-C to the end of the driver
-_LOOK_S = 0.02  # [s] between two looks at a journal
 _GB, _MB, _MS = 1e9, 1e6, 1e3
 _H = 3600.0  # [s]
 _TASKS = (300.0, 700.0)  # [1/s] that the scheduler of Dask takes
@@ -60,15 +58,6 @@ _FILE = """\
 name: scale
 seed: 1
 scenarios: {smooth: smooth}
-laws: [nmpc]
-"""
-_INTERRUPTED = """\
-name: interrupted
-seed: 1
-cases: 100
-scenarios:
-  first: {scenario: smooth, values: {common.duration: 0.04}}
-  long: smooth
 laws: [nmpc]
 """
 
@@ -206,25 +195,6 @@ def overhead(workers: int, seconds: float, saturation: float) -> float:
 def growth(drivers: Sequence[Driver]) -> float:
     """Return the factor by which the memory of a running driver changes from 1e3 cases to the most."""
     return drivers[-1].running / next(one for one in drivers if one.cases >= CASES[1]).running
-
-
-def leaving(jobs: int) -> float:
-    """Return the wall time in s from Ctrl-C, as of a terminal, to the end of a driver with long cases."""
-    with tempfile.TemporaryDirectory() as scratch:
-        file, out = Path(scratch) / "interrupted.yaml", Path(scratch) / "out"
-        file.write_text(_INTERRUPTED, encoding="utf-8")
-        words = [sys.executable, "-m", "sms_handover.cli.main", "campaign", "run", str(file)]
-        with subprocess.Popen(
-            [*words, "-o", str(out), "-j", str(jobs)], stderr=subprocess.DEVNULL, start_new_session=True
-        ) as child:
-            while not ((out / JOURNAL).exists() and (out / JOURNAL).read_bytes()):
-                if child.poll() is not None:
-                    raise SystemExit(f"a campaign to interrupt ended with {child.returncode}")
-                time.sleep(_LOOK_S)
-            os.killpg(child.pid, signal.SIGINT)
-            begin = time.perf_counter()
-            child.wait()
-            return time.perf_counter() - begin
 
 
 def beyond(
