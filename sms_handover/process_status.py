@@ -1,6 +1,7 @@
 """Process status: the session and group of a process, and when it started, as the system tells them."""
 
 import os
+from collections.abc import Collection
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,3 +26,9 @@ def process_status(pid: int) -> ProcessStatus | None:
     except OSError:
         return None
     return None if state in b"ZX" else ProcessStatus(int(session), int(group), int(rest[15]))
+
+
+def running_in(sessions: Collection[int]) -> dict[int, ProcessStatus]:
+    """Return what runs in some sessions by its id; where the system has no list, what began them alone."""
+    pids = [int(name) for name in os.listdir(PROC) if name.isdecimal()] if PROC.is_dir() else sessions
+    return {pid: status for pid in pids if (status := process_status(pid)) and status.session in sessions}

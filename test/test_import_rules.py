@@ -20,7 +20,10 @@ FILES = sorted((ROOT / PACKAGE).rglob("*.py"))
 
 FOUNDATION = "foundation"
 FRONT_DOOR = "front door"  # the names of sms_handover itself, imported when they are used
-FOUNDATION_MODULES = {"types", "errors", "units", "frames", "run_data", "plan_report", "previewed_targets"}
+FOUNDATION_MODULES = {
+    *("types", "errors", "units", "frames", "run_data", "plan_report", "previewed_targets"),
+    "process_status",  # of processes that campaigns and the launcher start
+}
 FOUNDATION_ROOMS = {"configuration", "graph"}  # known to all; configuration knows the names of the graph too
 MIDDLE = {"plant", "trajectory", "ik", "control"}
 CORE = {

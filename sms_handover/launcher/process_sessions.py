@@ -9,11 +9,11 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from contextlib import suppress
 from time import monotonic, sleep
 
-from sms_handover.ros.process.process_status import PROC, ProcessStatus, process_status
+from sms_handover.process_status import ProcessStatus, running_in
 
 GRACE_S = 20.0  # [s] of wall time that processes get to end when asked to, before they are killed
 
@@ -27,12 +27,12 @@ def end_sessions(sessions: Collection[int], grace_s: float) -> set[int]:
     in which something had to be killed.
     """
     for number in (signal.SIGTERM, signal.SIGCONT):
-        _signal(_running(sessions), number)
+        _signal(running_in(sessions).values(), number)
     deadline = monotonic() + grace_s
-    while (left := _running(sessions)) and monotonic() < deadline:
+    while (left := running_in(sessions)) and monotonic() < deadline:
         sleep(_POLL_PERIOD_S)
-    _signal(left, signal.SIGKILL)
-    return {status.session for status in left}
+    _signal(left.values(), signal.SIGKILL)
+    return {status.session for status in left.values()}
 
 
 class SessionGuard:
@@ -61,13 +61,7 @@ class SessionGuard:
         self._process.communicate()
 
 
-def _running(sessions: Collection[int]) -> list[ProcessStatus]:
-    """Return what runs in sessions, a process for each process group at least."""
-    pids = [int(name) for name in os.listdir(PROC) if name.isdecimal()] if PROC.is_dir() else sessions
-    return [status for pid in pids if (status := process_status(pid)) and status.session in sessions]
-
-
-def _signal(processes: Collection[ProcessStatus], number: signal.Signals) -> None:
+def _signal(processes: Iterable[ProcessStatus], number: signal.Signals) -> None:
     for group in {status.group for status in processes}:
         with suppress(ProcessLookupError, PermissionError):  # it has ended, or is another user's
             os.killpg(group, number)

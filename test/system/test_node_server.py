@@ -13,8 +13,8 @@ from sms_handover.launcher.domain import reserved_domain
 from sms_handover.launcher.interrupts import Interrupts
 from sms_handover.launcher.node_server import ForkedProcess, NodeServer
 from sms_handover.launcher.processes import NodeProcesses
+from sms_handover.process_status import process_status
 from sms_handover.ros.process.launcher_process import LAUNCHER_PID
-from sms_handover.ros.process.process_status import process_status
 
 from .runs import DEADLINE_S, has_ended
 

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-_PROC = Path("/proc")  # of Linux
+from sms_handover.process_status import PROC, running_in
+
 _MB = 1e6  # [byte]
 _KIB = 1024  # [byte]
 _END_S = 1.0  # [s] that the system takes at most to end what is killed
@@ -53,45 +54,32 @@ def takes_more(pid: int, limit_mb: float) -> bool:
 
 def end_session(leader: "subprocess.Popen[bytes]") -> None:
     """End at once whatever runs in the session that a child began, whether or not the child still does."""
-    if leader.poll() is not None and (_PROC / str(leader.pid)).exists():
+    if leader.poll() is not None and (PROC / str(leader.pid)).exists():
         return  # another process has its id by now, which it could not have while the session is there
     with suppress(ProcessLookupError, PermissionError):
         os.killpg(leader.pid, signal.SIGKILL)
     latest = time.monotonic() + _END_S
-    while (members := _members(leader.pid)) and time.monotonic() < latest:
+    while PROC.is_dir() and (members := running_in({leader.pid})) and time.monotonic() < latest:
         for pid in members:  # of groups of their own, or begun meanwhile
             with suppress(ProcessLookupError, PermissionError):
                 os.kill(pid, signal.SIGKILL)
         time.sleep(_LOOK_S)
 
 
-def _members(session: int) -> list[int]:
-    """Return the processes of a session that have not ended."""
-    pids = [int(name) for name in os.listdir(_PROC) if name.isdecimal()] if _PROC.is_dir() else []
-    found = []
-    for pid in pids:
-        with suppress(OSError):
-            # the name of the program stands in parentheses and may contain any character
-            state, _, _, its, *_ = (_PROC / f"{pid}/stat").read_bytes().rpartition(b")")[2].split()
-            if int(its) == session and state not in b"ZX":
-                found.append(pid)
-    return found
-
-
 def _tree(pid: int) -> Iterator[int]:
     """Yield a process and all that is below it."""
     yield pid
     with suppress(OSError):
-        for task in os.listdir(_PROC / f"{pid}/task"):
+        for task in os.listdir(PROC / f"{pid}/task"):
             with suppress(OSError):
-                for child in (_PROC / f"{pid}/task/{task}/children").read_text(encoding="ascii").split():
+                for child in (PROC / f"{pid}/task/{task}/children").read_text(encoding="ascii").split():
                     yield from _tree(int(child))
 
 
 def _resident_mb(pid: int) -> float:
     """Return the resident memory of a process in MB, 0 where the system does not tell."""
     try:
-        pages = int((_PROC / f"{pid}/statm").read_text(encoding="ascii").split()[1])
+        pages = int((PROC / f"{pid}/statm").read_text(encoding="ascii").split()[1])
     except (OSError, ValueError, IndexError):
         return 0.0
     return pages * os.sysconf("SC_PAGE_SIZE") / _MB
@@ -100,7 +88,7 @@ def _resident_mb(pid: int) -> float:
 def _share_mb(pid: int) -> float:
     """Return the share of a process in memory in MB, of shared pages a part; all of it if that is unknown."""
     try:
-        lines = (_PROC / f"{pid}/smaps_rollup").read_text(encoding="ascii").splitlines()
+        lines = (PROC / f"{pid}/smaps_rollup").read_text(encoding="ascii").splitlines()
         return next(int(line.split()[1]) for line in lines if line.startswith("Pss:")) * _KIB / _MB
     except (OSError, ValueError, StopIteration):
         return _resident_mb(pid)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import NamedTuple
 
-from sms_handover.ros.process.process_status import PROC, process_status
+from sms_handover.process_status import PROC, process_status
 
 # Environment variables that a launcher sets for its nodes, whatever runs between: its id and its start.
 LAUNCHER_PID, LAUNCHER_START = "SMS_HANDOVER_LAUNCHER_PID", "SMS_HANDOVER_LAUNCHER_START"
